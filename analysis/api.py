@@ -200,7 +200,7 @@ def fit(
     >>> fit(quickstart(), simulate(quickstart())).converged
     True
     """
-    from ballplate.simulator.design.layout import lay_out
+    from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.readings.reading_files import read_readings
 
     from .results import study

@@ -66,7 +66,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         default=[],
         help=(
             "what a design must reach, too, as in ballplate reach: lengths (U6 within"
-            ' target_uncertainty), tasks, or a quantity such as "U6 average 0.5 um"; may be repeated'
+            " target_uncertainty), tasks, or a quantity such as "
+            '"U6 average 0.5 um"; may be repeated'
         ),
     )
     parser.add_argument(

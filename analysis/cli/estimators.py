@@ -1,7 +1,7 @@
 """Estimators beside the full one that `ballplate fit --estimator` offers.
 
-A further one is a function from the options, the experiment and its readings to an `EstimatorOutcome`, and
-one line in `ESTIMATORS`.
+A further one is a function from the options, the experiment and its readings to an
+`EstimatorOutcome`, and one line in `ESTIMATORS`.
 """
 
 from __future__ import annotations

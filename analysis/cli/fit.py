@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
+    from ..results.fit import Fit
+
 
 # In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -95,42 +97,15 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
-    from ballplate.simulator.design.layout import lay_out
-    from ballplate.simulator.inputs.messages import in_one_line
-    from ballplate.simulator.inputs.settings import listing
+    from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.readings.certificate_files import read_certificate
-    from ballplate.simulator.readings.gross_error_messages import (
-        doubts_about_lengths,
-        doubts_about_volume,
-    )
     from ballplate.simulator.readings.reading_files import read_readings
 
     from ..results.study import fit
     from .common import print_json, print_lines, single
 
-    for option, given, estimators in (
-        ("--scale", options.scale, ("reversal",)),
-        ("--no-offsets", options.no_offsets, ("reversal",)),
-        ("--pairs", options.pairs, OF_DISTANCES),
-        ("--across-probes", options.across_probes, OF_DISTANCES),
-        ("--monomials", options.monomials, ("full", *OF_DISTANCES)),
-    ):
-        if given and options.estimator not in estimators:
-            wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
-            print(
-                f"ballplate fit: {option} goes with --estimator {wanted} only; leave it out",
-                file=sys.stderr,
-            )
-            return 2
-    if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (
-        ".yaml",
-        ".yml",
-    ):
-        told = (
-            f"the experiment file comes first, then the readings: fit {options.readings}"
-            f" {options.files[0]}"
-        )
-        print(f"ballplate fit: {told}", file=sys.stderr)
+    if complaint := _misused(options):
+        print(f"ballplate fit: {complaint}", file=sys.stderr)
         return 2
     experiment = single(options)
     if options.certificate:
@@ -145,16 +120,7 @@ def run(options: Namespace) -> int:
         print(f"ballplate fit: {text}", file=sys.stderr)
         return 2
     observed = read_readings(options.readings, lay_out(experiment))
-    for what, names in (
-        ("planned but not read", observed.missing),
-        ("read but not planned", observed.unplanned),
-    ):
-        if names:
-            told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
-            print(in_one_line(told), file=sys.stderr)
-    doubts = doubts_about_lengths(observed.design, observed.x)
-    for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
-        print(f"warning: {doubt}", file=sys.stderr)
+    _warn_of_readings(options, observed)
     if options.estimator != "full":
         return _run_other(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
@@ -180,24 +146,73 @@ def run(options: Namespace) -> int:
         return 1
     if not is_drawn:
         return 3
-    if result.too_large:
-        times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
-        cure = (
-            "no single mistake explains that: try a richer error model or larger uncertainties, and"
-            " think of drifts"
-        )
-        if result.diagnosis.suspects or result.diagnosis.scatter:
-            cure = "look at what is suspected"
-        print(
-            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {cure}",
-            file=sys.stderr,
-        )
-    for doubt in result.doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
+    _warn(result)
     if not result.verdict.as_expected:
         print(result.verdict.complaint, file=sys.stderr)
         return 1
     return 0
+
+
+def _misused(options: Namespace) -> str:
+    """What is wrong with options that do not go together; empty where they do."""
+    for option, given, estimators in (
+        ("--scale", options.scale, ("reversal",)),
+        ("--no-offsets", options.no_offsets, ("reversal",)),
+        ("--pairs", options.pairs, OF_DISTANCES),
+        ("--across-probes", options.across_probes, OF_DISTANCES),
+        ("--monomials", options.monomials, ("full", *OF_DISTANCES)),
+    ):
+        if given and options.estimator not in estimators:
+            wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
+            return f"{option} goes with --estimator {wanted} only; leave it out"
+    if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (
+        ".yaml",
+        ".yml",
+    ):
+        return (
+            f"the experiment file comes first, then the readings: fit {options.readings}"
+            f" {options.files[0]}"
+        )
+    return ""
+
+
+def _warn_of_readings(options: Namespace, observed: ObservedReadings) -> None:
+    """Warn of readings that are missing or not planned, and of those that are in doubt."""
+    from ballplate.simulator.inputs.messages import in_one_line
+    from ballplate.simulator.inputs.settings import listing
+    from ballplate.simulator.readings.gross_error_messages import (
+        doubts_about_lengths,
+        doubts_about_volume,
+    )
+
+    for what, names in (
+        ("planned but not read", observed.missing),
+        ("read but not planned", observed.unplanned),
+    ):
+        if names:
+            told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
+            print(in_one_line(told), file=sys.stderr)
+    doubts = doubts_about_lengths(observed.design, observed.x)
+    for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
+        print(f"warning: {doubt}", file=sys.stderr)
+
+
+def _warn(result: Fit) -> None:
+    """Warn where the fit leaves more than the stated uncertainties explain, and of its doubts."""
+    if result.too_large:
+        times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
+        advice = (
+            "no single mistake explains that: try a richer error model or larger uncertainties, and"
+            " think of drifts"
+        )
+        if result.diagnosis.suspects or result.diagnosis.scatter:
+            advice = "look at what is suspected"
+        print(
+            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {advice}",
+            file=sys.stderr,
+        )
+    for doubt in result.doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
 
 
 def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:

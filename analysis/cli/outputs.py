@@ -223,7 +223,7 @@ def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
         for path in paths:
             if name not in outputs and isinstance(path, Path):
                 yield path
-                if name == "store":
+                if name == "store" and path.name:
                     yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
                 if name in NAMING and path.suffix.lower() != ".csv":
                     yield from named_by(path)

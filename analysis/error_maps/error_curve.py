@@ -127,31 +127,7 @@ def fit_curve(
     x, points = x[order], points.chosen(order.tolist())
     boundaries = tuple(sorted(set(boundaries)))
     knots = settings.knots
-    problems = [
-        SplineProblem(
-            f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of"
-            " the curve"
-        )
-        for k in settings.straight
-        if not 1 <= k <= len(boundaries) + 1
-    ]
-    problems += [
-        SplineProblem(
-            "the boundary at {0} is not between the ends of the curve, {1} and {2}",
-            (place, lower, upper),
-        )
-        for place in boundaries
-        if not lower < place < upper
-    ]
-    problems += [
-        SplineProblem("{0} is a boundary and a knot; leave it out of the knots", (knot,))
-        for knot in knots or ()
-        if knot in boundaries
-    ]
-    if settings.order < 3 and boundaries:
-        problems.append(
-            SplineProblem("broken lines share no slope at boundaries; give an order of 3 or more")
-        )
+    problems = _misplaced(settings, boundaries, lower, upper)
     if problems:
         raise SplineError(problems)
     features = list(pairwise((lower, *boundaries, upper)))
@@ -196,6 +172,38 @@ def fit_curve(
         stated is not None,
         on_profile,
     )
+
+
+def _misplaced(
+    settings: CurveSettings, boundaries: tuple[float, ...], lower: float, upper: float
+) -> list[SplineProblem]:
+    """What is wrong with features, boundaries and knots between the ends of a curve."""
+    problems = [
+        SplineProblem(
+            f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of"
+            " the curve"
+        )
+        for k in settings.straight
+        if not 1 <= k <= len(boundaries) + 1
+    ]
+    problems += [
+        SplineProblem(
+            "the boundary at {0} is not between the ends of the curve, {1} and {2}",
+            (place, lower, upper),
+        )
+        for place in boundaries
+        if not lower < place < upper
+    ]
+    problems += [
+        SplineProblem("{0} is a boundary and a knot; leave it out of the knots", (knot,))
+        for knot in settings.knots or ()
+        if knot in boundaries
+    ]
+    if settings.order < 3 and boundaries:
+        problems.append(
+            SplineProblem("broken lines share no slope at boundaries; give an order of 3 or more")
+        )
+    return problems
 
 
 def whole_profile(points: CurvePoints, boundaries: Array) -> tuple[Profile, Array]:

@@ -11,9 +11,9 @@ from ballplate.simulator.computing.rounding import above, comparable
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.protocol import Array, Integers
@@ -187,12 +187,8 @@ def _tiles(
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:
     """Points (n, d) of a grid over the whole volume, the last axis changing fastest."""
-    sides = [
-        np.linspace(*ends)
-        for ends in zip(
-            design.machine.volume.lower, design.machine.volume.upper, counts, strict=True
-        )
-    ]
+    ends = zip(*design.machine.volume.corners, counts, strict=True)
+    sides = [np.linspace(*one) for one in ends]
     return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, design.dimension)
 
 

@@ -1,5 +1,5 @@
-"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as
-in section 6.2.7.
+"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a
+comparison as in section 6.2.7.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     AlternativeSolution,
@@ -22,12 +22,12 @@ from ballplate.simulator.estimation.length_equations import (
     NotAMetricError,
     length_estimate,
 )
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.readings.generate import (
     NoReadingError,
     noisy_certificate,
@@ -42,8 +42,8 @@ from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
-# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for each, and
-# more for few parameters.
+# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for
+# each, and more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
 # Pairs of points of a comparison.
@@ -56,8 +56,8 @@ COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 @dataclass(frozen=True)
 class AlternativeFit:
-    """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of balls,
-    without uncertainties.
+    """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of
+    balls, without uncertainties.
     """
 
     label: str
@@ -70,8 +70,8 @@ class AlternativeFit:
 
 @dataclass(frozen=True)
 class EstimatorComparison:
-    """How far an alternative estimator's corrected distances are from the full estimator's, over `trials` synthetic
-    data sets.
+    """How far an alternative estimator's corrected distances are from the full estimator's, over
+    `trials` synthetic data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
@@ -118,8 +118,8 @@ def count_terms(
     name: str | None = None,
     across_probes: bool = False,
 ) -> int:
-    """Number of terms of an alternative estimator, but for certificates and priors, if every position has
-    all the balls.
+    """Number of terms of an alternative estimator, but for certificates and priors, if every
+    position has all the balls.
     """
     count = 0
     artefact_of = design.balls.artefact[design.readings.ball]
@@ -169,13 +169,9 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
 
     :raises ExperimentError: a Bryan gauge, or a length standard without a certificate.
     """
-    gauges = design.artefacts.is_gauge is not None and bool(design.artefacts.is_gauge.any())
-    if gauges or design.unknown_lengths.names:
-        what = (
-            "a Bryan gauge's pivot"
-            if gauges
-            else f"an unknown length ({design.unknown_lengths.names[0]})"
-        )
+    gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
+    if gauges or unknown:
+        what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
         text = (
             f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         )
@@ -260,7 +256,7 @@ def compare_estimators(
     points: int = 200,
     report: Report = unreported,
 ) -> EstimatorComparison:
-    """Compare a rival with the full estimator on readings of the file's true machine.
+    """Compare an alternative with the full estimator on readings of the file's true machine.
 
     Each data set has noise, a certificate and `points` random pairs of points in the volume of its
     own, all drawn from `seed` (default: the file's) and its number, so that more data sets only add
@@ -275,9 +271,8 @@ def compare_estimators(
         _refuse_unknown_lengths(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
-    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
@@ -341,7 +336,7 @@ def _both_estimates(
             if full.status == "converged" and solved.converged
             else None
         )
-    rival = alternative_estimate(
+    alternative = alternative_estimate(
         observed.design,
         observed.x,
         chosen,
@@ -350,9 +345,9 @@ def _both_estimates(
         COMPARISON_TOLERANCE,
         start=full.state.a,
     )
-    if full.status != "converged" or rival.status != "converged":
+    if full.status != "converged" or alternative.status != "converged":
         return None
-    return full.state.a, rival.a
+    return full.state.a, alternative.a
 
 
 def _distances(design: Design, a: Array, ends: Array) -> Array:
@@ -404,7 +399,9 @@ def _used(pairs: int, lengths: int) -> str:
 
 
 def alternative_fit_data(fit: AlternativeFit) -> dict[str, Any]:
-    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is None."""
+    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
+    None.
+    """
     return {
         "experiment": fit.label,
         "title": fit.title,

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.length_equations import (
     LengthEstimator,
     LengthSolution,
@@ -22,8 +24,6 @@ from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.priors import Priors
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
 from ..presentation.formatting import aligned, finite, number
@@ -67,28 +67,7 @@ def fit_lengths(
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
     """
     design = observed.design
-    if design.dimension != 3 or not len(design.of(Lengths)):
-        what = "machine.volume" if design.dimension != 3 else "artefacts"
-        has = (
-            "has two dimensions"
-            if design.dimension != 3
-            else "has no ball bar or Bryan gauge whose lengths are read"
-        )
-        text = (
-            f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
-        )
-        bars = [
-            name
-            for name, one in experiment.artefacts.items()
-            if isinstance(one, TwoSpheresSettings)
-        ]
-        if bars and design.dimension == 3:
-            text = (
-                f"is a plate, but {estimator} needs length standards; state role: length_standard"
-            )
-            mark = experiment.place(("artefacts", bars[0]))
-            raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
-        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+    _refuse_other_artefacts(experiment, design, estimator)
     try:
         solution = length_estimate(design, observed.x, estimator)
     except NotAMetricError as error:
@@ -97,12 +76,58 @@ def fit_lengths(
             " directions"
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
+    remarks = _remarks(design, estimator, solution)
+    factors = np.where(solution.open_factors, np.nan, solution.factors)
+    centres = np.where(solution.open_centres, np.nan, solution.centres)
+    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
+    return LengthFit(
+        experiment.label,
+        experiment.title,
+        solution,
+        adjustments(
+            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
+        ),
+        tuple(factors.tolist()),
+        tuple(
+            (design.positions.names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
+        ),
+        tuple(zip(design.unknown_lengths.names, lengths.tolist(), strict=True)),
+        tuple(remarks),
+        tuple(_spheres(design, observed.x)),
+    )
+
+
+def _refuse_other_artefacts(
+    experiment: Experiment, design: Design, estimator: LengthEstimator
+) -> None:
+    """Refuse an experiment that has no lengths in three dimensions."""
+    if design.dimension == 3 and len(design.of(Lengths)):
+        return
+    what = "machine.volume" if design.dimension != 3 else "artefacts"
+    has = (
+        "has two dimensions"
+        if design.dimension != 3
+        else "has no ball bar or Bryan gauge whose lengths are read"
+    )
+    text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
+    bars = [
+        name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)
+    ]
+    if bars and design.dimension == 3:
+        text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
+        mark = experiment.place(("artefacts", bars[0]))
+        raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
+    raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+
+
+def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolution) -> list[str]:
+    """What should be known beside the figures."""
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
     if len(design.of(Priors)):
         remarks.append(f"{estimator} takes no notice of priors")
-    if design.probes.free.any() and design.probes.free.any():
+    if design.probes.free.any():
         remarks.append(
             f"{estimator} takes the probes' offsets as the file states them, though they are"
             " unknown"
@@ -127,24 +152,7 @@ def fit_lengths(
     instead = "the full estimator with --sigma given takes the uncertainties as stated"
     doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
     remarks += [doubt] if doubt else []
-    factors = np.where(solution.open_factors, np.nan, solution.factors)
-    centres = np.where(solution.open_centres, np.nan, solution.centres)
-    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
-    return LengthFit(
-        experiment.label,
-        experiment.title,
-        solution,
-        adjustments(
-            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
-        ),
-        tuple(factors.tolist()),
-        tuple(
-            (design.positions.names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
-        ),
-        tuple(zip(design.unknown_lengths.names, lengths.tolist(), strict=True)),
-        tuple(remarks),
-        tuple(_spheres(design, observed.x)),
-    )
+    return remarks
 
 
 def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:

@@ -15,8 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import (
     Reversal,
     UndeterminedError,
@@ -167,10 +167,7 @@ def fit_reversal(
     settings: MetricSettings = experiment.error_model
     scale = settings.plane_scale if scale is None else scale
     experiment = replace(experiment, error_model=settings.model_copy(update={"scale": scale}))
-    corners = (
-        tuple(map(float, experiment.machine.volume.lower)),
-        tuple(map(float, experiment.machine.volume.upper)),
-    )
+    corners = experiment.machine.volume.corners
     design = replace(observed.design, model=build_error_model(experiment.error_model, *corners))
     observed = replace(observed, design=design)
     seen = _mean_readings(observed)

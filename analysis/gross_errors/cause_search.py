@@ -141,9 +141,9 @@ class Search:
                 float(smooth.min(initial=0.0)),
                 float(scattered.min(initial=0.0)),
             )
-            rival = min(of_smooth, of_scatter)
+            alternative = min(of_smooth, of_scatter)
             significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
-            if significant and event.log_p < rival - LOG_ODDS_LIMIT:
+            if significant and event.log_p < alternative - LOG_ODDS_LIMIT:
                 columns = self._testable(self._with_other_directions(self._together(event.columns)))
                 chosen.append(
                     _Chosen(columns, event.log_p, self._range(columns), self._as_good(columns))
@@ -159,11 +159,13 @@ class Search:
                 )
                 for earlier in chosen:
                     self._take_out(earlier.columns)
-            elif rival < self.other_limit:
+            elif alternative < self.other_limit:
                 words = (
                     self.smooth[int(smooth.argmin())].words if of_smooth < self.other_limit else ""
                 )
-                return Diagnosis((), scatter, self._unexplained(words, rival, self.other_limit))
+                return Diagnosis(
+                    (), scatter, self._unexplained(words, alternative, self.other_limit)
+                )
             elif significant:
                 return Diagnosis((), scatter, self._unexplained("", event.log_p, self.limit))
             else:
@@ -199,9 +201,10 @@ class Search:
         return best
 
     def _smooth_chances(self, event: _Event) -> Array:
-        """Logarithms of the chances (k,) of all smooth errors as rivals of an event.
+        """Logarithms of the chances (k,) of all smooth errors as alternatives to an event.
 
-        One that contains the event is its rival only if the rest of it explains something as well.
+        One that contains the event is its alternative only if the rest of it explains something
+        as well.
         """
         taken = _basis(self.left, self._dense(event.columns))
         found = np.zeros(len(self.smooth))

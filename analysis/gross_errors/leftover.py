@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.hat import hat_rows, row_count, whitened_residuals
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:

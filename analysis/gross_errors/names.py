@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import length_name
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import length_name
 
 from .patterns import Patterns
 

@@ -14,23 +14,23 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, locations
-from ballplate.simulator.estimation.hat import row_count, row_places
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.observations.lengths import (
+from ballplate.simulator.design.observations.lengths import (
     Lengths,
     length_directions,
     length_values,
     length_whitening,
 )
-from ballplate.simulator.observations.readings import (
+from ballplate.simulator.design.observations.readings import (
     expected_readings,
     offset_sensitivity,
     reading_weights,
     rotation_sensitivity,
 )
+from ballplate.simulator.estimation.hat import row_count, row_places
+from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
-    from ballplate.simulator.observations.whitening import Whitening
+    from ballplate.simulator.design.observations.whitening import Whitening
     from scipy.sparse import csc_array
 
 # Axes along which a reading changes lengths by less than this share of the most are left out, and

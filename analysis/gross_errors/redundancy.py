@@ -12,10 +12,10 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import Functions, Parameters
 from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
@@ -62,6 +62,7 @@ def reliability(
     )
 
 
+# In one piece: one pass over the responses fills all sums of the result.
 @single_threaded
 def reliability_of(
     design: Design,

@@ -10,11 +10,15 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.lengths import (
+    Lengths,
+    length_directions,
+    length_whitening,
+)
+from ballplate.simulator.design.observations.readings import reading_weights, rotation_sensitivity
 from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.observations.lengths import Lengths, length_directions, length_whitening
-from ballplate.simulator.observations.readings import reading_weights, rotation_sensitivity
 from numpy.polynomial import legendre
 
 # Scale readings closer than this (m) count as the same place on a scale.

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
 
 from ..presentation.formatting import SHOWN, number
 from .cause_search import MOST
@@ -152,7 +152,8 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     if kind == "probe":
         told = f"offset {letter} of probe {design.probes.names[subject]} stated {size} too {high}"
         if len(suspect.columns) > 1:
-            told = f"offset of probe {design.probes.names[subject]} stated {_sizes(suspect, 'too high')}"
+            sizes = _sizes(suspect, "too high")
+            told = f"offset of probe {design.probes.names[subject]} stated {sizes}"
         return told, "qualify the probe again, or let its offset be estimated"
     place = design.positions.names[subject] if kind in ("shift", "turn", "expansion") else ""
     if kind in ("ball", "moved"):

@@ -20,8 +20,10 @@ NO_MISFIT = 1e-9
 def with_error(figure: MonteCarloEstimate, factor: float = 1.0) -> str:
     """A value with its standard error in units of the last digit, as the GUM writes it (7.2.2).
 
-    >>> with_error(MonteCarloEstimate(0.99213, 0.0066)), with_error(MonteCarloEstimate(0.9534, 0.0164), 100)
-    ('0.992(7)', '95(2)')
+    >>> with_error(MonteCarloEstimate(0.99213, 0.0066))
+    '0.992(7)'
+    >>> with_error(MonteCarloEstimate(0.9534, 0.0164), 100)
+    '95(2)'
     >>> with_error(MonteCarloEstimate(581.3, 7.3))
     '581(7)'
     """

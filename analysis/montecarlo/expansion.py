@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from ballplate.simulator.design.observations.readings import OFFSET_STEP, offset_sensitivity
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.observations.readings import OFFSET_STEP, offset_sensitivity
 from numpy.typing import NDArray
 
 Single = NDArray[np.float32]

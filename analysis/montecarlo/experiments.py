@@ -18,13 +18,13 @@ from ballplate.montecarlo.reference import (
     reference,
 )
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.priors import Priors
 from ballplate.simulator.readings.generate import NoReadingError, on_true_machine
 
 from .accumulator import Accumulator
@@ -74,7 +74,7 @@ def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
     design = lay_out(experiment)
     lower, upper = design.machine.volume.corners
     on_truth, state = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, lower, upper)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     return design, Truth(state, on_truth.model)
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, Rows, State
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.covariance import Spectrum
 from ballplate.simulator.estimation.elimination import Factor
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.readings.generate import scale_readings
 
 from .expansion import Direct, LocalModel, expand
@@ -123,8 +123,8 @@ class Reference:
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.
 
-    :raises NoReferenceError: a rank deficient design.
-    :raises TooWildError: readings without noise that cannot be fitted.
+    :raises RankDeficientError: a rank deficient design.
+    :raises DivergedError: readings without noise that cannot be fitted.
     :raises NoReadingError: errors of the true machine so large that no reading belongs to some
         location.
     """
@@ -172,7 +172,7 @@ def reference(design: Design, truth: Truth) -> Reference:
                 np.ascontiguousarray((blocks.residual / weight)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
                 local(exact[plates[chosen]], p[plates[chosen]]),
-                None if not observed.probes.free.any() else rows.probe,
+                rows.probe if observed.probes.free.any() else None,
             )
         )
         at += len(chosen)
@@ -256,7 +256,7 @@ def _as_slice(ascending: Integers) -> Integers | slice:
 def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool) -> LocalModel:
     """The model about readings x (m, d), with parameters a (n,) and probe offsets p (m, d)."""
     if is_expanded:
-        return expand(design.model, x, a, p, design.probes.free.any())
+        return expand(design.model, x, a, p, bool(design.probes.free.any()))
     return Direct(design.model, x, a, p, design.model.error(x, a, p))
 
 
@@ -269,9 +269,7 @@ def _is_faithful(
     noise = 1.0 / reading_weights(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, spectrum.root.shape[1])) @ spectrum.root[columns].T
-    offsets = (
-        None if not design.probes.free.any() else 1e-6 * generator.standard_normal(moved.shape)
-    )
+    offsets = 1e-6 * generator.standard_normal(moved.shape) if design.probes.free.any() else None
     expanded, direct = (
         _local_model(design, start.a, exact, p, is_expanded).change(moved, step, offsets)
         for is_expanded in (True, False)

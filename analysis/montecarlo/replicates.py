@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Replicates
+from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.elimination import Factor
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.substitution import solve_balls, solve_kept, solve_shared
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.observations.lengths import Lengths, length_values, length_whitening
 
 from .expansion import Single
 from .reference import PositionReadings, Reference

@@ -11,8 +11,9 @@ import numpy as np
 from ballplate.montecarlo.reference import Reference
 from ballplate.montecarlo.replicates import Deviations
 from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
-    Balls,
+    BallPlaces,
     Coordinates,
     Displacements,
     Distances,
@@ -22,7 +23,6 @@ from ballplate.simulator.estimation.functions import (
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -91,7 +91,7 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
     made: dict[bytes, Displaced] = {}
 
     def displaced(places: Places) -> Displaced:
-        if isinstance(places, Balls):
+        if isinstance(places, BallPlaces):
             truly = places.at(at.design, shared.truth.state)
             return Displaced(
                 displacements(at, places), truly, lambda found: found.balls[:, :, places.index]

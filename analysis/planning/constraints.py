@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes,
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from .schedule import Setup, changeover, kind_of
+from .changeover import Setup, changeover, kind_of
 
 HOUR = 3600.0
 

@@ -15,7 +15,12 @@ from itertools import chain
 from typing import Protocol
 
 import numpy as np
-from ballplate.simulator.estimation.functions import Balls, Distances, MeasuredPoints, point_rows
+from ballplate.simulator.estimation.functions import (
+    BallPlaces,
+    Distances,
+    MeasuredPoints,
+    point_rows,
+)
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -101,8 +106,8 @@ class Criterion:
     `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded`
     counts functions that the pool leaves open, whatever is chosen. `functions` are None of criteria
     that are about eigenvalues; these are of the model's parameters, `scaled` (n, z), in metres.
-    `target` is the criterion at which the target uncertainty is met on the average, None where there
-    is none. `needed` holds, for each artefact whose own distances count, its name and the
+    `target` is the criterion at which the target uncertainty is met on the average, None where
+    there is none. `needed` holds, for each artefact whose own distances count, its name and the
     candidates that place it: without one of them the distances are undetermined, whatever
     certificates say of them.
     """
@@ -447,7 +452,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         parts: list[Pairs | Linear] = []
         for given in kind.functions(drawn.design, drawn.layout):
             assert isinstance(given, Distances)
-            if isinstance(given.places, Balls):
+            if isinstance(given.places, BallPlaces):
                 plate = drawn.design.artefacts.names[
                     drawn.design.balls.artefact[given.places.index[0]]
                 ]
@@ -467,8 +472,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
 
 
 def _target(experiment: Experiment, name: str, functions: Functions | None) -> float | None:
-    """The target uncertainty of the functions: its mean for an average, for a largest value only where
-    it is constant.
+    """The target uncertainty of the functions: its mean for an average, for a largest value only
+    where it is constant.
     """
     target = experiment.target_uncertainty
     if functions is None or target is None:
@@ -479,7 +484,7 @@ def _target(experiment: Experiment, name: str, functions: Functions | None) -> f
 
 
 def _of_shared(information: Information, rows: Array) -> Array:
-    """Rows (m, z) of the shared part of z from rows (m, c) of shared columns."""
+    """CandidateRows (m, z) of the shared part of z from rows (m, c) of shared columns."""
     return np.asarray(rows @ information.basis.shared_root)
 
 
@@ -487,7 +492,9 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
     """Distances that are determined, between all places or those pairs that have names."""
     of = given.places
     places = of.at(information.drawn.design, information.drawn.state)
-    moved = _of_balls(information, of) if isinstance(of, Balls) else _of_points(information, of)
+    moved = (
+        _of_balls(information, of) if isinstance(of, BallPlaces) else _of_points(information, of)
+    )
     # Without the motion of all places together, no digits are lost where distances are formed.
     displacement, open_ = (without_rigid_motion(places, amount) for amount in moved)
     if given.pairs is None:
@@ -503,7 +510,7 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
     return Linear(rows[kept], length[kept], int((~kept).sum()))
 
 
-def _of_balls(information: Information, places: Balls) -> tuple[Array, Array]:
+def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Array]:
     """Displacements of balls (n, d, z), and those that the pool leaves open, in metres."""
     basis, n, d = information.basis, len(places.index), information.drawn.design.dimension
     amounts = basis.balls[places.index].reshape(n * d, -1)

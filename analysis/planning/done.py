@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Readings
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -82,11 +82,7 @@ def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
     for number, (candidate, base) in enumerate(zip(drawn, found.values(), strict=True)):
         item = _position(candidate)
         own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
-        first = int(
-            np.flatnonzero(
-                design.balls.artefact == list(design.artefacts.names).index(item.artefact)
-            )[0]
-        )
+        first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
         taken = tuple(_groups(own_readings, first, design.probes.names, experiment, item))
         result.append(_set_up(experiment, candidate, base, taken, candidate.name == name))
     return tuple(result)

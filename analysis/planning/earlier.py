@@ -6,10 +6,10 @@ from dataclasses import fields
 from typing import Any, cast
 
 import numpy as np
+from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.observations.calibration import Calibration
 
 from .offer import Offer
 

@@ -19,6 +19,8 @@ import numpy as np
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
+from ballplate.simulator.design.observations.readings import reading_weights, rotation_sensitivity
 from ballplate.simulator.estimation.covariance import EXACT
 from ballplate.simulator.estimation.elimination import ALIKE
 from ballplate.simulator.estimation.graded import Collected, Triangle
@@ -26,10 +28,8 @@ from ballplate.simulator.estimation.graded import triangle as triangular
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.lengths import Lengths, length_deviations
-from ballplate.simulator.observations.readings import reading_weights, rotation_sensitivity
 
-from .rows import STEP, PoolDesign, Rows, always, calibration_rows, draw, position_rows
+from .rows import STEP, CandidateRows, PoolDesign, always, calibration_rows, draw, position_rows
 
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
@@ -72,7 +72,7 @@ class InformationBasis:
         return self.of_balls + int(self.shared_root.shape[1])
 
     def rows(self, by_amount: Array, by_shared: Array) -> Array:
-        """Rows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m,
+        """CandidateRows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m,
         c).
         """
         shared = (by_shared - by_amount @ self.ball_shared) @ self.shared_root
@@ -192,7 +192,7 @@ def pool_information(
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
     drawn = draw(experiment, positions)
     some = replace(experiment, positions=tuple(positions[:1]))
-    items: dict[int, list[Rows]] = {
+    items: dict[int, list[CandidateRows]] = {
         k: calibration_rows(drawn, some, candidate.item, candidate.name)
         for k, candidate in enumerate(candidates)
         if not isinstance(candidate.item, Position)
@@ -275,8 +275,8 @@ def pool_information(
     )
 
 
-def _in_amounts(rows: Rows, balls: Array) -> Array:
-    """Rows (m, y + c) by amounts of ball combinations and shared columns, the pose projected
+def _in_amounts(rows: CandidateRows, balls: Array) -> Array:
+    """CandidateRows (m, y + c) by amounts of ball combinations and shared columns, the pose projected
     out.
     """
     y = balls.shape[2]
@@ -303,13 +303,13 @@ def _position_weight(drawn: PoolDesign) -> float:
     return STEP * max(float(of_readings.max(initial=0.0)), float(of_lengths.max(initial=0.0)))
 
 
-def _sizes(rows: Rows) -> Array:
+def _sizes(rows: CandidateRows) -> Array:
     """Lengths (m,) of rows."""
     of_ball = (rows.by_ball**2).sum(axis=2).max(axis=1, initial=0.0)
     return np.asarray(np.sqrt(of_ball + (rows.by_shared**2).sum(axis=1)))
 
 
-def _differs(rows: Rows, weight: float) -> bool:
+def _differs(rows: CandidateRows, weight: float) -> bool:
     """Whether any row's weight differs from `weight` by more than plain orthogonal transformations
     keep apart.
     """
@@ -317,8 +317,8 @@ def _differs(rows: Rows, weight: float) -> bool:
     return bool((sizes > ALIKE * weight).any() or (ALIKE * sizes[sizes > 0.0] < weight).any())
 
 
-def _weighted(rows: Rows, least: float, most: float) -> Rows:
-    """Rows without a pose with weights between `least` and `most`."""
+def _weighted(rows: CandidateRows, least: float, most: float) -> CandidateRows:
+    """CandidateRows without a pose with weights between `least` and `most`."""
     sizes = _sizes(rows)[:, None]
     factor = np.clip(sizes, least, most) / np.where(sizes > 0.0, sizes, 1.0)
     by_ball = factor[:, :, None] * rows.by_ball
@@ -334,7 +334,7 @@ def _range(columns: Array) -> Array:
 
 
 def _reduced(rows: Array) -> Array:
-    """Rows of the same information, no more of them than columns."""
+    """CandidateRows of the same information, no more of them than columns."""
     return rows if len(rows) <= rows.shape[1] else np.asarray(np.linalg.qr(rows, mode="r"))
 
 
@@ -353,7 +353,7 @@ def _motions(design: Design) -> Array:
     return np.concatenate([np.zeros((n, d, 0)), *parts], axis=2)
 
 
-def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) -> Array:
+def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_balls: bool) -> Array:
     """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything
     that is shared.
 
@@ -391,7 +391,7 @@ def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) 
     return found.vectors.reshape(n, d, -1)
 
 
-def _by_balls(rows: Rows, columns: Array, n: int) -> Array:
+def _by_balls(rows: CandidateRows, columns: Array, n: int) -> Array:
     """Products (n * d, columns) of rows' derivatives by balls with other columns (m, columns)."""
     d = rows.by_ball.shape[2]
     total = np.zeros((n, d, columns.shape[1]))
@@ -400,7 +400,7 @@ def _by_balls(rows: Rows, columns: Array, n: int) -> Array:
     return total.reshape(n * d, -1)
 
 
-def _kind(rows: Rows, n: int) -> Array:
+def _kind(rows: CandidateRows, n: int) -> Array:
     """Information (n, d, d) of readings on each ball, were all else known, the largest entry being
     1.
     """
@@ -542,13 +542,8 @@ def _unplaced(
         # Of balls that no combination moves there is nothing to hold, and rounding must not be
         # taken for it.
         by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
-        lengths = [
-            k
-            for k, length in enumerate(design.unknown_lengths.names)
-            if length.rpartition(": ")[0] == name
-        ]
         by_length = np.eye(drawn.shared)[
-            [drawn.layout.lengths.start - drawn.own.start + k for k in lengths]
+            drawn.layout.lengths.start - drawn.own.start + design.unknown_lengths.of(number)
         ]
         rows = np.concatenate(
             [
@@ -563,12 +558,15 @@ def _unplaced(
 
 
 def _frames(
-    drawn: PoolDesign, known: list[Rows], items: dict[int, list[Rows]], basis: InformationBasis
+    drawn: PoolDesign,
+    known: list[CandidateRows],
+    items: dict[int, list[CandidateRows]],
+    basis: InformationBasis,
 ) -> Frames:
     """How calibrated co-ordinates fix the frames of plates."""
     motions = _motions(drawn.design)
 
-    def fixed(rows: list[Rows]) -> Array:
+    def fixed(rows: list[CandidateRows]) -> Array:
         framed = [r for r in rows if r.frame]
         parts = [np.einsum("md,mdk->mk", r.by_ball[:, 0], motions[r.balls[:, 0]]) for r in framed]
         return np.concatenate([np.zeros((0, motions.shape[2])), *parts])

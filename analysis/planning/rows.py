@@ -13,15 +13,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.lengths import (
+    Lengths,
+    length_derivative,
+    length_whitening,
+)
+from ballplate.simulator.design.observations.priors import no_priors
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.observations.calibration import Calibration
-from ballplate.simulator.observations.lengths import Lengths, length_derivative, length_whitening
-from ballplate.simulator.observations.priors import no_priors
-from ballplate.simulator.observations.readings import reading_blocks
 
 # A micrometre: columns are scaled so that a unit step moves some point by up to this.
 STEP = 1e-6
@@ -31,7 +35,7 @@ AT_ONCE = 10_000
 
 
 @dataclass(frozen=True)
-class Rows:
+class CandidateRows:
     """Whitened rows of one candidate, columns in micrometres.
 
     `by_ball` (m, k, d) are the derivatives by the `balls` (m, k) of each, none where k is 0;
@@ -101,8 +105,8 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     return PoolDesign(design, shared_layout(design), nominal_state(design))
 
 
-def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
-    """Rows of every position in order."""
+def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
+    """CandidateRows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
     count = np.bincount(place, minlength=len(design.positions.names))
@@ -130,7 +134,7 @@ def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
                 continue
             own = slice(end[k] - count[k] - start, end[k] - start)
             balls = np.repeat(readings.ball[own], d)[:, None]
-            yield Rows(
+            yield CandidateRows(
                 balls,
                 STEP * blocks.by_ball[own].reshape(len(balls), 1, d),
                 by_shared[own].reshape(len(balls), drawn.shared),
@@ -139,8 +143,8 @@ def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
         first = last
 
 
-def _length_rows(drawn: PoolDesign) -> dict[int, Rows]:
-    """Rows of the lengths of standards and gauges, by position."""
+def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
+    """CandidateRows of the lengths of standards and gauges, by position."""
     design, layout = drawn.design, drawn.layout
     if not len(design.of(Lengths)):
         return {}
@@ -160,15 +164,15 @@ def _length_rows(drawn: PoolDesign) -> dict[int, Rows]:
     return found
 
 
-def _of_shared(drawn: PoolDesign, shared: Array) -> Rows:
-    """Rows (m, s) that no ball takes part in."""
+def _of_shared(drawn: PoolDesign, shared: Array) -> CandidateRows:
+    """CandidateRows (m, s) that no ball takes part in."""
     m = len(shared)
     none = np.zeros((m, 0, drawn.design.dimension))
-    return Rows(np.zeros((m, 0), np.int64), none, shared, np.zeros((m, 0)))
+    return CandidateRows(np.zeros((m, 0), np.int64), none, shared, np.zeros((m, 0)))
 
 
-def always(drawn: PoolDesign) -> list[Rows]:
-    """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
+def always(drawn: PoolDesign) -> list[CandidateRows]:
+    """CandidateRows of what is known in any case: calibrations and priors of the experiment, and errors of
     certificates.
     """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
@@ -177,8 +181,8 @@ def always(drawn: PoolDesign) -> list[Rows]:
 
 def calibration_rows(
     drawn: PoolDesign, experiment: Experiment, item: Calibration, name: str
-) -> list[Rows]:
-    """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
+) -> list[CandidateRows]:
+    """CandidateRows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
     `experiment` has some position, whichever.
 
@@ -188,11 +192,7 @@ def calibration_rows(
     if experiment.artefacts[item.artefact].role == "plate":
         design = lay_out(replace(experiment, calibration=(item,), priors=()))
         return _of_observations(drawn, design.observed(no_priors()))
-    named = [
-        k
-        for k, length in enumerate(drawn.design.unknown_lengths.names)
-        if length.rpartition(": ")[0] == item.artefact
-    ]
+    named = drawn.design.unknown_lengths.of(drawn.design.artefacts.names.index(item.artefact))
     if len(named) != 1:
         text = (
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
@@ -207,8 +207,8 @@ def calibration_rows(
     return [_of_shared(drawn, row * drawn.scale)]
 
 
-def _of_observations(drawn: PoolDesign, design: Design) -> list[Rows]:
-    """Rows of all observations that are not formed of readings, of a design with the same balls and
+def _of_observations(drawn: PoolDesign, design: Design) -> list[CandidateRows]:
+    """CandidateRows of all observations that are not formed of readings, of a design with the same balls and
     parameters.
     """
     found = []
@@ -220,7 +220,7 @@ def _of_observations(drawn: PoolDesign, design: Design) -> list[Rows]:
                 own = rows.by_shared[:, design.once(shared_layout).model.start :]
                 by_shared[:, : own.shape[1]] = own
             found.append(
-                Rows(
+                CandidateRows(
                     one.balls,
                     STEP * rows.by_ball,
                     by_shared * drawn.scale,

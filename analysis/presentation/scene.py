@@ -54,7 +54,8 @@ class Scene:
 def scene(design: Design) -> Scene:
     """The scene of a design; one in two dimensions is seen from above."""
     view, towards = projection(design.dimension)
-    edges, hidden = box_edges(design.machine.volume.lower, design.machine.volume.upper, towards)
+    volume = design.machine.volume
+    edges, hidden = box_edges(volume.lower, volume.upper, towards)
     where = locations(design, nominal_state(design), design.readings)
     places = []
     for k, name in enumerate(design.positions.names):
@@ -121,7 +122,8 @@ def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[n
 
 def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
     """Axes along the edges that stand outermost on the paper: x and y below, z on the left."""
-    lower, upper = design.machine.volume.lower, design.machine.volume.upper
+    volume = design.machine.volume
+    lower, upper = volume.lower, volume.upper
     starts = [lower.copy() for _ in range(design.dimension)]
     if design.dimension == 3:
         # The vertical edge at the left, the lower one at the right.

@@ -13,10 +13,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.lengths import Lengths
 
 from .proposed_bars import MISSING, bars_to_add, listed
 
@@ -49,25 +49,27 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     return tuple(found)
 
 
+def relative_changes(design: Design, layout: SharedLayout, directions: Array) -> Array:
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
+    metres.
+    """
+    points = design.evaluation.points
+    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
+    jacobian = design.model.jacobian(points, np.zeros(len(design.model.parameters)), offsets)
+    return without_rigid_motion(points, jacobian @ directions[layout.model])
+
+
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     """Strains (products, k), orthonormal columns, that some open change of the machine's errors
     amounts to.
     """
-    offsets = np.broadcast_to(
-        design.probes.offsets[design.evaluation.probe], design.evaluation.points.shape
-    )
-    jacobian = design.model.jacobian(
-        design.evaluation.points, np.zeros(len(design.model.parameters)), offsets
-    )
-    fields = without_rigid_motion(design.evaluation.points, jacobian @ open_[layout.model])
+    points = design.evaluation.points
+    fields = relative_changes(design, layout, open_)
     basis = np.stack(
-        [
-            design.evaluation.points @ _matrix(one, design.dimension)
-            for one in np.eye(_size(design.dimension))
-        ],
+        [points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
         2,
     )
-    wanted = without_rigid_motion(design.evaluation.points, basis - basis.mean(axis=0))
+    wanted = without_rigid_motion(points, basis - basis.mean(axis=0))
     flat = fields.reshape(-1, fields.shape[2])
     flat = flat[:, (flat**2).sum(axis=0) > 0.0]
     if not flat.shape[1]:

@@ -9,9 +9,9 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.directions import directions
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.lengths import Lengths
 
 # Singular values below this fraction of the largest: what readings tell of a direction through
 # their own scatter only.

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines
 
 from .canonical import elementary_mixture, principal_directions
-from .missing_bars import reasons
+from .missing_bars import reasons, relative_changes
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01
@@ -31,8 +31,8 @@ ROUNDING = 1e-9
 GREAT = 1e9
 
 # A direction is weak when one standard deviation along it moves corrected points, relative to one
-# another, by more than the target uncertainty at half the volume's diagonal or, without a target, this
-# many times the repeatability.
+# another, by more than the target uncertainty at half the volume's diagonal or, without a target,
+# this many times the repeatability.
 WEAK = 10.0
 
 # Curves that no polynomial of this degree describes are called irregular.
@@ -227,24 +227,11 @@ def _principal(at: Linearisation) -> tuple[Array, Array]:
     design, layout, found = at.design, at.layout, at.spectrum
     if not len(design.evaluation.points) or found.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
-    change = _changes(design, layout, at.shared)
+    change = relative_changes(design, layout, at.shared)
     # Two points whose errors are independent differ by the root of two times the error of one, per
     # co-ordinate.
     effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
     return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
-
-
-def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:
-    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
-    metres.
-    """
-    offsets = np.broadcast_to(
-        design.probes.offsets[design.evaluation.probe], design.evaluation.points.shape
-    )
-    jacobian = design.model.jacobian(
-        design.evaluation.points, np.zeros(len(design.model.parameters)), offsets
-    )
-    return without_rigid_motion(design.evaluation.points, jacobian @ roots[layout.model])
 
 
 def weak_limit(design: Design, target: Target | None) -> float:
@@ -260,7 +247,7 @@ def _weak_directions(
     if not roots.shape[1]:
         return ()
     directions = []
-    of_points = np.sqrt(2.0 * (_changes(design, layout, roots) ** 2).mean(axis=1))
+    of_points = np.sqrt(2.0 * (relative_changes(design, layout, roots) ** 2).mean(axis=1))
     beyond = above(of_points, limit).sum(axis=0)
     for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
         description = _describe(design, layout, root, np.zeros_like(design.balls.places))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.reading_files import read_readings
 
@@ -55,11 +55,7 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
 def _geometry(design: Design, state: State) -> dict[str, Any]:
     """Balls by plate, origins of the positions that are estimated, and probe offsets that are."""
     plates = [design.balls.of(k) for k in design.artefacts.plates]
-    free = (
-        np.zeros(len(design.probes.names), bool)
-        if not design.probes.free.any()
-        else design.probes.free.any(axis=1)
-    )
+    free = design.probes.free.any(axis=1)
     estimated = [k for k in design.posed_positions if not design.positions.held[k].all()]
     return {
         "balls": [state.balls[balls].tolist() for balls in plates],

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import Balls, displacements
+from ballplate.simulator.design.observations.readings import rotation_sensitivity
+from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.readings import rotation_sensitivity
 from numpy.typing import NDArray
 
 from ..uncertainty.pairs import pairs_of
@@ -97,7 +97,7 @@ def first_ball_lengths(at: Linearisation) -> tuple[Array, list[str]]:
     for artefact in design.artefacts.plates:
         own = design.balls.of(artefact)
         pairs = np.stack([np.zeros(len(own) - 1, np.int64), np.arange(1, len(own))], axis=1)
-        tile = pairs_of(displacements(at, Balls(own)), pairs)
+        tile = pairs_of(displacements(at, BallPlaces(own)), pairs)
         values.append(np.where(tile.is_open, np.nan, tile.uncertainties))
         for second in own[1:]:
             names.append(f"ball {design.ball_label(own[0])} to ball {design.ball_label(second)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -84,8 +84,7 @@ def fitted_exactly(experiment: Experiment) -> Fit:
     given.
     """
     design = lay_out(experiment)
-    corners = design.machine.volume.corners
-    machine = true_machine(experiment.true_machine, design.model, *corners)
+    machine = true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     _, x = exact_readings(*on_true_machine(design, machine))
     return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
 

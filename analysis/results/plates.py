@@ -63,7 +63,7 @@ def plate_coordinates(
     """
     design, found = at.design, []
     for artefact, axes in axes_of_plates(experiment).items():
-        balls = np.flatnonzero(design.balls.artefact == design.artefacts.names.index(artefact))
+        balls = design.balls.of(design.artefacts.names.index(artefact))
         coordinates, rotation = in_plate_axes(at.state.balls[balls], axes)
         across = 1 - axes.axis
         n = len(balls)

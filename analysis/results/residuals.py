@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
+from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.lengths import Lengths, length_deviations
-from ballplate.simulator.observations.readings import reading_blocks, reading_weights
 
 # Residuals that a fit names.
 LARGEST = 10

@@ -13,7 +13,13 @@ from typing import Any
 
 from ballplate.simulator.experiment.load import build
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import is_same_place, node_at, override, variant_trees
+from ballplate.simulator.experiment.variants import (
+    is_same_place,
+    node_at,
+    override,
+    variant_trees,
+    with_present_keys,
+)
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, listing
@@ -183,7 +189,7 @@ def _trees(base: Path) -> dict[str | None, Node]:
 
     :raises ExperimentError: the file cannot be read, or its variants cannot be made.
     """
-    root = read_tree(base)
+    root = with_present_keys(read_tree(base))
     problems = Problems(root)
     variants = variant_trees(root, problems)
     if problems.messages:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 
@@ -36,8 +36,8 @@ class ErrorMap:
     slices.
 
     A value is the root mean square over the co-ordinates, so that it compares with U4. `within` is
-    the share of the distances between points of the grid that are within the target uncertainty, None
-    without one.
+    the share of the distances between points of the grid that are within the target uncertainty,
+    None without one.
     """
 
     x: Array
@@ -52,23 +52,16 @@ def error_map(experiment: Experiment) -> ErrorMap:
     machine error.
     """
     design = lay_out(experiment)
-    x, y = (
-        np.linspace(design.machine.volume.lower[k], design.machine.volume.upper[k], POINTS)
-        for k in (0, 1)
-    )
+    volume = design.machine.volume
+    x, y = (np.linspace(volume.lower[k], volume.upper[k], POINTS) for k in (0, 1))
     levels: list[tuple[str, float | None]] = [("", None)]
     grid = np.stack(np.meshgrid(y, x, indexing="ij")[::-1], axis=-1)[None]
     if design.dimension == 3:
-        heights = [
-            float(
-                design.machine.volume.lower[2]
-                + share * (design.machine.volume.upper[2] - design.machine.volume.lower[2])
-            )
-            for _, share in LEVELS
-        ]
+        heights = [float(volume.lower[2] + share * volume.size[2]) for _, share in LEVELS]
         levels = [(name, height) for (name, _), height in zip(LEVELS, heights, strict=True)]
         grid = np.stack(np.meshgrid(heights, y, x, indexing="ij")[::-1], axis=-1)
-    design = replace(design, points=grid.reshape(-1, design.dimension))
+    points = grid.reshape(-1, design.dimension)
+    design = replace(design, evaluation=replace(design.evaluation, points=points))
     target = experiment.target_uncertainty
     limit = None if target is None else target.standard
     of_points, pairs = point_pairs(linearise(design), limit)

@@ -12,15 +12,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
-    Balls,
+    BallPlaces,
     Coordinates,
     Distances,
     Functions,
     MeasuredPoints,
     Parameters,
 )
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Unit
 
 
@@ -54,18 +54,16 @@ class QuantityKind:
 
 def evaluation_points(design: Design) -> MeasuredPoints:
     """The evaluation points as places, with the probe that they are evaluated with."""
-    return MeasuredPoints(
-        design.evaluation.points, np.full(len(design.evaluation.points), design.evaluation.probe)
-    )
+    given = design.evaluation
+    return MeasuredPoints(given.points, np.full(len(given.points), given.probe))
 
 
 def task_distances(design: Design) -> Distances:
     """The lengths of the measuring tasks."""
-    ends = MeasuredPoints(
-        design.tasks.points.reshape(-1, design.dimension), design.tasks.probes.ravel()
-    )
-    pairs = np.arange(2 * len(design.tasks.names)).reshape(-1, 2)
-    return Distances(ends, pairs, design.tasks.names, design.tasks.targets)
+    given = design.tasks
+    ends = MeasuredPoints(given.points.reshape(-1, design.dimension), given.probes.ravel())
+    pairs = np.arange(2 * len(given.names)).reshape(-1, 2)
+    return Distances(ends, pairs, given.names, given.targets)
 
 
 def _shared(layout: SharedLayout, columns: slice) -> tuple[Functions, ...]:
@@ -92,17 +90,16 @@ def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
     return (Parameters(rows, names, units),) if quoted else ()
 
 
-def _plates(design: Design) -> tuple[Balls, ...]:
+def _plates(design: Design) -> tuple[BallPlaces, ...]:
     """The balls of each plate."""
-    plates = design.artefacts.plates
-    return tuple(Balls(design.balls.of(plate)) for plate in plates)
+    return tuple(BallPlaces(design.balls.of(plate)) for plate in design.artefacts.plates)
 
 
 QUANTITIES: dict[str, QuantityKind] = {
     "U1": QuantityKind(
         "ball co-ordinates",
         lambda design, layout: (
-            (Coordinates(Balls(design.plate_balls)),) if len(design.plate_balls) else ()
+            (Coordinates(BallPlaces(design.plate_balls)),) if len(design.plate_balls) else ()
         ),
     ),
     "U2": QuantityKind(

@@ -13,9 +13,9 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing
@@ -193,11 +193,10 @@ def can_stretch(design: Design, state: State) -> bool:
 
 
 def _points(design: Design) -> Array:
-    if len(design.evaluation.points) > 1 and np.ptp(design.evaluation.points, axis=0).max() > 0:
-        return design.evaluation.points
-    return np.array(
-        list(product(*zip(design.machine.volume.lower, design.machine.volume.upper, strict=True)))
-    )
+    points = design.evaluation.points
+    if len(points) > 1 and np.ptp(points, axis=0).max() > 0:
+        return points
+    return np.array(list(product(*zip(*design.machine.volume.corners, strict=True))))
 
 
 def _linearised(experiment: Experiment) -> Linearisation | None:

@@ -6,15 +6,24 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs.quantities import Target
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
+from .objects import (
+    Artefacts,
+    Balls,
+    EvaluationPoints,
+    Machine,
+    Positions,
+    Probes,
+    Tasks,
+    UnknownLengths,
+)
 
 Made = TypeVar("Made")
 Kind = TypeVar("Kind", bound="Observations")
@@ -58,48 +67,23 @@ class Readings:
 class Design:
     """What an experiment consists of, in SI units and integer indices.
 
-    Shapes: `repeatability` (d,), `probes` (l, d), `balls` (n, d) in the frame of their artefact,
-    `rotations` (k, d, d) and `origins` (k, d) with x = R y + o for nominal poses, `held` (k, pose
-    size) marking the pose parameters (origin, then rotation about the machine's axes) that fix a
-    frame or that turn an artefact of collinear balls about its own axis. Balls and positions of
-    length standards stand in the same lists; `is_plate` (artefacts,) tells which artefacts are
-    plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose
-    pivots are: the origins of their positions. `free_offsets` (l, d) marks the probe offsets that
-    are parameters, None where none is. `length_names` and `drawn_lengths` (in metres) are those of
-    length standards without certificates, which are parameters. `observations` are all others than
-    readings of plates, one of each kind, in the order of their rows. `task_points` (t, 2, d) are
-    what the scales say at the ends of the lengths that the machine is to measure, `task_probes` (t,
-    2) what measures there, and `task_targets` (t,) what uncertainties are to be within.
+    `model` is the error model whose parameters are estimated. Balls and positions of length
+    standards stand in the same lists as those of plates: balls and poses of plates are parameters,
+    and the pivots of Bryan gauges, the origins of their positions. `observations` are all others
+    than readings of plates, one of each kind, in the order of their rows.
     """
 
     model: ErrorModel
-    lower: Array
-    upper: Array
-    repeatability: Array
-    probe_names: tuple[str, ...]
-    probes: Array
-    artefact_names: tuple[str, ...]
-    is_plate: NDArray[np.bool_]
-    ball_names: tuple[str, ...]
-    ball_artefact: Integers
-    balls: Array
-    position_names: tuple[str, ...]
-    position_artefact: Integers
-    rotations: Array
-    origins: Array
-    held: NDArray[np.bool_]
+    machine: Machine
+    probes: Probes
+    artefacts: Artefacts
+    balls: Balls
+    positions: Positions
     readings: Readings
     observations: tuple[Observations, ...]
-    points: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    point_probe: int = 0
-    free_offsets: NDArray[np.bool_] | None = None
-    is_gauge: NDArray[np.bool_] | None = None
-    length_names: tuple[str, ...] = ()
-    drawn_lengths: Array = field(default_factory=lambda: np.zeros(0))
-    task_names: tuple[str, ...] = ()
-    task_points: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
-    task_probes: Integers = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    task_targets: tuple[Target | None, ...] = ()
+    unknown_lengths: UnknownLengths
+    evaluation: EvaluationPoints
+    tasks: Tasks
 
     @property
     def dimension(self) -> int:
@@ -116,20 +100,19 @@ class Design:
         return np.flatnonzero(self.artefacts.is_plate[self.balls.artefact])
 
     @cached_property
+    def plate_positions(self) -> Integers:
+        """Indices of the positions of plates."""
+        return np.flatnonzero(self.artefacts.is_plate[self.positions.artefact])
+
+    @cached_property
     def gauge_positions(self) -> Integers:
         """Indices of the positions of Bryan gauges."""
-        gauges = (
-            np.zeros_like(self.artefacts.is_plate)
-            if self.artefacts.is_gauge is None
-            else self.artefacts.is_gauge
-        )
-        return np.flatnonzero(gauges[self.positions.artefact])
+        return np.flatnonzero(self.artefacts.is_gauge[self.positions.artefact])
 
     @cached_property
     def posed_positions(self) -> Integers:
         """Indices of the positions whose poses, or pivots, are parameters."""
-        of_plates = self.plate_positions
-        return np.sort(np.concatenate([of_plates, self.gauge_positions]))
+        return np.sort(np.concatenate([self.plate_positions, self.gauge_positions]))
 
     @cached_property
     def _made(self) -> dict[Callable[[Design], Any], Any]:
@@ -173,15 +156,12 @@ class Design:
         """Number of free parameters: balls, poses less what is held, machine errors, probe offsets,
         unknown lengths.
         """
-        poses = int((~self.positions.held[self.posed_positions]).sum())
-        offsets = 0 if not self.probes.free.any() else int(self.probes.free.sum())
-        lengths = len(self.unknown_lengths.names)
         return (
             self.dimension * len(self.plate_balls)
-            + poses
+            + int((~self.positions.held[self.posed_positions]).sum())
             + len(self.model.parameters)
-            + offsets
-            + lengths
+            + int(self.probes.free.sum())
+            + len(self.unknown_lengths.names)
         )
 
     def ball_label(self, ball: int) -> str:
@@ -194,28 +174,15 @@ class Design:
 @dataclass(frozen=True)
 class State:
     """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a`
-    (parameters,).
-
-    `probes` (l, d) are the probe offsets, and `lengths` the unknown lengths, None where they are
-    those of the design.
+    (parameters,), offsets of the `probes` (l, d) and unknown `lengths`.
     """
 
     balls: Array
     rotations: Array
     origins: Array
     a: Array
-    probes: Array | None = None
-    lengths: Array | None = None
-
-
-def unknown_lengths(design: Design, state: State) -> Array:
-    """Lengths of standards without certificates at `state`, in metres."""
-    return design.unknown_lengths.drawn if state.lengths is None else state.lengths
-
-
-def probe_offsets(design: Design, state: State) -> Array:
-    """Offsets (l, d) of all probes at `state`."""
-    return design.probes.offsets if state.probes is None else state.probes
+    probes: Array
+    lengths: Array
 
 
 def reading_uncertainties(design: Design, readings: Readings) -> Array:
@@ -234,6 +201,8 @@ def nominal_state(design: Design) -> State:
         design.positions.rotations,
         design.positions.origins,
         np.zeros(len(design.model.parameters)),
+        design.probes.offsets,
+        design.unknown_lengths.drawn,
     )
 
 

@@ -36,13 +36,13 @@ import numpy as np
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, nominal_state, reading_uncertainties
+from ..design.observations.distances import CalibratedDistances
+from ..design.observations.lengths import Lengths
+from ..design.observations.priors import Priors
+from ..design.parameters import shared_layout
 from ..machines.protocol import Array, Integers
-from ..observations.distances import CalibratedDistances
-from ..observations.lengths import Lengths
-from ..observations.priors import Priors
 from .covariance import EXACT, MICROMETRE
 from .gauss_newton import GaussNewtonSettings, Iteration, Status
-from .parameters import shared_layout
 
 AlternativeName = Literal["distances", "cresto", "kruth"]
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, Rows, State
+from ..design.observations.readings import reading_blocks, reading_weights
+from ..design.parameters import SharedLayout
 from ..machines.protocol import Array, Integers
-from ..observations.readings import reading_blocks, reading_weights
 from .graded import Collected, without_balls
-from .parameters import SharedLayout
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
 ROWS_AT_ONCE = 2048
@@ -126,6 +126,8 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     return _eliminate_alike(design, layout, state, x)
 
 
+# In one piece: the steps of one elimination, each of which uses up the rows that the one before
+# leaves.
 def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
     d, s = design.dimension, len(layout)
     kept, gathered = design.tied_balls, _gathered(design, state, x)
@@ -196,10 +198,16 @@ def _weighted_alike(design: Design, state: State) -> Design:
     readings = replace(
         design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)
     )
-    alike = replace(design, repeatability=np.ones(design.dimension), readings=readings)
+    alike = replace(
+        design,
+        machine=replace(design.machine, repeatability=np.ones(design.dimension)),
+        readings=readings,
+    )
     return alike.observed(*(one.alike(design, state) for one in design.observations))
 
 
+# In one piece: the steps of one elimination, each of which uses up the rows that the one before
+# leaves.
 def _eliminate_graded(
     design: Design, layout: SharedLayout, state: State, x: Array | None
 ) -> Factor:

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..design.arrays import Design, State
+from ..design.parameters import SharedLayout
 from ..geometry.motions import AXIS_NAMES
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, Integers, Unit
 from .corrections import corrected_points, correction_rows
 from .covariance import MICROMETRE, blank
 from .linearisation import LinearFunctions, Linearisation
-from .parameters import SharedLayout
 
 # Places whose derivatives by all shared parameters are formed at once.
 PLACES_AT_ONCE = 1000
@@ -35,7 +35,7 @@ class Parameters:
 
 
 @dataclass(frozen=True, eq=False)
-class Balls:
+class BallPlaces:
     """Balls of indices `index` (n,), in the frame of their artefact."""
 
     index: Integers
@@ -74,7 +74,7 @@ class MeasuredPoints:
         return corrected_points(design, state, self.points, self.probes)
 
 
-Places = Balls | MeasuredPoints
+Places = BallPlaces | MeasuredPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Dis
     common.
     """
     design, drawn = at.design, at.as_drawn.state
-    if isinstance(places, Balls):
+    if isinstance(places, BallPlaces):
         own, index = at.balls.own[places.index], places.index
         size = np.full((len(index), design.dimension), MICROMETRE)
         where = places.at(design, at.state), places.at(design, drawn)

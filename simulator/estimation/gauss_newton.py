@@ -9,15 +9,15 @@ import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, State
+from ..design.observations.lengths import Lengths
+from ..design.parameters import SharedLayout, shared_layout
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
-from ..observations.lengths import Lengths
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle
 from .initial import initial_state
 from .linearisation import Linearisation, linearise
-from .parameters import shared_layout
 from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
 Status = Literal["converged", "not converged", "diverged"]
@@ -101,16 +101,7 @@ def gauss_newton(
             float(np.abs(balls).max(initial=0.0)),
         )
         length = float(np.sqrt(shared @ shared + (balls**2).sum()))
-        state = moved(
-            design,
-            state,
-            layout.pose_columns,
-            shared,
-            balls,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
+        state = moved(state, layout, shared, balls)
         rounding = size > 0.5 * previous and size < 1e-9
         if size < settings.smallest_step or rounding:
             status = "converged"
@@ -185,29 +176,19 @@ def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
     return np.asarray(-(determined[:, rest.order] @ steps))
 
 
-def moved(
-    design: Design,
-    state: State,
-    pose_columns: np.ndarray,
-    shared: Array,
-    balls: Array,
-    model: slice,
-    offset_columns: np.ndarray | None = None,
-    lengths: slice | None = None,
-) -> State:
-    """The state after a step; rotations are turned about the machine's axes and stay orthogonal."""
-    d = design.dimension
-    poses = np.where(pose_columns >= 0, shared[np.maximum(pose_columns, 0)], 0.0)
-    turn = rotation_from_vector(poses[:, d:])
-    probes = state.probes
-    if offset_columns is not None and design.probes.free.any():
-        step = np.where(offset_columns >= 0, shared[np.maximum(offset_columns, 0)], 0.0)
-        probes = state.probes + step
+def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> State:
+    """The state after a step of shared parameters (s,) and balls (n, d); rotations are turned about
+    the machine's axes and stay orthogonal.
+    """
+    d = state.origins.shape[1]
+    # What is held takes the zero behind the last.
+    step = np.append(shared, 0.0)
+    poses = step[layout.pose_columns]
     return State(
         state.balls + balls,
-        turn @ state.rotations,
+        rotation_from_vector(poses[:, d:]) @ state.rotations,
         state.origins + poses[:, :d],
-        state.a + shared[model],
-        probes,
-        state.lengths + shared[lengths] if lengths is not None else state.lengths,
+        state.a + shared[layout.model],
+        state.probes + step[layout.offset_columns],
+        state.lengths + shared[layout.lengths],
     )

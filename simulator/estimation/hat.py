@@ -15,11 +15,11 @@ import numpy as np
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, State
+from ..design.observations.readings import reading_blocks
+from ..design.parameters import SharedLayout
 from ..machines.protocol import Array, Integers
-from ..observations.readings import reading_blocks
 from .elimination import ROWS_AT_ONCE
 from .linearisation import Linearisation
-from .parameters import SharedLayout
 
 
 @dataclass(frozen=True)

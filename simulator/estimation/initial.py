@@ -7,10 +7,12 @@ are joined one after the other to what is known already, so that none of them ne
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..computing.rounding import comparable
-from ..design.arrays import Design, State
+from ..design.arrays import Design, State, nominal_state
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
 from .spheres import fit_sphere
@@ -58,7 +60,7 @@ def initial_state(design: Design, x: Array) -> State:
             origins[k] = fit_sphere(
                 x[rows] + design.probes.offsets[readings.probe[rows]], origins[k]
             )[0]
-    state = State(balls, rotations, origins, np.zeros(len(design.model.parameters)))
+    state = replace(nominal_state(design), balls=balls, rotations=rotations, origins=origins)
     for one in design.observations:
         state = one.started(design, x, state)
     return state

@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design
+from ..design.observations.joint_lengths import equation_root
+from ..design.observations.lengths import Lengths, length_whitening
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
-from ..observations.joint_lengths import equation_root
-from ..observations.lengths import Lengths, length_whitening
 from .covariance import EXACT, MICROMETRE
 from .initial import initial_state
 
@@ -224,9 +224,8 @@ def _start(design: Design, x: Array) -> _Unknowns:
     errors.
     """
     state = initial_state(design, x)
-    lengths = design.unknown_lengths.drawn if state.lengths is None else state.lengths
     pivots = design.gauge_positions
-    values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), lengths])
+    values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), state.lengths])
     return _Unknowns(values, pivots)
 
 

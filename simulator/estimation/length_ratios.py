@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..design.arrays import Design
+from ..design.observations.lengths import Lengths
 from ..machines.protocol import Array
-from ..observations.lengths import Lengths
 from .spheres import FLAT, fit_sphere
 
 # Departures of the factor from one that are doubtful, and that no machine has; a length that is
@@ -53,7 +53,7 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
     Of unknown lengths the drawn ones, if they are off by more than 30 %.
     """
     given, readings = design.of(Lengths), design.readings
-    known = given.is_known
+    known = np.ones(len(given), bool) if given.free is None else given.free < 0
     seen = x + design.probes.offsets[readings.probe]
     artefact = design.balls.artefact[readings.ball[given.first]]
     found = []

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from ..design.lookup import References
+from ..design.observations.calibration import Calibration
+from ..design.observations.kinds import CALIBRATIONS
+from ..design.observations.radius import RadiusSettings
 from ..geometry.artefacts import BryanGaugeSettings
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings
-from ..observations.calibration import Calibration
-from ..observations.kinds import CALIBRATIONS
-from ..observations.radius import RadiusSettings
-from .lookup import References
 
 
 def resolve_calibration(

@@ -9,6 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..design.lookup import Floats, References
+from ..design.objects import SLIGHTLY, Machine, Volume
+from ..design.observations.calibration import Calibration
+from ..design.observations.distances import DistanceCalibration
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.motions import pose_size
 from ..geometry.positions import ball_coordinates
@@ -29,13 +34,9 @@ from ..machines.settings import (
 )
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
-from ..observations.calibration import Calibration
-from ..observations.distances import DistanceCalibration
-from ..observations.radius import RadiusCalibration
 from .curve_files import read_curves
-from .lookup import References
 from .machine_file import load_machine
-from .model import SLIGHTLY, Evaluation, Floats, Machine, Position, Volume
+from .model import Evaluation, Position
 from .structure import Sections
 
 TOLERANCE = 1e-9
@@ -77,7 +78,7 @@ def _check_model(
         if machine is None:
             return True
         try:
-            build_error_model(settings, *_corners(machine))
+            build_error_model(settings, *machine.volume.corners)
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
     elif isinstance(settings, MetricSettings):
@@ -99,7 +100,7 @@ def _check_model(
     elif (
         isinstance(settings, MachineFileSettings)
         and machine is not None
-        and not build_error_model(settings, *_corners(machine)).parameters
+        and not build_error_model(settings, *machine.volume.corners).parameters
     ):
         text = (
             f"{settings.file} states no error that could be estimated; give polynomials or tables"
@@ -182,7 +183,7 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         or problems.has_below(_TRUE_MODEL)
     ):
         return
-    corners = _corners(machine)
+    corners = machine.volume.corners
     try:
         true_machine(truth, build_error_model(settings, *corners), *corners)
     except TruthError as error:
@@ -228,10 +229,6 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
 
 
 _TRUE_MODEL = ("true_machine", "error_model")
-
-
-def _corners(machine: Machine) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(map(float, machine.volume.lower)), tuple(map(float, machine.volume.upper))
 
 
 def check_names(position_count: int, problems: Problems) -> None:
@@ -447,7 +444,7 @@ def check_size(
         name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
     }
     pivots = [one for one in positions.values() if one.artefact in gauges]
-    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     shared = errors + pose_size(d) * poses + d * (len(pivots) + len(offset_uncertainties))
     if shared > MOST_SHARED:
         text = (
@@ -480,7 +477,7 @@ def check_derivatives(
     # Errors are at most as many as parameters are, so that they need seldom be counted.
     if count * d * MOST_SHARED <= MOST_DERIVATIVES:
         return
-    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     if count * d * errors > MOST_DERIVATIVES:
         text = (
             f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at"

@@ -9,11 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..design.observations.calibration import Calibration
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, written_count
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, read_tree
 from ..machines.settings import with_defaults
-from ..observations.calibration import Calibration
 from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import (
@@ -36,7 +36,7 @@ from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
-from .variants import MOST_OF_ALL, in_variants, variant_trees
+from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
 
 def load(
@@ -55,7 +55,7 @@ def load(
     """
     source = Path(path)
     refused: list[Message] = []
-    root = read_tree(source, refused)
+    root = with_present_keys(read_tree(source, refused))
     base_problems = Problems(root)
     trees = variant_trees(root, base_problems)
     if not with_modules:
@@ -120,7 +120,7 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
         text = "are for files; change an experiment with its method with_()"
         raise ExperimentError([mark.message("variants", text)])
     try:
-        tree = node_of(sections, mark)
+        tree = with_present_keys(node_of(sections, mark))
     except ValueError as error:
         raise ExperimentError([mark.message("", str(error))]) from None
     return _built(tree, folder / "experiment", None, False)

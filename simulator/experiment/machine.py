@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ..design.lookup import Floats, References, frozen
+from ..design.objects import Machine, Volume
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems
 from ..inputs.quantities import LengthFunction, Target, format_length
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
-from .lookup import References, frozen
-from .model import Evaluation, Floats, Machine, Task, Volume
+from .model import Evaluation, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 

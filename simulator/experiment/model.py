@@ -9,51 +9,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..design.lookup import Floats, Indices
+from ..design.objects import Machine
+from ..design.observations.calibration import Calibration
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
 from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, written
-from ..observations.calibration import Calibration
 from .changes import changed_tree
-from .lookup import Floats, Indices
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
-
-
-# Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
-# round numbers, and artefacts are not set up just as drawn.
-SLIGHTLY = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Volume:
-    """The measuring volume: ``lower`` and ``upper`` (d,) in metres."""
-
-    lower: Floats
-    upper: Floats
-
-    @property
-    def of_readings(self) -> tuple[Floats, Floats]:
-        """Limits (d,) of scale readings, a thousandth of the volume outside it."""
-        slightly = SLIGHTLY * (self.upper - self.lower)
-        return self.lower - slightly, self.upper + slightly
-
-
-@dataclass(frozen=True, eq=False)
-class Machine:
-    """The machine. ``repeatability``: (d,) standard uncertainty of a reading per co-ordinate, in
-    metres.
-    """
-
-    volume: Volume
-    repeatability: Floats
-
-    @property
-    def dimension(self) -> int:
-        """Number of co-ordinates, 2 or 3."""
-        return len(self.volume.lower)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..design.lookup import References, lengths_per_axis
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     IN_PLANE_AXES,
@@ -16,7 +17,6 @@ from ..geometry.positions import (
     nominal_pose,
 )
 from ..inputs.messages import Steps
-from .lookup import References, lengths_per_axis
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 

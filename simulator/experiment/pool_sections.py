@@ -8,20 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
-from ..geometry.artefacts import Name
+from ..design.observations.kinds import CALIBRATIONS
+from ..geometry.artefacts import BallNames, Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Duration, Length
-from ..inputs.settings import FORM, Settings
-from ..observations.kinds import CALIBRATIONS
-from .position_sections import (
-    BallNames,
-    Count,
-    LengthPerAxis,
-    PositionSettings,
-    ProbeNames,
-    QuarterTurns,
-    Text,
-)
+from ..inputs.settings import FORM, Settings, Text
+from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
 AXES = ("x", "y", "z")
 GROUP_KEYS = ("planes", "levels", "corners", "centres")

@@ -13,18 +13,19 @@ from typing import Any
 
 import numpy as np
 
+from ..design.lookup import Floats, ReadingCount, References, frozen
+from ..design.objects import Machine
+from ..design.observations.calibration import Calibration
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
 from ..inputs.messages import Steps, format_path
 from ..inputs.problems import written_count, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
-from ..observations.calibration import Calibration
-from ..observations.radius import RadiusCalibration
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
-from .lookup import ReadingCount, References, frozen
-from .model import AtMost, Candidate, ChangeTimes, Floats, Machine, Pool, Position
+from .model import AtMost, Candidate, ChangeTimes, Pool, Position
 from .placements import resolve_position
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (

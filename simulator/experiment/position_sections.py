@@ -6,16 +6,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints, Tag
+from pydantic import Field, Tag
 
-from ..geometry.artefacts import Coordinates, Name, PairSet
+from ..geometry.artefacts import BallNames, Coordinates, Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Angle, Length, PositiveLength
 from ..inputs.settings import FORM, Settings
 
-Text = Annotated[str, StringConstraints(min_length=1)]
 Count = Annotated[int, Field(ge=1, le=10_000)]
-BallNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 ProbeNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 BallSelection = Annotated[
     Annotated[Literal["all"], Tag("<one>")]
@@ -24,21 +22,6 @@ BallSelection = Annotated[
     | Annotated[BallNames, Tag("<mapping>")],
     FORM,
 ]
-CalibratedBalls = Annotated[
-    Annotated[Literal["all", "corners"], Tag("<one>")]
-    | Annotated[BallNames, Tag("<list>")]
-    | Annotated[BallNames, Tag("<mapping>")],
-    FORM,
-]
-ListedPairs = Annotated[tuple[tuple[Name, Name], ...], Field(min_length=1)]
-PairSelection = Annotated[
-    Annotated[PairSet, Tag("<one>")]
-    | Annotated[ListedPairs, Tag("<list>")]
-    | Annotated[ListedPairs, Tag("<mapping>")],
-    FORM,
-]
-
-
 # Those beyond are refused when the position is placed, with what is meant.
 QuarterTurns = Annotated[int, Field(json_schema_extra={"minimum": 0, "maximum": 3})]
 
@@ -49,14 +32,6 @@ class AxisLengthsSettings(Settings):
     x: PositiveLength = Field(description="along x")
     y: PositiveLength = Field(description="along y")
     z: PositiveLength | None = Field(None, description="along z; omitted in 2-D")
-
-
-class SomeAxisLengthsSettings(Settings):
-    """A length above zero for some axes."""
-
-    x: PositiveLength | None = Field(None, description="along x; omitted: x is not calibrated")
-    y: PositiveLength | None = Field(None, description="along y; omitted: y is not calibrated")
-    z: PositiveLength | None = Field(None, description="along z; omitted: z is not calibrated")
 
 
 Edges = Annotated[tuple[PositiveLength, ...], Field(min_length=2, max_length=3)]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..design.lookup import Floats, References
+from ..design.objects import Machine
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names
 from ..inputs.messages import Steps, format_path
@@ -13,8 +15,7 @@ from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
-from .lookup import References
-from .model import Floats, Machine, Position, Prior
+from .model import Position, Prior
 from .sections import PriorSettings
 from .structure import Sections
 
@@ -34,9 +35,8 @@ def resolve_priors(
         return ()
     if dimension_of(settings) not in (machine.dimension, None):
         return ()
-    lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
     try:
-        model = build_error_model(settings, lower, upper)
+        model = build_error_model(settings, *machine.volume.corners)
     except CustomModelError:
         # Told already, with the error model.
         return ()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..design.lookup import Floats, References, frozen, lengths_per_axis
 from ..geometry.artefacts import (
     MOST_BALLS,
     ArtefactSettings,
@@ -21,7 +22,6 @@ from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
 from ..inputs.yamltree import Mapping, Node, written
 from ..inputs.yamltree import Sequence as SequenceNode
-from .lookup import Floats, References, frozen, lengths_per_axis
 from .sections import ProbeSettings
 from .structure import Sections
 

@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, Tag
 
+from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name
 from ..inputs.quantities import Length, LengthFunction
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import FORM, Settings, Text
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
-from ..observations.kinds import CalibrationSettings
 from .pool_sections import PoolSettings
-from .position_sections import Edges, LengthPerAxis, PositionSettings, Text
+from .position_sections import Edges, LengthPerAxis, PositionSettings
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
@@ -126,7 +126,9 @@ class TaskSettings(Settings):
     )
     target_uncertainty: LengthFunction | None = Field(
         None,
-        description="what is to be reached, as target_uncertainty of the file, which is the default",
+        description=(
+            "what is to be reached, as target_uncertainty of the file, which is the default"
+        ),
     )
 
 
@@ -212,8 +214,8 @@ class ExperimentSettings(Settings):
     coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
         1.0,
         description=(
-            "k of the expanded uncertainty U = k u that is compared with target_uncertainty; default"
-            " 1: the standard uncertainty u is"
+            "k of the expanded uncertainty U = k u that is compared with target_uncertainty;"
+            " default 1: the standard uncertainty u is"
         ),
     )
     sigma: Literal["estimated", "given"] = Field(

@@ -92,6 +92,7 @@ def _text_of_whole_number(value: object) -> object:
 
 # Numbers are usual as names of balls, and YAML reads them as numbers.
 Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
+BallNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 

@@ -1,4 +1,6 @@
-"""Small rotations as vectors, and the rigid motion that fits two sets of points best."""
+"""Rigid motions: their parameters, small rotations as vectors, and the motion that fits two sets of
+points best.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
 
 AXIS_NAMES = ("x", "y", "z")
 

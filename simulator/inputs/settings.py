@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Discriminator
+from pydantic import BaseModel, ConfigDict, Discriminator, StringConstraints
 
 
 def _form(value: Any) -> str:
@@ -24,6 +24,8 @@ def _form(value: Any) -> str:
 
 FORM = Discriminator(_form)
 """Chooses among the forms of a value by the tags <mapping>, <list> and <one>."""
+
+Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Settings(BaseModel):

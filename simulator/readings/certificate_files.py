@@ -20,6 +20,8 @@ from typing import TextIO
 import numpy as np
 
 from ..design.arrays import Design, State
+from ..design.observations.calibration import FAR_FROM_DRAWING, CertifiedValue, far_from_drawing
+from ..design.observations.priors import Priors
 from ..experiment.model import Experiment
 from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path
 from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
@@ -27,12 +29,6 @@ from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, read_table
 from ..machines.protocol import Array, ErrorModel
-from ..observations.calibration import (
-    FAR_FROM_DRAWING,
-    CertifiedValue,
-    far_from_drawing,
-)
-from ..observations.priors import Priors
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..design.arrays import Design, Readings, State, locations, nominal_state, reading_uncertainties
+from ..design.observations.joint_lengths import FLAT
+from ..design.observations.lengths import Lengths
 from ..machines.protocol import Array, ErrorModel, Integers
 from ..machines.truth import TrueMachine
-from ..observations.joint_lengths import FLAT
-from ..observations.lengths import Lengths
 
 
 class NoReadingError(ValueError):
@@ -21,10 +21,7 @@ def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State
     """The design as drawn on the true machine, whose error model may be another than the
     design's.
     """
-    drawn = nominal_state(design)
-    return replace(design, model=machine.model), State(
-        drawn.balls, drawn.rotations, drawn.origins, machine.a
-    )
+    return replace(design, model=machine.model), replace(nominal_state(design), a=machine.a)
 
 
 def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
@@ -67,6 +64,7 @@ def noisy_readings(
     )
 
 
+# In one piece: random numbers are drawn in an order on which what a seed gives depends.
 def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its
     uncertainty.

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..design.arrays import Design
+from ..design.objects import SLIGHTLY
 from ..estimation.length_ratios import LengthRatio, doubtful_lengths
-from ..experiment.model import SLIGHTLY
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
@@ -54,13 +54,14 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
     By less than a thousandth of the volume a reading is outside if an artefact was not set up just
     as drawn.
     """
-    beyond = np.maximum(design.machine.volume.lower - x, x - design.machine.volume.upper)
-    far = np.flatnonzero((beyond > SLIGHTLY * design.machine.volume.size).any(axis=1))
+    volume = design.machine.volume
+    beyond = np.maximum(volume.lower - x, x - volume.upper)
+    far = np.flatnonzero((beyond > SLIGHTLY * volume.size).any(axis=1))
     if not len(far):
         return ()
     i = int(far[beyond[far].max(axis=1).argmax()])
     axis = int(beyond[i].argmax())
-    how = "below" if x[i, axis] < design.machine.volume.lower[axis] else "above"
+    how = "below" if x[i, axis] < volume.lower[axis] else "above"
     readings = design.readings
     where = f" (line {marks[i].line})" if marks else ""
     count = "1 reading is" if len(far) == 1 else f"{len(far)} readings are"

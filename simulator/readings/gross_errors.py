@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..design.arrays import Design
+from ..design.observations.lengths import Lengths
+from ..design.observations.priors import Priors
 from ..estimation.consensus import consensus_motion, distances
 from ..estimation.initial import initial_state
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
-from ..observations.lengths import Lengths
-from ..observations.priors import Priors
 
 AGAINST_DRAWING = 0.3
 # Extent across a line, as a fraction of that along it, below which balls are in one line.
@@ -262,8 +262,6 @@ def _against_readings(
 
 def _offset_uncertainties(design: Design) -> Array:
     """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
-    if not design.probes.free.any():
-        return np.zeros(len(design.probes.offsets))
     variance = np.where(design.probes.free, np.inf, 0.0)
     known = np.flatnonzero(design.of(Priors).probe >= 0)
     probe, axis = design.of(Priors).probe[known], design.of(Priors).component[known]

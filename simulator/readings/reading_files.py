@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..design.arrays import Design, Readings
+from ..design.observations.lengths import Lengths
 from ..estimation.spheres import fit_sphere
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from ..inputs.settings import hint, listing
@@ -20,7 +21,6 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, column_names, read_table
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from ..observations.lengths import Lengths
 from .gross_error_messages import refuse_gross_errors
 
 AXES = ("x", "y", "z")
@@ -162,10 +162,9 @@ def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
     """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in
     another unit.
     """
-    size = float(design.machine.volume.size.max())
-    return np.asarray(
-        (x < design.machine.volume.lower - size) | (x > design.machine.volume.upper + size)
-    )
+    volume = design.machine.volume
+    size = float(volume.size.max())
+    return np.asarray((x < volume.lower - size) | (x > volume.upper + size))
 
 
 def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> None:

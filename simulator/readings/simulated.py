@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..design.arrays import Design, Readings, State
-from ..design.layout import lay_out
+from ..experiment.layout import lay_out
 from ..experiment.model import Experiment
 from ..inputs.messages import ExperimentError
 from ..machines.protocol import Array, ErrorModel
@@ -50,9 +50,8 @@ def simulated_readings(
     :raises ExperimentError: the true machine's errors are so large that there is no reading.
     """
     design = lay_out(experiment)
-    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     chosen = experiment.seed if seed is None else seed
     generator = None if exact else np.random.default_rng(np.random.SeedSequence(chosen))

@@ -14,9 +14,9 @@ import pytest
 from ballplate.results.estimates import EstimatedFunctions, correct, estimated_functions
 from ballplate.results.fit import Fit
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit, moved
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import observe
 from numpy.typing import NDArray
@@ -162,15 +162,7 @@ def by_differences(at: Linearisation) -> tuple[Real, Real]:
     def at_step(step: Real) -> State:
         balls = np.zeros(design.balls.places.shape)
         balls[design.plate_balls] = step[count:].reshape(-1, d)
-        columns = (
-            layout.pose_columns,
-            step[:count],
-            balls,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
-        return moved(design, at.state, *columns)
+        return moved(at.state, layout, step[:count], balls)
 
     def values(step: Real) -> Real:
         return estimated_functions(replace(at, state=at_step(step)), monomials=False).values

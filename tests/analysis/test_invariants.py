@@ -10,14 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
@@ -116,12 +116,11 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
             readings=replace(
                 readings, ball=new_ball[readings.ball], position=new_position[readings.position]
             ),
-        ).observed(
-            replace(
+            distances=replace(
                 design.of(CalibratedDistances),
                 first=new_ball[design.of(CalibratedDistances).second],
                 second=new_ball[design.of(CalibratedDistances).first],
-            )
+            ),
         )
     )
     for symbol, quantity in expected.items():
@@ -134,13 +133,13 @@ def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
     design = small_design(1, calibration)
     expected, _, _ = judged(design)
     scaled = altered(
-        design, machine={"repeatability": factor * design.machine.repeatability}
-    ).observed(
-        replace(
+        design,
+        machine={"repeatability": factor * design.machine.repeatability},
+        distances=replace(
             design.of(CalibratedDistances),
             uncertainty=factor * design.of(CalibratedDistances).uncertainty,
         ),
-        replace(
+        coordinates=replace(
             design.of(CalibratedCoordinates),
             uncertainty=factor * design.of(CalibratedCoordinates).uncertainty,
         ),
@@ -189,6 +188,8 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         drawn.rotations,
         drawn.origins,
         1e-5 * generator.standard_normal(len(design.model.parameters)),
+        drawn.probes,
+        drawn.lengths,
     )
     _, spread, layout = judged(design)
     trials = 60

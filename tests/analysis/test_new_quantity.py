@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate import quickstart
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 
 from tests.reference import dense
 
@@ -26,9 +26,9 @@ ENTRY = """\
         "lengths of the body diagonals",
         lambda design, layout: (
             Distances(
-                Points(
-                    np.stack(np.meshgrid(*zip(design.lower, design.upper)), axis=-1).reshape(-1, design.dimension),
-                    np.full(2**design.dimension, design.point_probe),
+                MeasuredPoints(
+                    np.stack(np.meshgrid(*zip(*design.machine.volume.corners)), axis=-1).reshape(-1, design.dimension),
+                    np.full(2**design.dimension, design.evaluation.probe),
                 ),
                 np.array([(i, 2**design.dimension - 1 - i) for i in range(2 ** (design.dimension - 1))]),
                 tuple(f"diagonal {i + 1}" for i in range(2 ** (design.dimension - 1))),
@@ -55,7 +55,7 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.cli import main
-from ballplate.requirements.goals import SYMBOLS
+from ballplate.planning.requirements.goals import SYMBOLS
 from ballplate.planning.criteria import NAMES
 
 def said(*arguments):

@@ -14,16 +14,16 @@ from ballplate.results.fit import Fit
 from ballplate.results.plates import axes_of_plates, plate_coordinates
 from ballplate.results.study import fit
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
 from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings
 from numpy.typing import NDArray

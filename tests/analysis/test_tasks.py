@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.uncertainty.quantities import task_distances
 from ballplate.uncertainty.summaries import uncertainties
 
@@ -125,6 +125,10 @@ def test_undetermined_tasks_are_told_as_such() -> None:
     design = small_design()
     design = altered(
         design,
+        distances=replace(
+            design.of(CalibratedDistances),
+            **{name: v[:0] for name, v in vars(design.of(CalibratedDistances)).items()},
+        ),
         probes={"offsets": np.zeros_like(design.probes.offsets)},
         tasks={
             "names": ("edge", "none"),
@@ -132,11 +136,6 @@ def test_undetermined_tasks_are_told_as_such() -> None:
             "probes": np.zeros((2, 2), int),
             "targets": (None, None),
         },
-    ).observed(
-        replace(
-            design.of(CalibratedDistances),
-            **{name: v[:0] for name, v in vars(design.of(CalibratedDistances)).items()},
-        )
     )
     quantity = judged(design)[0]["tasks"]
     assert (quantity.count, quantity.undetermined, quantity.within_target) == (2, 2, None)

@@ -29,10 +29,10 @@ from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.trials import run_trials
 from ballplate.simulator.design.arrays import State, nominal_state
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.readings import reading_blocks
 from joblib import Parallel, delayed
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
@@ -136,6 +136,8 @@ def by_scipy(shared: Reference, k: int) -> State:
             rotation_from_vector(poses[:, d:]) @ start.rotations,
             start.origins + poses[:, :d],
             start.a + shared_part[layout.model],
+            start.probes,
+            start.lengths,
         )
 
     def residuals(v: Array) -> Array:

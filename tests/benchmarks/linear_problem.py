@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.estimation.observations import distance_rows
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.readings import reading_blocks
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
@@ -67,7 +68,7 @@ def linear_problem(design: Design) -> LinearProblem:
         by_model=blocks.by_model,
         first=design.of(CalibratedDistances).first,
         second=design.of(CalibratedDistances).second,
-        along=design.of(CalibratedDistances).rows(design, state, None).by_ball[:, 0],
+        along=distance_rows(design, state).derivative,
     )
 
 

@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.functions import Displacements, displacements, linear_functions
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.readings import expected_readings
 from ballplate.uncertainty.pairs import all_pairs
 from ballplate.uncertainty.quantities import QUANTITIES, evaluation_points
 from ballplate.uncertainty.summaries import point_pairs, uncertainties
@@ -152,6 +151,7 @@ def with_length_standard(design: Design, projected: bool) -> Design:
         artefacts={
             "names": (*design.artefacts.names, "bar"),
             "is_plate": np.append(design.artefacts.is_plate, False),
+            "is_gauge": np.zeros(2, bool),
         },
         balls={
             "names": (*design.balls.names, "left", "right"),
@@ -168,8 +168,7 @@ def with_length_standard(design: Design, projected: bool) -> Design:
             "held": np.concatenate([design.positions.held, np.zeros((count, 6), bool)]),
         },
         readings=joined,
-    ).observed(
-        Lengths(
+        lengths=Lengths(
             first=index,
             second=index + 1,
             value=np.full(count, 2 * half),
@@ -178,7 +177,7 @@ def with_length_standard(design: Design, projected: bool) -> Design:
             direction=stated,
             with_repeatability=np.array([True, False, True]),
             certificate=np.array([0, 1, 0]),
-        )
+        ),
     )
 
 
@@ -207,7 +206,11 @@ def two_artefacts() -> Design:
     first, second = large.readings, extra.readings
     return altered(
         large,
-        artefacts={"names": ("large", "small"), "is_plate": np.array([True, True])},
+        artefacts={
+            "names": ("large", "small"),
+            "is_plate": np.array([True, True]),
+            "is_gauge": np.zeros(2, bool),
+        },
         balls={
             "names": large.balls.names + extra.balls.names,
             "artefact": np.repeat([0, 1], [balls, len(small)]),
@@ -226,8 +229,7 @@ def two_artefacts() -> Design:
             np.concatenate([first.probe, second.probe]),
             np.concatenate([first.repeats, second.repeats]),
         ),
-    ).observed(
-        replace(extra.of(CalibratedCoordinates), ball=extra.of(CalibratedCoordinates).ball + balls)
+        coordinates=replace(extra.coordinates, ball=extra.coordinates.ball + balls),
     )
 
 
@@ -413,6 +415,8 @@ def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], 
         rotation_from_vector(turn) @ nominal.rotations,
         nominal.origins + shift,
         1e-4 * random.standard_normal(nominal.a.shape),
+        nominal.probes,
+        nominal.lengths,
     )
     scatter = random.standard_normal((len(design.readings), 3))
     x = expected_readings(design, nominal, design.readings) + 1e-4 * scatter

@@ -12,15 +12,15 @@ import pytest
 import yaml
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.length_equations import length_estimate
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.estimation.spheres import fit_sphere
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from scipy.optimize import least_squares

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.readings import reading_blocks
 
 LAYOUTS = {
     "one ball": "[[0 mm, 0 mm, 0 mm]]",

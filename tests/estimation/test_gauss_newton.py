@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import (
     exact_readings,
     noisy_certificate,
@@ -41,6 +41,8 @@ def truth_of(design: Design, seed: int = 3, errors: float = 1e-5) -> State:
         turn @ design.positions.rotations,
         design.positions.origins + shift,
         errors * generator.standard_normal(len(design.model.parameters)),
+        design.probes.offsets,
+        design.unknown_lengths.drawn,
     )
 
 

@@ -16,7 +16,9 @@ import pytest
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
@@ -25,14 +27,12 @@ from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
 from ballplate.simulator.estimation.length_equations import length_estimate
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.lengths import Lengths, length_whitening
-from ballplate.simulator.observations.readings import expected_readings
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
 from numpy.typing import NDArray
 
@@ -138,6 +138,8 @@ def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) 
         nominal.origins
         + 1e-4 * random.standard_normal(nominal.origins.shape) * ~design.positions.held[:, :3],
         1e-5 * random.standard_normal(nominal.a.shape),
+        nominal.probes,
+        nominal.lengths,
     )
     scatter = random.standard_normal((len(design.readings), 3))
     x = expected_readings(design, nominal, design.readings) + 1e-6 * scatter
@@ -460,7 +462,7 @@ def test_lengths_that_follow_from_others_tell_nothing_of_the_machine(tmp_path: P
     for symbol in ("U4", "U5", "U6"):
         found = [predict(one).quantities[symbol].maximum for one in (every, two)]
         assert found[0] == pytest.approx(found[1], rel=1e-9)
-    assert lay_out(every).observation_count == lay_out(two).observation_count
+    assert lay_out(every).observations == lay_out(two).observations
 
 
 def test_true_standards_differ_from_their_certificates_as_stated(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ import pytest
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.readings.generate import noisy_certificate
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
@@ -76,8 +76,7 @@ def test_ignoring_the_repeatability_counts_each_position_anew(tmp_path: Path) ->
 def test_a_certificate_has_one_error(tmp_path: Path) -> None:
     design = lay_out(with_bar(tmp_path, 4, "20 um"))
     assert design.of(Lengths).certificate.tolist() == [0, 0, 0, 0]
-    certified = noisy_certificate(design, nominal_state(design), np.random.default_rng(1))
-    drawn = certified.of(Lengths).value
+    drawn = noisy_certificate(design, nominal_state(design), np.random.default_rng(1)).lengths.value
     assert len(set(drawn.tolist())) == 1 and drawn[0] != 0.4
 
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings, reading_blocks
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.readings import expected_readings, reading_blocks
 
 from tests.reference.derivatives import assert_derivative, central_difference
 from tests.reference.designs import corner_sides, plate_design, six_positions, square
@@ -51,7 +51,7 @@ def test_readings(design: Design) -> None:
     blocks = reading_blocks(design, state, chosen, x)
 
     def residual(shared: np.ndarray, balls: np.ndarray) -> np.ndarray:
-        there = moved(design, state, layout.pose_columns, shared, balls, layout.model)
+        there = moved(state, layout, shared, balls)
         return reading_blocks(design, there, chosen, x).residual
 
     zero, still = np.zeros(len(layout)), np.zeros(design.balls.places.shape)

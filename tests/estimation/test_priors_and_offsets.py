@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from ballplate.results.study import check, fit, predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit, moved
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
-from ballplate.simulator.observations.priors import Priors
-from ballplate.simulator.observations.readings import reading_blocks
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 
@@ -110,8 +110,7 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
         * generator.standard_normal(design.balls.places.shape)
         * design.artefacts.is_plate[design.balls.artefact][:, None]
     )
-    arguments = (layout.pose_columns, shared, balls, layout.model, layout.offset_columns)
-    state = moved(design, nominal_state(design), *arguments)
+    state = moved(nominal_state(design), layout, shared, balls)
     _, x = exact_readings(
         replace(
             design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))
@@ -125,15 +124,7 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     def residual(step: np.ndarray) -> np.ndarray:
         of_balls = np.zeros(design.balls.places.shape)
         of_balls[members] = step[count:].reshape(-1, 3)
-        there = moved(
-            design,
-            state,
-            layout.pose_columns,
-            step[:count],
-            of_balls,
-            layout.model,
-            layout.offset_columns,
-        )
+        there = moved(state, layout, step[:count], of_balls)
         return all_residuals(design, there, x)
 
     size = np.concatenate([np.minimum(layout.scale, 1.0), np.ones(3 * len(members))]) * 1e-4

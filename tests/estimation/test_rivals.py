@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
@@ -16,7 +17,6 @@ from ballplate.simulator.estimation.alternative_estimators import (
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 
 from tests.estimation.test_gauss_newton import exactly_calibrated, truth_of

@@ -11,10 +11,10 @@ import mpmath
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.priors import Priors
 from ballplate.uncertainty.summaries import point_pairs
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -53,8 +53,8 @@ def design_of(positions: tuple[int, ...], certificate: str, repeatability: float
     n = len(design.model.parameters)
     none, empty = np.zeros(0, np.int64), np.zeros(0)
     priors = Priors((), none, none, none, np.zeros((0, n)), empty, empty)
-    return altered(design, evaluation={"points": np.random.default_rng(3).random((6, 3))}).observed(
-        priors
+    return altered(
+        design, priors=priors, evaluation={"points": np.random.default_rng(3).random((6, 3))}
     )
 
 
@@ -132,11 +132,13 @@ def _with_prior(
 
 def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     """The dense reference's problem, its rows without their uncertainties, and these."""
-    alike = altered(design, machine={"repeatability": np.ones(3)}).observed(
-        replace(
+    alike = altered(
+        design,
+        machine={"repeatability": np.ones(3)},
+        distances=replace(
             design.of(CalibratedDistances), uncertainty=np.ones(len(design.of(CalibratedDistances)))
         ),
-        replace(
+        coordinates=replace(
             design.of(CalibratedCoordinates),
             uncertainty=np.ones(len(design.of(CalibratedCoordinates))),
         ),

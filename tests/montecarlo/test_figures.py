@@ -27,11 +27,11 @@ from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, ta
 from ballplate.montecarlo.trials import run_trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.readings import expected_readings, reading_blocks
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.readings import expected_readings, reading_blocks
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:

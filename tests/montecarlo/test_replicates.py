@@ -10,13 +10,13 @@ from ballplate.montecarlo.expansion import Direct, Expansion
 from ballplate.montecarlo.reference import RankDeficientError, Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.priors import Priors
 
 from tests.reference.designs import (
     altered,
@@ -44,6 +44,8 @@ def truth(design: Design, seed: int = 1, size: float = 2e-6) -> Truth:
         size
         * generator.standard_normal(len(drawn.a))
         / [p.effect for p in design.model.parameters],
+        drawn.probes,
+        drawn.lengths,
     )
     if design.probes.free.any():
         moved = 1e-5 * design.probes.free * generator.standard_normal(design.probes.offsets.shape)
@@ -228,8 +230,7 @@ def assert_agree(shared: Reference, found: Estimates, state: State, squares: flo
     assert_close(start.balls + own.balls[k].T, state.balls, own.balls)
     assert_close(start.origins + own.origins[k], state.origins, own.origins)
     assert_close(start.a + own.a[k], state.a, own.a)
-    if state.probes is not None and start.probes is not None:
-        assert_close(start.probes + own.offsets[k], state.probes, own.offsets)
+    assert_close(start.probes + own.offsets[k], state.probes, own.offsets)
     turned = rotation_from_vector(own.rotations[k]) @ start.rotations
     assert_close(turned, state.rotations, own.rotations)
     assert found.sum_of_squares[k] == pytest.approx(squares, rel=1e-6)

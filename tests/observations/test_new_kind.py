@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate import experiment
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from scipy.optimize import least_squares
 from scipy.stats import norm
 
@@ -115,7 +115,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         shutil.copytree(TOP / part, package / part, ignore=ignored)
     page = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
     file, entry = (part.split("```\n")[0] for part in page.split("```python\n")[1:3])
-    rooms = package / "simulator" / "observations"
+    rooms = package / "simulator" / "design" / "observations"
     (rooms / "flatness.py").write_text(file, encoding="utf-8")
     kinds = (rooms / "kinds.py").read_text(encoding="utf-8")
     line, registered = entry.strip().split("\n\n")

@@ -20,7 +20,7 @@ from ballplate.planning.repair.repair_search import Repair, Repairs, repairs
 from ballplate.planning.repair.repair_tables import repair_lines
 from ballplate.planning.repair.screening import rank_of, seen_by
 from ballplate.results.study import check
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import (
     AtMost,
@@ -177,7 +177,7 @@ def test_words_name_errors_and_positions() -> None:
 
 @pytest.mark.parametrize("file, variant", DEFICIENT[:3])
 def test_screening_tells_the_rank(file: str, variant: str) -> None:
-    """Rows of added observations on the null directions against the full computation."""
+    """CandidateRows of added observations on the null directions against the full computation."""
     base = examine(design(file, variant))
     additions = [
         one

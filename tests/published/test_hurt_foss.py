@@ -15,13 +15,13 @@ from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.directions import directions
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
-from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings
 

@@ -5,16 +5,28 @@ alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.objects import (
+    Artefacts,
+    Balls,
+    EvaluationPoints,
+    Machine,
+    Positions,
+    Probes,
+    Tasks,
+    UnknownLengths,
+    Volume,
+)
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import no_priors
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.priors import no_priors
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
@@ -151,21 +163,21 @@ def plate_design(
         model=kinematic_model(
             ARRANGEMENTS["MB2"], position_coefficients, rotation_coefficients, lower, upper
         ),
-        lower=np.array(lower),
-        upper=np.array(upper),
-        repeatability=np.array(repeatability),
-        probe_names=tuple(TIPS),
-        probes=np.array(list(TIPS.values())),
-        artefact_names=("plate",),
-        is_plate=np.array([True]),
-        ball_names=tuple(f"b{i}" for i in range(len(balls))),
-        ball_artefact=np.zeros(len(balls), np.int64),
-        balls=balls,
-        position_names=tuple(f"p{k}" for k in range(len(positions))),
-        position_artefact=np.zeros(len(positions), np.int64),
-        rotations=np.array([pose.rotation for pose in positions]),
-        origins=np.array([pose.origin for pose in positions]),
-        held=held,
+        machine=Machine(Volume(np.array(lower), np.array(upper)), np.array(repeatability)),
+        probes=Probes(
+            tuple(TIPS), np.array(list(TIPS.values())), np.zeros((len(TIPS), len(lower)), bool)
+        ),
+        artefacts=Artefacts(("plate",), np.array([True]), np.array([False])),
+        balls=Balls(
+            tuple(f"b{i}" for i in range(len(balls))), np.zeros(len(balls), np.int64), balls
+        ),
+        positions=Positions(
+            tuple(f"p{k}" for k in range(len(positions))),
+            np.zeros(len(positions), np.int64),
+            np.array([pose.rotation for pose in positions]),
+            np.array([pose.origin for pose in positions]),
+            held,
+        ),
         readings=Readings(ball, position, probe, np.ones(len(ball), np.int64)),
         observations=(
             CalibratedDistances(
@@ -181,6 +193,22 @@ def plate_design(
             no_lengths(),
             no_priors(),
         ),
+        unknown_lengths=UnknownLengths((), np.zeros(0, np.int64), np.zeros(0)),
+        evaluation=EvaluationPoints(np.zeros((0, 3)), 0),
+        tasks=Tasks((), np.zeros((0, 2, 3)), np.zeros((0, 2), np.int64), ()),
+    )
+
+
+def altered(design: Design, **changes: Any) -> Design:
+    """The design with other fields, or parts of it with the other fields that a dictionary
+    states.
+    """
+    return replace(
+        design,
+        **{
+            name: replace(getattr(design, name), **other) if isinstance(other, dict) else other
+            for name, other in changes.items()
+        },
     )
 
 

@@ -20,14 +20,14 @@ from ballplate.gross_errors.events import Cause, cause
 from ballplate.gross_errors.power import noncentrality
 from ballplate.gross_errors.suspects import Diagnosis
 from ballplate.simulator.design.arrays import Design, Readings
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import TrueMachine, true_machine
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import observe
 from numpy.typing import NDArray

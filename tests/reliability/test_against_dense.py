@@ -14,16 +14,16 @@ from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
 from ballplate.simulator.estimation.hat import row_places, whitened_residuals
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.readings import expected_readings
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import certified_coordinates, repeats, with_length_standard
@@ -357,7 +357,7 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_pa
         if given.kind[k] == "scale" and given.design.artefacts.names[given.subject[k]] != "plate":
             continue
         biased, x = changed(design, given, k, size)
-        found = gauss_newton(biased, x, start)
+        found = gauss_newton(biased, x, nominal_state(biased))
         assert found.status == "converged"
         for symbol, was, now in zip(
             ("U5", "U6"), before, distances_of(biased, found.state), strict=True

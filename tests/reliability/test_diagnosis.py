@@ -13,13 +13,13 @@ from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.suspects import Diagnosis, Suspect
 from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.hat import whitened_residuals
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe, read_readings
 from numpy.typing import NDArray

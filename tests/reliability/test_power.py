@@ -16,15 +16,15 @@ from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentra
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_count
+from ballplate.simulator.estimation.hat import hat_rows, row_places
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.observations.distances import CalibratedDistances
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.readings import rotation_sensitivity
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 from numpy.typing import NDArray
@@ -81,7 +81,7 @@ def basis_of(design: Design) -> Real:
     """The columns Q (rows, rank) of the hat matrix's root, dense."""
     linear = linearise(design)
     width, d = linear.balls.common.shape[2], design.dimension
-    basis = np.zeros((row_count(design), width + d * len(design.balls.places)))
+    basis = np.zeros((len(row_places(design)), width + d * len(design.balls.places)))
     for some in hat_rows(linear, None):
         basis[some.rows, :width] = some.common
         at = np.flatnonzero(some.ball >= 0)
@@ -275,7 +275,9 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
             for r in range(fits):
                 k = int(every[r % len(every)])
                 seed = 100_000 * number + 1000 * int(estimated) + r
-                observed, solution = world.fitted(seed, planned, k, float(planned.detectable[k]))
+                observed, solution = world.fitted(
+                    seed, planned, k, float(planned.minimal_detectable[k])
+                )
                 freedom = freedom_of(observed.design)
                 found = patterns(observed.design, solution.state, observed.x)
                 left = leftover(linearised_fit(observed.design, solution), observed.x, freedom)

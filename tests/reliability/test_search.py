@@ -13,11 +13,11 @@ from ballplate.gross_errors.cause_search import Search
 from ballplate.gross_errors.leftover import leftover
 from ballplate.gross_errors.scatter import log_chances, ratio, scatters, with_scatter
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
 from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import observe
@@ -53,17 +53,8 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
     def residuals(step: Real) -> Real:
         shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
-        there = moved(
-            design,
-            state,
-            layout.pose_columns,
-            step[:s],
-            shift,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
-        return whitened_residuals(design, there, x)
+        there = moved(state, layout, step[:s], shift)
+        return whitened_residuals(design, layout, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
     found = numeric(residuals, len(scale), scale, 1e-4) * scale
@@ -95,7 +86,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
     )
     matrix = search.patterns.matrix.toarray()
     residual, taken = (
-        whitened_residuals(design, state, x),
+        whitened_residuals(design, shared_layout(design), state, x),
         jacobian(design, state, x),
     )
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
@@ -129,7 +120,7 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
         linearise(design, state, x), x, design.observation_count - design.parameter_count, True
     )
     residual, taken = (
-        whitened_residuals(design, state, x),
+        whitened_residuals(design, shared_layout(design), state, x),
         jacobian(design, state, x),
     )
     before, seen = left_by(taken, residual), set()

@@ -16,10 +16,10 @@ from ballplate.gross_errors.names import name
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import write_observations
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
-from ballplate.simulator.observations.lengths import Lengths
-from ballplate.simulator.observations.readings import expected_readings
+from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
 from tests.reference import dense

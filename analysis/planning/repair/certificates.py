@@ -8,7 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.experiment.model import Experiment, Indices
+from ballplate.simulator.design.lookup import Indices
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.radius import RadiusCalibration
+from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import (
     BallLayout,
     BryanGaugeSettings,
@@ -16,8 +19,6 @@ from ballplate.simulator.geometry.artefacts import (
     pairs,
 )
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length
-from ballplate.simulator.observations.distances import DistanceCalibration
-from ballplate.simulator.observations.radius import RadiusCalibration
 
 from .changes import (
     Change,

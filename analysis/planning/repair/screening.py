@@ -9,18 +9,18 @@ from dataclasses import replace
 
 import numpy as np
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.distances import DistanceCalibration
-from ballplate.simulator.observations.readings import reading_blocks
 
 from .changes import Change
 from .judging import Examined
 from .moves import new_tips
 
-# Rows on null directions, in standard deviations per micrometre, that count for more than rounding.
+# CandidateRows on null directions, in standard deviations per micrometre, that count for more than rounding.
 SEEN = 1e-6
 
 
@@ -100,7 +100,7 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
 
 
 def _without(rows: Array, by_pose: Array) -> Array:
-    """Rows (m, d, k) less what a pose of its own can do, with derivatives (m, d, pose size)."""
+    """CandidateRows (m, d, k) less what a pose of its own can do, with derivatives (m, d, pose size)."""
     u, sizes, _ = np.linalg.svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
     u = u[:, sizes > 1e-10 * sizes[0]]
     flat = rows.reshape(len(u), -1)

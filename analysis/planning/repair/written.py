@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 import yaml
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
@@ -17,9 +20,6 @@ from ballplate.simulator.geometry.positions import (
 )
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.observations.calibration import Calibration
-from ballplate.simulator.observations.coordinates import CoordinateCalibration
-from ballplate.simulator.observations.distances import DistanceCalibration
 
 from .changes import ball_set, pair_set
 

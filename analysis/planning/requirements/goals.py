@@ -129,7 +129,8 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
         without = [task.name for task in prediction.tasks if task.target is None]
         if without:
             raise GoalError(
-                f"no target for {listing(without)}; give target_uncertainty to tasks, or to the file"
+                f"no target for {listing(without)}; give target_uncertainty to tasks, or to the"
+                " file"
             )
     if goal.kind == "quantity" and goal.symbol not in prediction.quantities:
         raise GoalError(

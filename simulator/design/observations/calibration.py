@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, cast
 
-from ..geometry.artefacts import BallLayout
-from ..machines.protocol import Array, Unit
+from ...geometry.artefacts import BallLayout
+from ...machines.protocol import Array, Unit
 from .balls import BallObservations
 
 # A certified distance that differs from the drawing by more than this fraction is a slip of the

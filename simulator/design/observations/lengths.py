@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Observations, Rows, State, locations, reading_uncertainties
-from ..estimation.parameters import SharedLayout, shared_layout
-from ..machines.protocol import Array, ErrorModel, Integers
+from ...machines.protocol import Array, ErrorModel, Integers
+from ..arrays import Design, Observations, Rows, State, locations, reading_uncertainties
+from ..parameters import SharedLayout, shared_layout
 from .joint_lengths import LengthArrays, LengthWhitening, length_whitening_of
 from .readings import expected_readings, offset_sensitivity
 
@@ -105,10 +105,8 @@ def length_name(design: Design, length: int, of_reading: bool = True) -> str:
         return f"radius of {artefact}" + (
             f" to ball {design.balls.names[ball]}" if of_reading else ""
         )
-    return (
-        f"length {design.balls.names[ball]}-{design.balls.names[readings.ball[given.second[length]]]}"
-        f" of {artefact}"
-    )
+    other = readings.ball[given.second[length]]
+    return f"length {design.balls.names[ball]}-{design.balls.names[other]} of {artefact}"
 
 
 def length_derivative(design: Design, state: State, x: Array | None) -> Array:
@@ -258,11 +256,11 @@ def true_lengths(design: Design, truth: State) -> Array:
     return np.asarray(length[first][given.certificate])
 
 
-def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
+def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
     """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
     given = design.of(Lengths)
     if given.free is None or not len(design.unknown_lengths.names):
-        return None
+        return design.unknown_lengths.drawn
     seen = x + design.probes.offsets[design.readings.probe]
     other = np.where(
         given.to_pivot[:, None],

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import Design
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names, pose_size
 from ..machines.protocol import Array, Integers, Parameter
+from .arrays import Design
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def shared_layout(design: Design) -> SharedLayout:
     parameters += design.model.parameters
     model = slice(start, len(parameters))
     offsets = np.full(design.probes.offsets.shape, -1, np.int64)
-    for probe, axis in np.argwhere(design.probes.free) if design.probes.free.any() else ():
+    for probe, axis in np.argwhere(design.probes.free):
         offsets[probe, axis] = len(parameters)
         name, letter = design.probes.names[probe], AXIS_NAMES[axis]
         meaning = f"offset {letter} of probe {name}"

@@ -8,22 +8,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..computing.rounding import comparable
-from ..experiment.model import Experiment, Prior
+from ..design.arrays import Design, Readings
+from ..design.objects import (
+    Artefacts,
+    Balls,
+    EvaluationPoints,
+    Flags,
+    Positions,
+    Probes,
+    Tasks,
+    Volume,
+)
+from ..design.observations.balls import BallObservations
+from ..design.observations.coordinates import CalibratedCoordinates, no_coordinates
+from ..design.observations.distances import CalibratedDistances, no_distances
+from ..design.observations.priors import Priors
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
-from ..observations.balls import BallObservations
-from ..observations.coordinates import CalibratedCoordinates, no_coordinates
-from ..observations.distances import CalibratedDistances, no_distances
-from ..observations.length_standards import standard_lengths
-from ..observations.priors import Priors
-from ..observations.radius import RadiusCalibration
-from .arrays import Design, Readings
+from .length_standards import standard_lengths
+from .model import Experiment, Prior
 
-# Evaluation points of an experiment that names none.
+# EvaluationPoints points of an experiment that names none.
 DEFAULT_POINTS = 200
 DEFAULT_SEED = 1
 
@@ -43,10 +53,7 @@ def lay_out(experiment: Experiment) -> Design:
     3
     """
     machine, d = experiment.machine, experiment.dimension
-    lower, upper = machine.volume.lower, machine.volume.upper
-    model = build_error_model(
-        experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper))
-    )
+    model = build_error_model(experiment.error_model, *machine.volume.corners)
     artefacts = list(experiment.artefacts)
     layouts = [experiment.layouts[name] for name in artefacts]
     sizes = [len(layout.names) for layout in layouts]
@@ -54,12 +61,13 @@ def lay_out(experiment: Experiment) -> Design:
     balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
     for item in experiment.calibration:
         if isinstance(item, RadiusCalibration):
-            own = slice(
-                first_ball[item.artefact],
-                first_ball[item.artefact] + len(experiment.layouts[item.artefact].names),
-            )
+            first = first_ball[item.artefact]
+            own = slice(first, first + len(experiment.layouts[item.artefact].names))
             balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
-    is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
+    is_plate = np.array([one.role == "plate" for one in experiment.artefacts.values()])
+    is_gauge = np.array(
+        [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+    )
     probe_index = {name: k for k, name in enumerate(experiment.probes)}
     places = experiment.positions
     readings = _readings(experiment, first_ball, probe_index)
@@ -68,64 +76,54 @@ def lay_out(experiment: Experiment) -> Design:
     origins = np.array([place.pose.origin for place in places])
     of_balls = _of_balls(experiment, first_ball)
     distances, coordinates, *others = of_balls
-    lengths, length_names, drawn = standard_lengths(
+    lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
-    ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
     points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
-        points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
-    held = _held(balls, ball_artefact, position_artefact, rotations, of_balls, d)
-    for k, place in enumerate(places):
-        if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
-            # A pivot has a place; how the bar turns about it is what the readings say.
-            held[k] = np.arange(pose_size(d)) >= d
+        points = random_points(machine.volume, DEFAULT_POINTS, DEFAULT_SEED)
+    laid = Balls(
+        tuple(name for layout in layouts for name in layout.names),
+        np.repeat(np.arange(len(artefacts)), sizes),
+        balls,
+    )
+    held = _held(laid, position_artefact, rotations, of_balls)
+    # A pivot has a place; how the bar turns about it is what the readings say.
+    held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     priors = _priors(experiment, held, len(model.parameters))
     return Design(
-        model=model,
-        lower=lower,
-        upper=upper,
-        repeatability=machine.repeatability,
-        probe_names=tuple(experiment.probes),
-        probes=np.array([experiment.probes[name] for name in experiment.probes]),
-        artefact_names=tuple(artefacts),
-        is_plate=is_plate,
-        ball_names=tuple(name for layout in layouts for name in layout.names),
-        ball_artefact=ball_artefact,
-        balls=balls,
-        position_names=tuple(place.name for place in places),
-        position_artefact=position_artefact,
-        rotations=rotations,
-        origins=origins,
-        held=held,
-        readings=readings,
-        observations=(distances, coordinates, lengths, priors, *others),
-        points=points,
-        point_probe=probe_index[experiment.evaluation.probe],
-        free_offsets=_free_offsets(experiment),
-        is_gauge=np.array(
-            [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+        model,
+        machine,
+        Probes(
+            tuple(experiment.probes), np.array(list(experiment.probes.values())), _free(experiment)
         ),
-        length_names=length_names,
-        drawn_lengths=drawn,
-        task_names=tuple(task.name for task in tasks),
-        task_points=np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
-        task_probes=np.array(
-            [[probe_index[name] for name in task.probes] for task in tasks], np.int64
-        ).reshape(-1, 2),
-        task_targets=tuple(task.target for task in tasks),
+        Artefacts(tuple(artefacts), is_plate, is_gauge),
+        laid,
+        Positions(
+            tuple(place.name for place in places), position_artefact, rotations, origins, held
+        ),
+        readings,
+        (distances, coordinates, lengths, priors, *others),
+        unknown,
+        EvaluationPoints(points, probe_index[experiment.evaluation.probe]),
+        Tasks(
+            tuple(task.name for task in tasks),
+            np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
+            np.array(
+                [[probe_index[name] for name in task.probes] for task in tasks], np.int64
+            ).reshape(-1, 2),
+            tuple(task.target for task in tasks),
+        ),
     )
 
 
-def _free_offsets(experiment: Experiment) -> NDArray[np.bool_] | None:
+def _free(experiment: Experiment) -> Flags:
     """Which probe offsets are parameters (l, d)."""
-    if not experiment.offset_uncertainties:
-        return None
     free = [name in experiment.offset_uncertainties for name in experiment.probes]
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
-def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) -> Priors:
+def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
 
     :raises ExperimentError: a prior is about a pose parameter that is held.
@@ -162,10 +160,10 @@ def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) ->
     )
 
 
-def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
+def random_points(volume: Volume, count: int, seed: int) -> Array:
     """Points (count, d) drawn evenly from the volume."""
     generator = np.random.default_rng(np.random.SeedSequence(seed))
-    return np.asarray(lower + (upper - lower) * generator.random((count, len(lower))))
+    return np.asarray(volume.lower + volume.size * generator.random((count, len(volume.lower))))
 
 
 def _readings(
@@ -215,13 +213,11 @@ def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallOb
 
 
 def _held(
-    balls: Array,
-    ball_artefact: NDArray[np.int64],
+    balls: Balls,
     position_artefact: NDArray[np.int64],
     rotations: Array,
     observations: Collection[BallObservations],
-    d: int,
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Which pose parameters are held (k, pose size).
 
     An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it.
@@ -229,19 +225,21 @@ def _held(
     distances are known, none with co-ordinates of three balls. Balls on one line leave the turn
     about it open in every pose, a single ball every turn.
     """
+    d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
     ball, axis = (
         np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
     )
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
-        own = np.flatnonzero(ball_artefact == artefact)
-        idle = _idle_turns(balls[own])
+        own = balls.of(artefact)
+        places = balls.places[own]
+        idle = _idle_turns(places)
         for k in positions:
             held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
         chosen = np.isin(ball, own)
         fixed = _motion_of_coordinates(
-            balls[ball[chosen]] - balls[own].mean(axis=0), axis[chosen], d
+            balls.places[ball[chosen]] - places.mean(axis=0), axis[chosen], d
         )
         # Turns that no reading shows are dealt with already, in every position.
         free = _null_space(np.concatenate([fixed, idle.T]))
@@ -299,7 +297,7 @@ def _null_space(rows: Array) -> Array:
     return np.asarray(directions[rank:].T)
 
 
-def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+def _pivots(motions: Array, already: Flags | None = None) -> Flags:
     """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first,
     then largest.
     """

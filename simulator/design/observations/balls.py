@@ -8,8 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from ..design.arrays import Design, Observations, Replicates, Rows, State
-from ..machines.protocol import Array, ErrorModel
+from ...machines.protocol import Array, ErrorModel
+from ..arrays import Design, Observations, Replicates, Rows, State
 
 
 class BallObservations(Observations):

@@ -9,12 +9,13 @@ from itertools import count
 import numpy as np
 
 from ..design.arrays import Readings
-from ..experiment.model import Experiment
+from ..design.objects import UnknownLengths
+from ..design.observations.distances import DistanceCalibration
+from ..design.observations.lengths import Lengths
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..machines.protocol import Array, Integers
-from ..observations.distances import DistanceCalibration
-from ..observations.radius import RadiusCalibration
-from .lengths import Lengths
+from .model import Experiment
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class _Row:
     direction: tuple[float, ...] = ()
 
 
+# In one piece: rows, names and drawn values are counted together, in the order of the file.
 def standard_lengths(
     experiment: Experiment,
     readings: Readings,
@@ -41,8 +43,8 @@ def standard_lengths(
     rotations: Array,
     position_artefact: Integers,
     balls: Array,
-) -> tuple[Lengths, tuple[str, ...], Array]:
-    """The lengths of all standards, and names and drawn values of those that are unknown.
+) -> tuple[Lengths, UnknownLengths]:
+    """The lengths of all standards, and those of them that are unknown.
 
     A length standard contributes each of its calibrated distances once for every position and probe
     with which both its balls are read. The error of a certificate is the same in all of them, but
@@ -54,6 +56,7 @@ def standard_lengths(
     artefacts = list(experiment.artefacts)
     rows: list[_Row] = []
     names: list[str] = []
+    standing: list[int] = []
     drawn: list[float] = []
     read: dict[tuple[int, int, int], int] = {}
     standards = [
@@ -80,6 +83,7 @@ def standard_lengths(
 
     def unknown(name: str, what: str, value: float) -> _Row:
         names.append(f"{name}: {what}")
+        standing.append(artefacts.index(name))
         drawn.append(value)
         return _Row(value=value, certificate=(name, 0), free=len(names) - 1)
 
@@ -118,7 +122,10 @@ def standard_lengths(
                 along = rotations[readings.position[k]] @ balls[readings.ball[k]]
                 unit = along / np.sqrt(along @ along)
                 rows.append(replace(kind, first=int(k), direction=tuple(unit)))
-    return _arrays(rows, experiment.dimension), tuple(names), np.array(drawn, float)
+    unknown_lengths = UnknownLengths(
+        tuple(names), np.array(standing, np.int64), np.array(drawn, float)
+    )
+    return _arrays(rows, experiment.dimension), unknown_lengths
 
 
 def _certified_radius(name: str, item: object) -> _Row:

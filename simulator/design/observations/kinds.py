@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import Field
 
-from ..experiment.lookup import References
-from ..inputs.messages import Steps
-from ..inputs.settings import Settings
+from ...inputs.messages import Steps
+from ...inputs.settings import Settings
+from ..lookup import References
 from .calibration import Calibration
 from .coordinates import CoordinatesSettings, read_coordinates
 from .distances import DistancesSettings, read_distances

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import Design, Readings, State, locations, reading_uncertainties
-from ..geometry.motions import pose_size
-from ..machines.protocol import Array, ErrorModel
+from ...geometry.motions import pose_size
+from ...machines.protocol import Array, ErrorModel
+from ..arrays import Design, Readings, State, locations, reading_uncertainties
 
 # Metres: of the size of probe offsets.
 OFFSET_STEP = 0.1

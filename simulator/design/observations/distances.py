@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Tag
 
-from ..design.arrays import Design, Words
-from ..experiment.lookup import References, frozen
-from ..experiment.position_sections import PairSelection, Text
-from ..geometry.artefacts import COINCIDENT, BallLayout, Name, pairs
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.quantities import LengthFunction, PositiveLength
-from ..inputs.settings import FORM, Settings, hint, listing
-from ..inputs.tables import read_table
-from ..inputs.yamltree import Mark, mark_of
-from ..machines.protocol import Array, Integers
+from ...geometry.artefacts import COINCIDENT, BallLayout, Name, PairSet, pairs
+from ...inputs.messages import ExperimentError, Steps
+from ...inputs.quantities import LengthFunction, PositiveLength
+from ...inputs.settings import FORM, Settings, Text, hint, listing
+from ...inputs.tables import read_table
+from ...inputs.yamltree import Mark, mark_of
+from ...machines.protocol import Array, Integers
+from ..arrays import Design, Words
+from ..lookup import References, frozen
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, Calibration, far_from_drawing
 
@@ -106,6 +105,15 @@ class DistanceCalibration(Calibration):
             standard_uncertainty=LengthFunction(factor * old.constant, factor * old.slope),
             standard_uncertainties=factor * self.standard_uncertainties,
         )
+
+
+ListedPairs = Annotated[tuple[tuple[Name, Name], ...], Field(min_length=1)]
+PairSelection = Annotated[
+    Annotated[PairSet, Tag("<one>")]
+    | Annotated[ListedPairs, Tag("<list>")]
+    | Annotated[ListedPairs, Tag("<mapping>")],
+    FORM,
+]
 
 
 class CertifiedDistance(Settings):

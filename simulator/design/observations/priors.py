@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..design.arrays import Design, Observations, Rows, State, Words
-from ..estimation.parameters import shared_layout
-from ..geometry.motions import vector_from_rotation, vector_rate
-from ..machines.protocol import Array, ErrorModel, Integers, Unit
+from ...geometry.motions import vector_from_rotation, vector_rate
+from ...machines.protocol import Array, ErrorModel, Integers, Unit
+from ..arrays import Design, Observations, Rows, State, Words
+from ..parameters import shared_layout
 
 
 @dataclass(frozen=True)

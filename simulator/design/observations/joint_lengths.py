@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..machines.protocol import Array, Integers
+from ...machines.protocol import Array, Integers
 from .whitening import Whitening, whitening
 
 # Displacements that change lengths by less than this, compared with what changes them most, count

@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from ..experiment.lookup import References
-from ..geometry.artefacts import BallLayout, BryanGaugeSettings, Name
-from ..inputs.messages import Steps
-from ..inputs.quantities import PositiveLength
-from ..inputs.settings import Settings
-from ..machines.protocol import Array
+from ...geometry.artefacts import BallLayout, BryanGaugeSettings, Name
+from ...inputs.messages import Steps
+from ...inputs.quantities import PositiveLength
+from ...inputs.settings import Settings
+from ...machines.protocol import Array
+from ..lookup import References
 from .calibration import FAR_FROM_DRAWING, Calibration, CertifiedValue, far_from_drawing
 
 

@@ -9,20 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Tag
 
-from ..design.arrays import Design
-from ..experiment.lookup import References, frozen
-from ..experiment.position_sections import CalibratedBalls, SomeAxisLengthsSettings, Text
-from ..geometry.artefacts import BallLayout, Name, corners
-from ..geometry.motions import AXIS_NAMES
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.quantities import PositiveLength
-from ..inputs.settings import FORM, Settings, hint, listing
-from ..inputs.tables import read_table
-from ..machines.protocol import Array, Integers
+from ...geometry.artefacts import BallLayout, BallNames, Name, corners
+from ...geometry.motions import AXIS_NAMES
+from ...inputs.messages import ExperimentError, Steps
+from ...inputs.quantities import PositiveLength
+from ...inputs.settings import FORM, Settings, Text, hint, listing
+from ...inputs.tables import read_table
+from ...machines.protocol import Array, Integers
+from ..arrays import Design
+from ..lookup import References, frozen
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, Calibration
-
-AXES = AXIS_NAMES
 
 # What balls may be off a plane that they are drawn in, in metres.
 HARDLY_FLAT = 1e-3
@@ -90,10 +87,26 @@ class CoordinateCalibration(Calibration):
         )
 
     def names(self, layout: BallLayout) -> list[tuple[str, str]]:
-        return [(layout.names[ball], AXES[axis]) for ball in self.balls for axis in self.axes]
+        return [(layout.names[ball], AXIS_NAMES[axis]) for ball in self.balls for axis in self.axes]
 
     def doubt(self, layout: BallLayout) -> str:
         return far_spread(self.values, layout.coordinates[self.balls][:, list(self.axes)])
+
+
+CalibratedBalls = Annotated[
+    Annotated[Literal["all", "corners"], Tag("<one>")]
+    | Annotated[BallNames, Tag("<list>")]
+    | Annotated[BallNames, Tag("<mapping>")],
+    FORM,
+]
+
+
+class SomeAxisLengthsSettings(Settings):
+    """A length above zero for some axes."""
+
+    x: PositiveLength | None = Field(None, description="along x; omitted: x is not calibrated")
+    y: PositiveLength | None = Field(None, description="along y; omitted: y is not calibrated")
+    z: PositiveLength | None = Field(None, description="along z; omitted: z is not calibrated")
 
 
 class CoordinatesSettings(Settings):
@@ -133,11 +146,11 @@ def read_coordinates(
         return None
     uncertainty = settings.standard_uncertainty
     by_axis = (
-        dict.fromkeys(AXES[:dimension], uncertainty)
+        dict.fromkeys(AXIS_NAMES[:dimension], uncertainty)
         if isinstance(uncertainty, float)
         else {
             axis: getattr(uncertainty, axis)
-            for axis in AXES
+            for axis in AXIS_NAMES
             if getattr(uncertainty, axis) is not None
         }
     )
@@ -166,7 +179,7 @@ def read_coordinates(
     if values is None:
         return None
     balls.setflags(write=False)
-    axes = tuple(AXES.index(axis) for axis in by_axis)
+    axes = tuple(AXIS_NAMES.index(axis) for axis in by_axis)
     return CoordinateCalibration(
         artefact,
         balls,
@@ -187,9 +200,9 @@ def _certified_coordinates(
 ) -> Array | None:
     problems = references.problems
     if settings.values is None:
-        return layout.coordinates[balls][:, [AXES.index(axis) for axis in axes]]
+        return layout.coordinates[balls][:, [AXIS_NAMES.index(axis) for axis in axes]]
     try:
-        others = [axis for axis in AXES if axis not in axes]
+        others = [axis for axis in AXIS_NAMES if axis not in axes]
         rows = read_table(references.folder / settings.values, ["ball"], axes, others)
     except ExperimentError as error:
         problems.take(error, steps)
@@ -213,7 +226,9 @@ def _certified_coordinates(
     if len(problems.messages) > before:
         return None
     found = np.array([by_ball[layout.names[i]] for i in balls])
-    if text := far_spread(found, layout.coordinates[balls][:, [AXES.index(axis) for axis in axes]]):
+    if text := far_spread(
+        found, layout.coordinates[balls][:, [AXIS_NAMES.index(axis) for axis in axes]]
+    ):
         problems.add(steps, text)
         return None
     return found
