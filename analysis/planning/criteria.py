@@ -484,7 +484,7 @@ def _target(experiment: Experiment, name: str, functions: Functions | None) -> f
 
 
 def _of_shared(information: Information, rows: Array) -> Array:
-    """CandidateRows (m, z) of the shared part of z from rows (m, c) of shared columns."""
+    """Rows (m, z) of the shared part of z from rows (m, c) of shared columns."""
     return np.asarray(rows @ information.basis.shared_root)
 
 

@@ -72,7 +72,7 @@ class InformationBasis:
         return self.of_balls + int(self.shared_root.shape[1])
 
     def rows(self, by_amount: Array, by_shared: Array) -> Array:
-        """CandidateRows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m,
+        """Rows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m,
         c).
         """
         shared = (by_shared - by_amount @ self.ball_shared) @ self.shared_root
@@ -276,7 +276,7 @@ def pool_information(
 
 
 def _in_amounts(rows: CandidateRows, balls: Array) -> Array:
-    """CandidateRows (m, y + c) by amounts of ball combinations and shared columns, the pose projected
+    """Rows (m, y + c) by amounts of ball combinations and shared columns, the pose projected
     out.
     """
     y = balls.shape[2]
@@ -318,7 +318,7 @@ def _differs(rows: CandidateRows, weight: float) -> bool:
 
 
 def _weighted(rows: CandidateRows, least: float, most: float) -> CandidateRows:
-    """CandidateRows without a pose with weights between `least` and `most`."""
+    """Rows without a pose with weights between `least` and `most`."""
     sizes = _sizes(rows)[:, None]
     factor = np.clip(sizes, least, most) / np.where(sizes > 0.0, sizes, 1.0)
     by_ball = factor[:, :, None] * rows.by_ball
@@ -334,7 +334,7 @@ def _range(columns: Array) -> Array:
 
 
 def _reduced(rows: Array) -> Array:
-    """CandidateRows of the same information, no more of them than columns."""
+    """Rows of the same information, no more of them than columns."""
     return rows if len(rows) <= rows.shape[1] else np.asarray(np.linalg.qr(rows, mode="r"))
 
 

@@ -106,7 +106,7 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
 
 
 def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
-    """CandidateRows of every position in order."""
+    """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
     count = np.bincount(place, minlength=len(design.positions.names))
@@ -144,7 +144,7 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
 
 
 def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
-    """CandidateRows of the lengths of standards and gauges, by position."""
+    """Rows of the lengths of standards and gauges, by position."""
     design, layout = drawn.design, drawn.layout
     if not len(design.of(Lengths)):
         return {}
@@ -165,14 +165,14 @@ def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
 
 
 def _of_shared(drawn: PoolDesign, shared: Array) -> CandidateRows:
-    """CandidateRows (m, s) that no ball takes part in."""
+    """Rows (m, s) that no ball takes part in."""
     m = len(shared)
     none = np.zeros((m, 0, drawn.design.dimension))
     return CandidateRows(np.zeros((m, 0), np.int64), none, shared, np.zeros((m, 0)))
 
 
 def always(drawn: PoolDesign) -> list[CandidateRows]:
-    """CandidateRows of what is known in any case: calibrations and priors of the experiment, and errors of
+    """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
     certificates.
     """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
@@ -182,7 +182,7 @@ def always(drawn: PoolDesign) -> list[CandidateRows]:
 def calibration_rows(
     drawn: PoolDesign, experiment: Experiment, item: Calibration, name: str
 ) -> list[CandidateRows]:
-    """CandidateRows of a calibration item that may be chosen; of a length standard, of its unknown length.
+    """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
     `experiment` has some position, whichever.
 
@@ -208,7 +208,7 @@ def calibration_rows(
 
 
 def _of_observations(drawn: PoolDesign, design: Design) -> list[CandidateRows]:
-    """CandidateRows of all observations that are not formed of readings, of a design with the same balls and
+    """Rows of all observations that are not formed of readings, of a design with the same balls and
     parameters.
     """
     found = []

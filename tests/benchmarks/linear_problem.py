@@ -9,7 +9,6 @@ from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
-from ballplate.simulator.estimation.observations import distance_rows
 from ballplate.simulator.machines.protocol import Integers
 from numpy.typing import NDArray
 

@@ -111,8 +111,7 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
 
     def residual(step: np.ndarray) -> np.ndarray:
         still = np.zeros_like(design.balls.places)
-        arguments = (step, still, layout.model, layout.offset_columns, layout.lengths)
-        there = moved(design, state, layout.pose_columns, *arguments)
+        there = moved(state, layout, step, still)
         return design.of(Lengths).rows(design, there, x).residual
 
     state = replace(nominal_state(design), a=1e-4 * generator.standard_normal(6))

@@ -41,7 +41,7 @@ def perturbed(design: Design, seed: int = 3) -> State:
     layout = shared_layout(design)
     shared = 1e-3 * generator.standard_normal(len(layout))
     balls = 1e-2 * generator.standard_normal(design.balls.places.shape)
-    return moved(design, nominal_state(design), layout.pose_columns, shared, balls, layout.model)
+    return moved(nominal_state(design), layout, shared, balls)
 
 
 def test_readings(design: Design) -> None:

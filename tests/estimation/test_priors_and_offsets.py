@@ -311,7 +311,6 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
         layout = shared_layout(design)
         spread = linearised_fit(design, found).of_shared(np.eye(len(layout)))
         columns = layout.offset_columns[1:]
-        assert found.state.probes is not None
         deviations.append((found.state.probes - drawn.probes.offsets)[1:] / spread[columns])
     assert np.mean(sums) == pytest.approx(freedom, abs=4 * np.sqrt(2 * freedom / len(sums)))
     assert 0.7 < np.std(deviations) < 1.3

@@ -10,6 +10,7 @@ from ballplate.montecarlo.expansion import Direct, Expansion
 from ballplate.montecarlo.reference import RankDeficientError, Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.objects import Machine, Volume
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
@@ -83,7 +84,11 @@ def with_length_standard(projected: bool) -> Design:
     turned = np.array([np.eye(3), [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
     return altered(
         design,
-        artefacts={"names": ("plate", "bar"), "is_plate": np.array([True, False])},
+        artefacts={
+            "names": ("plate", "bar"),
+            "is_plate": np.array([True, False]),
+            "is_gauge": np.zeros(2, bool),
+        },
         balls={
             "names": (*design.balls.names, "left", "right"),
             "artefact": np.append(design.balls.artefact, [1, 1]),
@@ -104,8 +109,7 @@ def with_length_standard(projected: bool) -> Design:
             np.append(design.readings.probe, [0, 0, 0, 0]),
             np.append(design.readings.repeats, [2, 2, 3, 3]),
         ),
-    ).observed(
-        Lengths(
+        lengths=Lengths(
             np.array([m, m + 2]),
             np.array([m + 1, m + 3]),
             np.array([0.6, 0.6]),
@@ -114,7 +118,7 @@ def with_length_standard(projected: bool) -> Design:
             -direction,
             np.array([True, True]),
             np.array([0, 0]),
-        )
+        ),
     )
 
 
@@ -132,8 +136,11 @@ def with_unknown_probes(lengths: bool) -> Design:
     if lengths:
         # The ends of the standard with probes of unknown offset.
         readings = replace(readings, probe=np.append(readings.probe[:-4], [0, 1, 2, 3]))
-    return altered(design, readings=readings, probes={"free": free}).observed(
-        Priors(
+    return altered(
+        design,
+        readings=readings,
+        probes={"free": free},
+        priors=Priors(
             (*(f"offset {k}" for k in range(12)), "origin", "function", "turn"),
             np.append(np.full(12, -1), [2, -1, 3]),
             np.append(offsets[:, 0], [-1, -1, -1]),
@@ -141,7 +148,7 @@ def with_unknown_probes(lengths: bool) -> Design:
             of_model,
             np.zeros(15),
             np.append(np.full(12, 1e-6), [1e-6, 1e-6, 1e-6]),
-        )
+        ),
     )
 
 
@@ -155,12 +162,8 @@ def plane() -> Design:
     return altered(
         design,
         model=MetricModel(scale="x"),
-        machine={
-            "lower": np.zeros(2),
-            "upper": np.ones(2),
-            "repeatability": np.array([2e-7, 4e-7]),
-        },
-        probes={"names": ("tip",), "offsets": np.zeros((1, 2))},
+        machine=Machine(Volume(np.zeros(2), np.ones(2)), np.array([2e-7, 4e-7])),
+        probes={"names": ("tip",), "offsets": np.zeros((1, 2)), "free": np.zeros((1, 2), bool)},
         balls={"places": balls},
         positions={
             "names": ("a", "b", "c"),
@@ -170,10 +173,11 @@ def plane() -> Design:
             "held": np.zeros((3, 3), bool),
         },
         readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
+        distances=small(pairs=False).of(CalibratedDistances),
+        coordinates=CalibratedCoordinates(
+            certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)
+        ),
         evaluation={"points": np.zeros((0, 2))},
-    ).observed(
-        small(pairs=False).of(CalibratedDistances),
-        CalibratedCoordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
     )
 
 

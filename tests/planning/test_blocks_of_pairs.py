@@ -35,7 +35,7 @@ def some_places(count: int, dimension: int) -> tuple[Array, Array, Array]:
 
 
 def all_rows(places: Array, displacement: Array, open_: Array) -> tuple[Array, Array, int]:
-    """CandidateRows (pairs, z) and lengths (pairs,) of all distances that count, one by one, and how many
+    """Rows (pairs, z) and lengths (pairs,) of all distances that count, one by one, and how many
     are left open.
     """
     rows, lengths, excluded = [], [], 0

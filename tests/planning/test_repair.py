@@ -177,7 +177,7 @@ def test_words_name_errors_and_positions() -> None:
 
 @pytest.mark.parametrize("file, variant", DEFICIENT[:3])
 def test_screening_tells_the_rank(file: str, variant: str) -> None:
-    """CandidateRows of added observations on the null directions against the full computation."""
+    """Rows of added observations on the null directions against the full computation."""
     base = examine(design(file, variant))
     additions = [
         one

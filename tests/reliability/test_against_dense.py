@@ -84,16 +84,7 @@ def dense_jacobian(design: Design) -> Real:
     def residuals(step: Real) -> Real:
         shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
-        there = moved(
-            design,
-            state,
-            layout.pose_columns,
-            step[:s],
-            shift,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
+        there = moved(state, layout, step[:s], shift)
         return whitened_residuals(design, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
@@ -295,7 +286,7 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
 @pytest.mark.parametrize("text", [PLATE, MIXED, PLANE], ids=["plate", "mixed", "plane"])
 def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: Path) -> None:
     design = lay_out(experiment(tmp_path, text))
-    state = nominal_state(design)
+    state, layout = nominal_state(design), shared_layout(design)
     given = patterns(design, state, None)
     matrix, seen = given.matrix.toarray(), set()
     # Some of each kind; those of single lengths are compared with the dense reference.
@@ -308,7 +299,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
         sides = []
         for sign in (1.0, -1.0):
             biased, x = changed(design, given, k, 1e-6 * sign)
-            sides.append(whitened_residuals(biased, state, x))
+            sides.append(whitened_residuals(biased, nominal_state(biased), x))
         expected = (sides[0] - sides[1]) / 2e-6
         np.testing.assert_allclose(
             matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k]

@@ -21,7 +21,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_places
+from ballplate.simulator.estimation.hat import hat_rows, row_count
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
@@ -81,7 +81,7 @@ def basis_of(design: Design) -> Real:
     """The columns Q (rows, rank) of the hat matrix's root, dense."""
     linear = linearise(design)
     width, d = linear.balls.common.shape[2], design.dimension
-    basis = np.zeros((len(row_places(design)), width + d * len(design.balls.places)))
+    basis = np.zeros((row_count(design), width + d * len(design.balls.places)))
     for some in hat_rows(linear, None):
         basis[some.rows, :width] = some.common
         at = np.flatnonzero(some.ball >= 0)

@@ -54,7 +54,7 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
         shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
         there = moved(state, layout, step[:s], shift)
-        return whitened_residuals(design, layout, there, x)
+        return whitened_residuals(design, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
     found = numeric(residuals, len(scale), scale, 1e-4) * scale
@@ -86,7 +86,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
     )
     matrix = search.patterns.matrix.toarray()
     residual, taken = (
-        whitened_residuals(design, shared_layout(design), state, x),
+        whitened_residuals(design, state, x),
         jacobian(design, state, x),
     )
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
@@ -120,7 +120,7 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
         linearise(design, state, x), x, design.observation_count - design.parameter_count, True
     )
     residual, taken = (
-        whitened_residuals(design, shared_layout(design), state, x),
+        whitened_residuals(design, state, x),
         jacobian(design, state, x),
     )
     before, seen = left_by(taken, residual), set()

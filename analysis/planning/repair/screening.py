@@ -20,7 +20,7 @@ from .changes import Change
 from .judging import Examined
 from .moves import new_tips
 
-# CandidateRows on null directions, in standard deviations per micrometre, that count for more than rounding.
+# Rows on null directions, in standard deviations per micrometre, that count for more than rounding.
 SEEN = 1e-6
 
 
@@ -100,7 +100,7 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
 
 
 def _without(rows: Array, by_pose: Array) -> Array:
-    """CandidateRows (m, d, k) less what a pose of its own can do, with derivatives (m, d, pose size)."""
+    """Rows (m, d, k) less what a pose of its own can do, with derivatives (m, d, pose size)."""
     u, sizes, _ = np.linalg.svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
     u = u[:, sizes > 1e-10 * sizes[0]]
     flat = rows.reshape(len(u), -1)
