@@ -67,7 +67,7 @@ def linear_problem(design: Design) -> LinearProblem:
         by_model=blocks.by_model,
         first=design.of(CalibratedDistances).first,
         second=design.of(CalibratedDistances).second,
-        along=distance_rows(design, state).derivative,
+        along=design.of(CalibratedDistances).rows(design, state, None).by_ball[:, 0],
     )
 
 

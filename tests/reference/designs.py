@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.arrays import Design, Observations, Readings
 from ballplate.simulator.design.objects import (
     Artefacts,
     Balls,
@@ -201,15 +201,15 @@ def plate_design(
 
 def altered(design: Design, **changes: Any) -> Design:
     """The design with other fields, or parts of it with the other fields that a dictionary
-    states.
+    states; observations take the place of those of their kind.
     """
-    return replace(
-        design,
-        **{
-            name: replace(getattr(design, name), **other) if isinstance(other, dict) else other
-            for name, other in changes.items()
-        },
-    )
+    observed = [one for one in changes.values() if isinstance(one, Observations)]
+    fields = {
+        name: replace(getattr(design, name), **other) if isinstance(other, dict) else other
+        for name, other in changes.items()
+        if not isinstance(other, Observations)
+    }
+    return replace(design, **fields).observed(*observed)
 
 
 def no_lengths() -> Lengths:

@@ -286,7 +286,7 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
 @pytest.mark.parametrize("text", [PLATE, MIXED, PLANE], ids=["plate", "mixed", "plane"])
 def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: Path) -> None:
     design = lay_out(experiment(tmp_path, text))
-    state, layout = nominal_state(design), shared_layout(design)
+    state = nominal_state(design)
     given = patterns(design, state, None)
     matrix, seen = given.matrix.toarray(), set()
     # Some of each kind; those of single lengths are compared with the dense reference.

@@ -14,7 +14,6 @@ from ballplate.gross_errors.suspects import Diagnosis, Suspect
 from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.experiment.layout import lay_out
@@ -82,9 +81,7 @@ def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(
     solution, found = diagnosed(observed.design, x, estimated)
     assert found.suspects
     taken = jacobian(observed.design, solution.state, x)
-    residual = whitened_residuals(
-        observed.design, shared_layout(observed.design), solution.state, x
-    )
+    residual = whitened_residuals(observed.design, solution.state, x)
     columns = np.concatenate([one.columns for one in found.suspects])
     for one in found.suspects:
         matrix = one.patterns.matrix[:, columns].toarray()
