@@ -286,7 +286,7 @@ def length_covariance(design: Any) -> Real:
     A length whose repeatability is ignored has nothing in common with any other.
     """
     given = known(design, "length")
-    m, d = len(given.first), len(design.repeatability)
+    m, d = len(given.first), len(design.machine.repeatability)
     noise = np.zeros((m, d * len(design.readings)))
     for i in range(m):
         if not given.with_repeatability[i]:

@@ -255,11 +255,10 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         probes[subject] += step
         return altered(design, probes={"offsets": probes}), x
     elif kind in ("distance", "coordinate", "prior"):
-        field = {"distance": "distances", "coordinate": "coordinates", "prior": "priors"}[kind]
-        items = getattr(design, field)
+        (items,) = (one for one in design.observations if one.word == kind)
         value = items.value.copy()
         value[subject] += size
-        return replace(design, **{field: replace(items, value=value)}), x
+        return design.observed(items.given(value=value)), x
     elif kind == "length value":
         same = design.of(Lengths).certificate == design.of(Lengths).certificate[subject]
         return (
@@ -271,13 +270,10 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
     elif kind == "scale":
         of_plate = design.artefacts.names[subject] == "plate"
         assert of_plate
-        larger = {
-            field: replace(
-                getattr(design, field), value=getattr(design, field).value * (1.0 + size)
-            )
-            for field in ("distances", "coordinates")
-        }
-        return replace(design, **larger), x
+        larger = [
+            one.given(value=one.value * (1.0 + size)) for one in design.observations if one.scales
+        ]
+        return design.observed(*larger), x
     else:
         raise AssertionError(kind)
     return design, x

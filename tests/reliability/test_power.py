@@ -190,10 +190,10 @@ def biased(
             x,
         )
     else:
-        field = {"distance": "distances", "prior": "priors"}[kind]
-        value = getattr(design, field).value.copy()
+        (items,) = (one for one in design.observations if one.word == kind)
+        value = items.value.copy()
         value[subject] += size
-        return replace(design, **{field: replace(getattr(design, field), value=value)}), x
+        return design.observed(items.given(value=value)), x
     return design, x
 
 
