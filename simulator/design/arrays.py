@@ -354,8 +354,8 @@ class Replicates:
 
     def pull(self, balls: Integers, forces: Array) -> None:
         """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""
-        # A ball may take part in several.
         for ball, force in zip(balls.T, forces.transpose(2, 1, 0, 3), strict=True):
-            pulled = np.zeros((self.by_ball.shape[2], len(self.squares), force.shape[2]))
-            np.add.at(pulled, ball, force)
-            self.by_ball[:] += pulled.transpose(1, 2, 0)
+            # A ball may take part in several.
+            order = np.argsort(ball, kind="stable")
+            pulled, start = np.unique(ball[order], return_index=True)
+            self.by_ball[:, :, pulled] += np.add.reduceat(force[order], start).transpose(1, 2, 0)

@@ -62,6 +62,14 @@ def test_intervals_cover_what_they_say() -> None:
         assert one.bias.value < 0.1 and one.flags == (), symbol
 
 
+@pytest.mark.parametrize("file", ["certified-coordinates", "ball-bar"])
+def test_certificates_that_differ_from_the_drawing_leave_the_spread(file: str) -> None:
+    found = trials(shipped(f"certified/{file}.yaml"), 1024).outcome
+    assert found is not None and found.misfit.noise_free < 1e-9
+    for symbol, one in found.comparisons.items():
+        assert abs(one.spread.value - 1.0) < 4 * one.spread.error, symbol
+
+
 def test_residuals_are_those_of_a_right_model() -> None:
     misfit = two_thousand().misfit
     assert abs(misfit.mean.value - misfit.degrees_of_freedom) < 4 * misfit.mean.error
