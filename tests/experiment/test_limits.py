@@ -356,7 +356,7 @@ def test_many_distances_are_absorbed_some_at_a_time(
     state = nominal_state(design)
     assert SMALL < 3 * 196
     some = eliminate(*arguments, state)
-    monkeypatch.setattr("ballplate.simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.TIED_AT_ONCE", 50)
     few = eliminate(*arguments, state)
     monkeypatch.setattr("ballplate.simulator.estimation.elimination.SMALL", 10_000)
     plain = eliminate(*arguments, state)
