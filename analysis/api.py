@@ -336,7 +336,7 @@ def fit(
     >>> fit(quickstart(), readings, estimator="distances", pairs="braced")
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
-    from ballplate.simulator.design.layout import lay_out
+    from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 

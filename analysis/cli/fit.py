@@ -86,7 +86,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
-    from ballplate.simulator.design.layout import lay_out
+    from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.inputs.messages import in_one_line
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings

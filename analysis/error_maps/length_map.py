@@ -10,9 +10,9 @@ from ballplate.simulator.computing.rounding import above, comparable
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     AlternativeSolution,
@@ -23,6 +23,7 @@ from ballplate.simulator.estimation.length_equations import (
     NotAMetricError,
     length_estimate,
 )
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -71,7 +72,7 @@ class AlternativeFit(FitResult):
     @property
     def lengths(self) -> int:
         """Number of lengths of standards that it uses."""
-        return len(self.observed.design.lengths)
+        return len(self.observed.design.of(Lengths))
 
     @property
     def converged(self) -> bool:
@@ -240,7 +241,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         errors left open.
     """
     what, text = "artefacts", ""
-    if not len(design.lengths):
+    if not len(design.of(Lengths)):
         text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
     elif not has_all_errors(design):
         what, text = (
@@ -353,7 +354,7 @@ def compare_estimators(
         estimator,
         trials,
         len(chosen),
-        len(design.lengths),
+        len(design.of(Lengths)),
         across_probes,
         points,
         np.array(rms),

@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.length_equations import (
     LengthEstimator,
     LengthSolution,
@@ -160,7 +162,7 @@ def _refuse_other_artefacts(
     experiment: Experiment, design: Design, estimator: LengthEstimator
 ) -> None:
     """Refuse an experiment that has no lengths in three dimensions."""
-    if design.dimension == 3 and len(design.lengths):
+    if design.dimension == 3 and len(design.of(Lengths)):
         return
     what = "machine.volume" if design.dimension != 3 else "artefacts"
     has = (
@@ -184,7 +186,7 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
-    if len(design.priors):
+    if len(design.of(Priors)):
         remarks.append(f"{estimator} takes no notice of priors")
     if design.probes.free.any():
         remarks.append(
@@ -196,7 +198,7 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
             f"{estimator} has three scale errors and three squareness errors, whatever the file's"
             " error model"
         )
-    if design.lengths.free is not None and (design.lengths.free >= 0).all():
+    if not design.of(Lengths).is_known.any():
         remarks.append(
             "no length is known: scales are told against one another, and the overall scale stays"
             " open"

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import (
     Reversal,
     UndeterminedError,

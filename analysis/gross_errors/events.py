@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.machines.protocol import Integers
 
-from .patterns import Kind, Patterns
+from .patterns import Patterns
 
 # Kinds whose patterns come one for each axis, of one subject together.
-BY_AXIS: tuple[Kind, ...] = ("reading", "end", "ball", "moved", "probe")
+BY_AXIS: tuple[str, ...] = ("reading", "end", "ball", "moved", "probe")
 # Certified distances of one ball that are looked at together, at the most.
 MOST_DISTANCES = 12
 
-SLIP: tuple[Kind, ...] = ("shift", "turn")
+SLIP: tuple[str, ...] = ("shift", "turn")
 
 
 def event_groups(given: Patterns) -> list[Integers]:
@@ -45,7 +46,7 @@ def event_groups(given: Patterns) -> list[Integers]:
 def _by_ball(given: Patterns) -> list[Integers]:
     """Groups of all certified distances of one ball, of balls with as many together."""
     columns = given.of_kind("distance")
-    ends = given.design.distances.first, given.design.distances.second
+    ends = given.design.of(CalibratedDistances).first, given.design.of(CalibratedDistances).second
     first, second = (end[given.subject[columns]] for end in ends)
     by_width: dict[int, list[Integers]] = {}
     for ball in np.unique([first, second]).tolist():
@@ -55,7 +56,7 @@ def _by_ball(given: Patterns) -> list[Integers]:
     return [np.array(by_width[width]) for width in sorted(by_width)]
 
 
-def _by_subject(given: Patterns, kind: Kind) -> Iterator[Integers]:
+def _by_subject(given: Patterns, kind: str) -> Iterator[Integers]:
     """Groups of the patterns of each subject, those of as many axes together."""
     columns = given.of_kind(kind)
     _, start, count = np.unique(given.subject[columns], return_index=True, return_counts=True)
@@ -63,7 +64,7 @@ def _by_subject(given: Patterns, kind: Kind) -> Iterator[Integers]:
         yield columns[start[count == q][:, None] + np.arange(q)]
 
 
-def _by_start(given: Patterns, kind: Kind) -> Integers:
+def _by_start(given: Patterns, kind: str) -> Integers:
     """Patterns (starts, q) of the slips of each start."""
     columns = given.of_kind(kind)
     if not len(columns):
@@ -93,7 +94,7 @@ def cause(given: Patterns, columns: Integers) -> Cause:
 
 def whole(given: Patterns, columns: Integers) -> Integers:
     """All patterns of the cause that `columns` are of."""
-    kind: Kind = given.kind[columns[0]]
+    kind: str = given.kind[columns[0]]
     if kind not in (*BY_AXIS, *SLIP):
         return columns
     found = cause(given, columns)

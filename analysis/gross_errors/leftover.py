@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.hat import hat_rows, row_places, whitened_residuals
+from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.estimation.hat import hat_rows, row_count, whitened_residuals
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ def entries(design: Design) -> tuple[int, int]:
     Those are the shared parameters and the co-ordinates of balls that certificates of distances tie
     together.
     """
-    tied = np.unique(np.concatenate([design.distances.first, design.distances.second]))
-    return len(row_places(design)), len(shared_layout(design)) + design.dimension * len(tied)
+    shared = len(design.once(shared_layout))
+    return row_count(design), shared + design.dimension * len(design.tied_balls)
 
 
 def too_many_entries(design: Design) -> str:
@@ -112,11 +112,11 @@ def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
     order.
     """
     design = at.design
-    n, d = len(row_places(design)), design.dimension
+    n, d = row_count(design), design.dimension
     common, own, ball = np.zeros((n, at.balls.common.shape[2])), np.zeros((n, d)), np.full(n, -1)
     for some in hat_rows(at, x):
         common[some.rows], own[some.rows], ball[some.rows] = some.common, some.own, some.ball
-    residual = whitened_residuals(design, at.layout, at.state, x)
+    residual = whitened_residuals(design, at.state, x)
     found = Leftover(residual, common, own, ball, len(design.balls.places), freedom)
     return replace(found, residual=found.of(residual[:, None])[:, 0])
 

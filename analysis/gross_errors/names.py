@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import length_name
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Integers
 
@@ -17,18 +19,9 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
     if kind in ("reading", "end"):
         return f"{reading_name(design, subject, with_position)}, {letter}"
-    if kind == "length":
-        position = design.readings.position[design.lengths.first[subject]]
-        return f"{length_name(design, subject)} in position {design.positions.names[position]}"
-    if kind == "prior":
-        return f"prior of {design.priors.names[subject]}"
-    if kind == "coordinate":
-        return f"{letter} of ball {design.ball_label(int(design.coordinates.ball[subject]))}"
-    if kind == "distance":
-        first, second = (
-            int(end[subject]) for end in (design.distances.first, design.distances.second)
-        )
-        return f"distance {design.ball_label(first)} to {design.balls.names[second]}"
+    for one in design.observations:
+        if one.word == kind:
+            return one.name(design, subject)
     if kind == "ball":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
         return (
@@ -53,7 +46,7 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
 
 def common_ball(design: Design, distances: Integers) -> int:
     """The ball that several distances have in common; of two between the same balls, the first."""
-    ends = np.stack([design.distances.first[distances], design.distances.second[distances]], axis=1)
+    ends = design.of(CalibratedDistances).balls[distances]
     return next(int(ball) for ball in ends[0] if (ends == ball).any(axis=1).all())
 
 
@@ -83,16 +76,3 @@ def reading_name(design: Design, reading: int, with_position: bool = True) -> st
         else ""
     )
     return f"ball {design.ball_label(int(readings.ball[reading]))}{position}{probe}"
-
-
-def length_name(design: Design, length: int, of_reading: bool = True) -> str:
-    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is
-    certified.
-    """
-    given, readings, balls = design.lengths, design.readings, design.balls
-    ball = int(readings.ball[given.first[length]])
-    artefact = design.artefacts.names[balls.artefact[ball]]
-    if given.second[length] < 0:
-        return f"radius of {artefact}" + (f" to ball {balls.names[ball]}" if of_reading else "")
-    second = balls.names[readings.ball[given.second[length]]]
-    return f"length {balls.names[ball]}-{second} of {artefact}"

@@ -14,43 +14,29 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, locations
-from ballplate.simulator.estimation.hat import row_places
-from ballplate.simulator.estimation.observations import (
-    expected_readings,
+from ballplate.simulator.design.observations.lengths import (
+    Lengths,
     length_directions,
     length_values,
+    length_whitening,
+)
+from ballplate.simulator.design.observations.readings import (
+    expected_readings,
     offset_sensitivity,
     reading_weights,
     rotation_sensitivity,
 )
+from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
-    from ballplate.simulator.design.whitening import Whitening
+    from ballplate.simulator.design.observations.whitening import Whitening
     from scipy.sparse import csc_array
-
-Kind = Literal[
-    "reading",
-    "length",
-    "prior",
-    "coordinate",
-    "distance",
-    "end",
-    "ball",
-    "moved",
-    "shift",
-    "turn",
-    "probe",
-    "length value",
-    "scale",
-    "expansion",
-]
-SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
 
 # Axes along which a reading changes lengths by less than this share of the most are left out, and
 # so are those that change all of them in a proportion equal to within the square of this.
 SLIGHT = 1e-3
-UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
+UNITS: dict[str, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
 
 # A slip leaves at least so many readings of the position on either side, and is looked for before
 # at most so many.
@@ -69,7 +55,7 @@ class BiasPatterns:
     first reading after a slip, -1 without one.
     """
 
-    kind: Kind
+    kind: str
     row: Integers
     column: Integers
     value: Array
@@ -103,17 +89,18 @@ class Patterns:
         """Which patterns (k,) are of rows that come together: of one ball at the most, or one
         kind.
         """
-        return np.isin(self.kind, [*SINGLE, "end", "ball", "moved", "length value"])
+        return np.isin(self.kind, [*single_kinds(self.design), "ball", "moved", "length value"])
 
-    def of_kind(self, *kinds: Kind) -> Integers:
+    def of_kind(self, *kinds: str) -> Integers:
         """Indices of the patterns of some kinds."""
         return np.flatnonzero(np.isin(self.kind, kinds))
 
     def unit(self, k: int) -> Literal["m", "rad", "1"]:
         """Unit of the bias."""
-        kind: Kind = self.kind[k]
-        if kind == "prior":
-            return prior_unit(self.design, int(self.subject[k]))
+        kind: str = self.kind[k]
+        for one in self.design.observations:
+            if one.word == kind:
+                return one.unit(self.design, int(self.subject[k]))
         return UNITS.get(kind, "m")
 
 
@@ -134,7 +121,7 @@ def patterns(design: Design, state: State, x: Array | None, every_start: bool = 
     )
     row = np.concatenate([block.row for block in blocks])
     value = np.concatenate([block.value for block in blocks])
-    matrix = coo_array((value, (row, column)), shape=(len(at.places), int(start[-1]))).tocsc()
+    matrix = coo_array((value, (row, column)), shape=(row_count(design), int(start[-1]))).tocsc()
     kind = np.repeat(np.array([block.kind for block in blocks]), [block.count for block in blocks])
     return Patterns(
         design,
@@ -146,15 +133,9 @@ def patterns(design: Design, state: State, x: Array | None, every_start: bool = 
     )
 
 
-def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
-    """Unit of what a prior states."""
-    given = design.priors
-    if given.position[prior] >= 0:
-        return "rad" if given.component[prior] >= design.dimension else "m"
-    if given.probe[prior] >= 0:
-        return "m"
-    used = np.flatnonzero(given.by_model[prior])
-    return design.model.parameters[int(used[0])].unit if len(used) else "1"
+def single_kinds(design: Design) -> list[str]:
+    """Kinds of patterns of single observations."""
+    return ["reading", "end", *(one.word for one in design.observations)]
 
 
 class Place:
@@ -169,7 +150,7 @@ class Place:
         self.readings = design.readings.select(self.chosen)
         self.weight = reading_weights(design, self.readings)
         self.x = expected_readings(design, state, design.readings) if x is None else x
-        self.unit, self.white = length_directions(design, state, x), design.length_whitening
+        self.unit, self.white = length_directions(design, state, x), design.once(length_whitening)
         turned = locations(design, state, self.readings) - state.origins[self.readings.position]
         self.arm = turned
         self.has_plate = design.plate_positions
@@ -192,7 +173,7 @@ class Place:
 
     def along_lengths(self, displacement: Array) -> Array:
         """Changes (lengths, k) of lengths by displacements (readings, d, k) of all readings."""
-        given = self.design.lengths
+        given = self.design.of(Lengths)
         other = displacement[np.maximum(given.second, 0)]
         apart = displacement[given.first] - np.where(given.to_pivot[:, None, None], 0.0, other)
         return np.einsum("md,mdk->mk", self.unit, apart)
@@ -201,11 +182,11 @@ class Place:
         """Entries of changes (lengths, k) of measured less known lengths."""
         white = self.white.whitened(columns)
         row, column = np.nonzero(white)
-        return self.places.lengths.start + row, column, white[row, column]
+        return self.places["length"].start + row, column, white[row, column]
 
 
 def _block(
-    kind: Kind,
+    kind: str,
     entries: tuple[Integers, Integers, Array],
     subject: Any,
     axis: Any = -1,
@@ -240,14 +221,14 @@ def _single_lengths(at: Place) -> Iterator[BiasPatterns]:
     row, column = _pairs_within(white, white.group)
     own, along = white.own[column], white.direction
     value = ((row == column) - along[row] * along[column]) / own
-    yield _block("length", (at.places.lengths.start + row, column, value), alone)
+    yield _block("length", (at.places["length"].start + row, column, value), alone)
 
 
 def _ends(at: Place) -> Iterator[BiasPatterns]:
     """Readings of standards whose lengths are read together, each along the axes that change
     lengths differently.
     """
-    given = at.design.lengths
+    given = at.design.of(Lengths)
     joint = np.setdiff1d(np.arange(len(given)), at.white.alone)
     for reading in np.unique([given.first[joint], given.second[joint]]):
         sign = (given.first == reading).astype(float) - (given.second == reading)
@@ -286,19 +267,13 @@ def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers
 
 
 def _single_items(at: Place) -> Iterator[BiasPatterns]:
-    """Priors, co-ordinates and distances: a value that is stated too large makes residuals
-    smaller.
-    """
-    design = at.design
-    kinds: tuple[tuple[Kind, slice, Array], ...] = (
-        ("prior", at.places.priors, design.priors.uncertainty),
-        ("coordinate", at.places.coordinates, design.coordinates.uncertainty),
-        ("distance", at.places.distances, design.distances.uncertainty),
-    )
-    for kind, rows, uncertainty in kinds:
-        every = np.arange(len(uncertainty))
-        axis = design.coordinates.axis if kind == "coordinate" else -1
-        yield _block(kind, (rows.start + every, every, -1.0 / uncertainty), every, axis)
+    """Certified values and priors: what is stated too large makes residuals smaller."""
+    # What is known of the machine first, then of artefacts.
+    for one in reversed(at.design.observations):
+        if not isinstance(one, Lengths):
+            every = np.arange(len(one))
+            entries = (at.places[one.word].start + every, every, -1.0 / one.uncertainty)
+            yield _block(one.word, entries, every, one.along)
 
 
 def _dirty_balls(at: Place) -> Iterator[BiasPatterns]:
@@ -402,10 +377,10 @@ def _probes(at: Place) -> Iterator[BiasPatterns]:
     wrong.
     """
     design, state = at.design, at.state
-    offsets = state.probes[design.readings.probe]
+    d, offsets = design.dimension, state.probes[design.readings.probe]
     all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
     for probe in np.unique(design.readings.probe):
-        fixed = ~design.probes.free[probe]
+        fixed = np.ones(d, bool) if not design.probes.free.any() else ~design.probes.free[probe]
         if not fixed.any():
             continue
         rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[
@@ -421,8 +396,8 @@ def _length_values(at: Place) -> Iterator[BiasPatterns]:
     """Certified lengths that are stated too long and are read several times, or together with
     others.
     """
-    given = at.design.lengths
-    known = np.ones(len(given), bool) if given.free is None else given.free < 0
+    given = at.design.of(Lengths)
+    known = given.is_known
     numbers, first, count = np.unique(
         given.certificate[known], return_index=True, return_counts=True
     )
@@ -434,37 +409,26 @@ def _length_values(at: Place) -> Iterator[BiasPatterns]:
 
 def _scales(at: Place) -> Iterator[BiasPatterns]:
     """Certificates of an artefact of which all values are too long by one ratio."""
-    design, places = at.design, at.places
-    known = (
-        np.ones(len(design.lengths), bool)
-        if design.lengths.free is None
-        else design.lengths.free < 0
-    )
+    design = at.design
+    lengths = design.of(Lengths)
+    of_length = design.balls.artefact[design.readings.ball[lengths.first]]
+    scaled = [one for one in design.observations if one.scales]
     for artefact in range(len(design.artefacts.names)):
-        of_distances = np.flatnonzero(design.balls.artefact[design.distances.first] == artefact)
-        of_coordinates = np.flatnonzero(design.balls.artefact[design.coordinates.ball] == artefact)
-        of_lengths = known & (
-            design.balls.artefact[design.readings.ball[design.lengths.first]] == artefact
-        )
-        if (
-            len(of_distances)
-            + len(of_coordinates)
-            + len(np.unique(design.lengths.certificate[of_lengths]))
-            < 2
-        ):
+        mine = [
+            np.flatnonzero(design.balls.artefact[one.balls[:, 0]] == artefact) for one in scaled
+        ]
+        of_lengths = lengths.is_known & (of_length == artefact)
+        if sum(map(len, mine)) + len(np.unique(lengths.certificate[of_lengths])) < 2:
             continue
         parts = [
             (
-                start + rows,
+                at.places[one.word].start + rows,
                 np.zeros(len(rows), np.int64),
-                -given.value[rows] / given.uncertainty[rows],
+                -one.value[rows] / one.uncertainty[rows],
             )
-            for start, rows, given in (
-                (places.distances.start, of_distances, design.distances),
-                (places.coordinates.start, of_coordinates, design.coordinates),
-            )
+            for one, rows in zip(scaled, mine, strict=True)
         ]
-        columns = -np.where(of_lengths, design.lengths.value, 0.0)[:, None]
+        columns = -np.where(of_lengths, lengths.value, 0.0)[:, None]
         yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
 
 
@@ -472,7 +436,7 @@ def _expansions(at: Place) -> Iterator[BiasPatterns]:
     """Artefacts that are larger in one position."""
     design = at.design
     values = length_values(design, at.state)
-    of_lengths = design.readings.position[design.lengths.first]
+    of_lengths = design.readings.position[design.of(Lengths).first]
     for k in range(len(design.positions.names)):
         rows = np.flatnonzero(at.readings.position == k)
         if not len(rows) and not (of_lengths == k).any():

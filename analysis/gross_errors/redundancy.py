@@ -12,10 +12,10 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import Parameters
-from ballplate.simulator.estimation.hat import row_places
+from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
@@ -82,7 +82,7 @@ def reliability_of(
     }
     places = row_places(design)
     redundancy, left, information = (
-        np.zeros(len(places)),
+        np.zeros(row_count(design)),
         np.zeros(len(given)),
         np.zeros(len(given)),
     )
@@ -93,7 +93,7 @@ def reliability_of(
     }
     done = 0
     for one in responses(at, None, given):
-        report(ProgressStep("observations", done, len(places)))
+        report(ProgressStep("observations", done, row_count(design)))
         done += len(one.rows)
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information
@@ -106,20 +106,14 @@ def reliability_of(
         for symbol, groups in changes.items():
             for among in groups:
                 _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
-    for kind, rows in (
-        ("reading", places.readings),
-        ("length", places.lengths),
-        ("prior", places.priors),
-        ("coordinate", places.coordinates),
-        ("distance", places.distances),
-    ):
+    for kind, rows in places.items():
         own = np.flatnonzero(given.kind == kind)
         left[own] = redundancy[rows][: len(own)]
     repeats = design.readings.repeats[design.plate_readings]
     every = patterns(design, at.state, None, every_start=True)
     tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
     limit = 0.5 * FAMILY / max(tests, 1)
-    freedom = design.observations - design.parameter_count + at.deficiency
+    freedom = design.observation_count - design.parameter_count + at.deficiency
     return Reliability(
         experiment.label if experiment else "",
         experiment.title if experiment else "",

@@ -25,7 +25,7 @@ from ..rank.proposed_bars import listed
 from ..uncertainty.quantities import QUANTITIES
 from .effects import LENGTHS, MOST_PLACES, SYMBOLS
 from .names import name
-from .patterns import SINGLE, Kind, Patterns
+from .patterns import Patterns, single_kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +36,7 @@ NO_EFFECT = 1e-6
 # Observations of a kind that a table names.
 MOST = 5
 
-EVENTS: tuple[tuple[Kind, ...], ...] = (
+EVENTS: tuple[tuple[str, ...], ...] = (
     ("ball",),
     ("moved",),
     ("shift",),
@@ -46,7 +46,6 @@ EVENTS: tuple[tuple[Kind, ...], ...] = (
     ("scale",),
     ("expansion",),
 )
-ITEMS: tuple[Kind, ...] = ("length", "end", "prior", "coordinate", "distance")
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ class Reliability(Result):
     fit_noncentrality: float
 
     def headline(self) -> str:
-        observations = self.design.observations
+        observations = self.design.observation_count
         mean = (float(self.redundancy.sum()) + self.among_repeats) / observations
         return (
             f"redundancy {mean:.3g} of an observation on average; {len(self.patterns)} biases"
@@ -188,7 +187,7 @@ def _lines(result: Reliability, with_all: bool) -> list[str]:
     """
     lines = [*_heading(result), "", *_positions(result)]
     readings = result.patterns.of_kind("reading")
-    items = result.patterns.of_kind(*ITEMS)
+    items = result.patterns.of_kind(*single_kinds(result.design)[1:])
     for title, chosen in (("worst readings", readings), ("worst items", items)):
         if len(chosen):
             lines += [
@@ -205,7 +204,7 @@ def _lines(result: Reliability, with_all: bool) -> list[str]:
 
 
 def _heading(result: Reliability) -> list[str]:
-    design, count = result.design, result.design.observations
+    design, count = result.design, result.design.observation_count
     rank = f"rank deficiency {result.deficiency}" if result.deficiency else "full rank"
     sigma = "estimated from the other residuals" if result.sigma_is_estimated else "as given"
     total = result.redundancy.sum() + result.among_repeats
@@ -442,12 +441,12 @@ def _data(result: Reliability) -> dict[str, Any]:
     """Reliability as plain data in metres, radians and ratios; None where nothing can be detected
     or determined.
     """
-    is_single = np.isin(result.patterns.kind, [*SINGLE, "end"])
+    is_single = np.isin(result.patterns.kind, single_kinds(result.design))
     return {
         "experiment": result.label,
         "title": result.title,
         "parameters": result.design.parameter_count,
-        "observations": result.design.observations,
+        "observations": result.design.observation_count,
         "rank_deficiency": result.deficiency,
         "degrees_of_freedom": result.degrees_of_freedom,
         "sigma_is_estimated": result.sigma_is_estimated,
@@ -513,7 +512,7 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
     )
     design, given = result.design, result.patterns
     effects = {symbol: _effect(result, symbol) for symbol in SYMBOLS}
-    for k in np.flatnonzero(np.isin(given.kind, [*SINGLE, "end"])).tolist():
+    for k in np.flatnonzero(np.isin(given.kind, single_kinds(given.design))).tolist():
         names = ["", "", "", ""]
         if given.kind[k] in ("reading", "end"):
             i = int(given.subject[k])

@@ -10,7 +10,8 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.observations import rotation_sensitivity
+from ballplate.simulator.design.observations.readings import rotation_sensitivity
+from ballplate.simulator.estimation.hat import row_count
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
@@ -155,7 +156,7 @@ def _in_all_directions(values: Array, d: int) -> Array:
 def _rows(at: Place, displacement: Array) -> Array:
     """Biases (rows, k) of all observations by displacements (readings, d, k) of all readings."""
     k = displacement.shape[2]
-    of_plates = (at.weight[:, :, None] * displacement[at.chosen]).reshape(-1, k)
-    of_lengths = at.white.whitened(at.along_lengths(displacement))
-    others = len(at.places) - len(of_plates) - len(of_lengths)
-    return np.concatenate([of_plates, of_lengths, np.zeros((others, k))])
+    found = np.zeros((row_count(at.design), k))
+    found[at.places["reading"]] = (at.weight[:, :, None] * displacement[at.chosen]).reshape(-1, k)
+    found[at.places["length"]] = at.white.whitened(at.along_lengths(displacement))
+    return found

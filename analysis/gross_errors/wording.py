@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
@@ -57,8 +59,9 @@ def scatter_words(scatter: MoreScatter) -> str:
     """Which readings scatter more than the others."""
     return (
         f"readings {_scatter_place(scatter)} scatter {number(scatter.times, 2)} times as much as"
-        f" stated for the others {_significance(scatter)}; look for what was different there, or"
-        " state their uncertainty in a column u"
+        " stated for the others"
+        f" {_significance(scatter)}; look for what was different there, or state their"
+        " uncertainty in a column u"
     )
 
 
@@ -129,19 +132,20 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     leave = f"check or leave out {lines}" if lines else "check or leave out the readings"
     if kind in ("reading", "end"):
         return f"{reading_name(design, subject)} read {_sizes(suspect, 'too high')}", leave
-    if kind == "length":
-        return f"{name(given, k)} read {size} too {long}", leave
-    if kind == "prior":
-        return f"{name(given, k)} stated {size} too {high}", "check it in the experiment file"
-    if kind == "coordinate":
-        return f"{name(given, k)} certified {size} too {high}", "check the certificate"
     if kind == "distance" and len(_significant(suspect)) > 1:
         common = common_ball(design, given.subject[suspect.columns])
         told = f"certified distances of ball {design.ball_label(common)}: {_from(common, suspect)}"
         return told, "check the certificate"
-    if kind in ("distance", "length value"):
-        what = length_name(design, subject, False) if kind == "length value" else name(given, k)
-        return f"{what} certified {size} too {long}", "check the certificate"
+    if kind == "length":
+        return f"{name(given, k)} read {size} too {long}", leave
+    if kind == "length value":
+        told = f"{length_name(design, subject, False)} certified {size} too {long}"
+        return told, "check the certificate"
+    for other in design.observations:
+        if other.word == kind:
+            words = other.words
+            too = words.more if suspect.value > 0 else words.less
+            return f"{name(given, k)} {words.verb} {size} too {too}", words.cure
     if kind == "scale":
         artefact = design.artefacts.names[subject]
         told = f"all that is certified of {artefact} is {size} too {long}"
@@ -189,7 +193,10 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
 
 def _from(ball: int, suspect: Suspect) -> str:
     """Sizes by which the distances of a ball are wrong, those that are significant."""
-    given, ends = suspect.patterns.design.distances, suspect.patterns.design.balls.names
+    given, ends = (
+        suspect.patterns.design.of(CalibratedDistances),
+        suspect.patterns.design.balls.names,
+    )
     parts = []
     for place in _significant(suspect):
         distance, value = (
@@ -255,7 +262,7 @@ def _touched(suspect: Suspect) -> list[int]:
     if kind in ("reading", "end"):
         return [subject]
     if kind == "length":
-        ends = (int(design.lengths.first[subject]), int(design.lengths.second[subject]))
+        ends = (int(design.of(Lengths).first[subject]), int(design.of(Lengths).second[subject]))
         return [i for i in ends if i >= 0]
     if kind in ("ball", "moved"):
         order = position_order(design)[readings.position]

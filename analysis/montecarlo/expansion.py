@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from ballplate.simulator.estimation.observations import OFFSET_STEP, offset_sensitivity
+from ballplate.simulator.design.observations.readings import OFFSET_STEP, offset_sensitivity
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from numpy.typing import NDArray
 

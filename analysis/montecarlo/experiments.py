@@ -18,9 +18,9 @@ from ballplate.montecarlo.reference import (
 )
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.design.observations import Priors
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.joined import JoinedModel
@@ -72,6 +72,7 @@ class Trials:
 def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
     """The design, and the artefacts as drawn on the true machine."""
     design = lay_out(experiment)
+    lower, upper = design.machine.volume.corners
     on_truth, state = on_true_machine(
         design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
@@ -149,11 +150,8 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     design = shared.design
     # Neither model need contain the other: what the true one's functions add is the rank of both
     # together.
-    both = replace(
-        design,
-        model=JoinedModel(design.model, shared.truth.model),
-        priors=_widened(design, shared.truth),
-    )
+    joined = replace(design, model=JoinedModel(design.model, shared.truth.model))
+    both = joined.observed(_widened(design, shared.truth))
     more = both.parameter_count - linearise(both).deficiency - design.parameter_count
     if more == 0:
         return Optimism(power, None)
@@ -162,7 +160,7 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
 
 def _widened(design: Design, truth: Truth) -> Priors:
     """The design's priors for a model that has the true one's parameters besides."""
-    by_model = design.priors.by_model
+    by_model = design.of(Priors).by_model
     return replace(
-        design.priors, by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters))))
+        design.of(Priors), by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters))))
     )

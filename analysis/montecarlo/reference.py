@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design, Rows, State
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.covariance import Spectrum
 from ballplate.simulator.estimation.elimination import Factor
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.observations import prior_rows, reading_blocks, reading_weights
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.readings.generate import scale_readings, true_lengths, true_priors
+from ballplate.simulator.readings.generate import scale_readings
 
 from .expansion import Direct, LocalModel, expand
 
@@ -74,8 +75,8 @@ class Reference:
     of each. `ends` are the model at the first and the second ends of the length standards' lengths,
     so far as they are read, with `end_noise` (d, ends) and `end_difference` (m, d), their
     difference at the reference; `is_expanded` tells that models are expanded about readings,
-    because that is faithful. `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of
-    priors about the truth. `start` is the estimate from readings without noise.
+    because that is faithful. `rows` are those of each kind of observations about the truth. `start`
+    is the estimate from readings without noise.
     """
 
     design: Design
@@ -89,8 +90,7 @@ class Reference:
     end_noise: tuple[Array, Array]
     end_difference: Array
     is_expanded: bool
-    prior_residual: Array
-    prior_derivative: Array
+    rows: tuple[Rows, ...]
     exact: Array
 
     @property
@@ -114,7 +114,7 @@ class Reference:
 
     @property
     def degrees_of_freedom(self) -> int:
-        return self.design.observations - self.design.parameter_count
+        return self.design.observation_count - self.design.parameter_count
 
 
 # In one piece: everything that replicates share is made at one reference, each part from those
@@ -141,10 +141,9 @@ def reference(design: Design, truth: Truth) -> Reference:
     exact = scale_readings(
         truth.model, turned + truth.state.origins[readings.position], truth.state.a, p
     )
-    observed = replace(
-        observed,
-        priors=true_priors(observed, truth.model, truth.state),
-        lengths=replace(observed.lengths, value=true_lengths(observed, truth.state)),
+    true = [one.true_values(observed, truth.state, truth.model) for one in observed.observations]
+    observed = observed.observed(
+        *(one.given(value=value) for one, value in zip(observed.observations, true, strict=True))
     )
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
     if solution.status != "converged":
@@ -178,7 +177,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         )
         at += len(chosen)
     order = np.concatenate([np.arange(0), *_groups(observed)])
-    given = observed.lengths
+    given = observed.of(Lengths)
     read = ~given.to_pivot
     both = given.first, given.second[read]
     ends = (
@@ -209,7 +208,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         (end_noise[0], end_noise[1]),
         difference,
         is_expanded,
-        *prior_rows(observed, solution.factor.layout, start),
+        tuple(one.rows(observed, start, exact) for one in observed.observations),
         exact,
     )
 
@@ -218,22 +217,15 @@ def _observed(design: Design) -> Design:
     """The design with a row for each repeat, but for length standards, whose lengths point to their
     readings.
     """
-    lengths, readings = design.lengths, design.readings
+    readings = design.readings
     times = readings.repeats.copy()
     times[np.setdiff1d(np.arange(len(readings)), design.plate_readings)] = 1
     chosen = np.repeat(np.arange(len(readings)), times)
     first = np.cumsum(times) - times
     repeats = np.where(times == readings.repeats, 1, readings.repeats)[chosen]
     single = replace(readings.select(chosen), repeats=repeats)
-    return replace(
-        design,
-        readings=single,
-        lengths=replace(
-            lengths,
-            first=first[lengths.first],
-            second=np.where(lengths.to_pivot, -1, first[lengths.second]),
-        ),
-    )
+    moved = (one.reread(design, first) for one in design.observations)
+    return replace(design, readings=single).observed(*moved)
 
 
 def _groups(design: Design) -> list[Integers]:

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.design.arrays import Replicates
+from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.elimination import Factor
-from ballplate.simulator.estimation.observations import length_values
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.substitution import solve_balls, solve_kept, solve_shared
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -69,15 +69,12 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Draw:
-    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the certificates'
-    distances, co-ordinates and lengths (b, m), of priors (b, m), and of the readings of the
-    lengths' two ends (b, d, m)."""
+    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the values of each kind
+    of observations `errors` (b, m), and of the readings of the lengths' two ends (b, d, m).
+    """
 
     moved: Single
-    distances: Array
-    coordinates: Array
-    lengths: Array
-    priors: Array
+    errors: tuple[Array, ...]
     ends: tuple[Array, Array]
 
 
@@ -89,27 +86,15 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     moved = generator.standard_normal((BATCH, *shared.noise.shape), np.float32)
     moved *= shared.noise.astype(np.float32)
 
-    def certificate(uncertainty: Array) -> Array:
-        return uncertainty * generator.standard_normal((BATCH, len(uncertainty)))
-
-    distances = certificate(design.distances.uncertainty)
-    coordinates = certificate(design.coordinates.uncertainty)
-    lengths = _drawn_lengths(design.lengths, generator)
-    priors = certificate(design.priors.uncertainty)
-    return Draw(moved, distances, coordinates, lengths, priors, _drawn_ends(shared, generator))
-
-
-def _drawn_lengths(given: Lengths, generator: np.random.Generator) -> Array:
-    """Errors (b, m) of the certificates of lengths, one for each certificate."""
-    drawn = generator.standard_normal((BATCH, int(given.certificate.max(initial=-1)) + 1))
-    return np.asarray(given.uncertainty * drawn[:, given.certificate])
+    errors = tuple(one.errors(generator, BATCH) for one in design.observations)
+    return Draw(moved, errors, _drawn_ends(shared, generator))
 
 
 def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
     """Noise of the readings that lengths are formed of; a reading that serves several is drawn
     once.
     """
-    given = shared.design.lengths
+    given = shared.design.of(Lengths)
     read, place = np.unique(
         np.concatenate([given.first, given.second[~given.to_pivot]]), return_inverse=True
     )
@@ -206,15 +191,16 @@ def _gradient(
             _add_by_offset(by_shared, layout, group.probe, group.model.gather_offsets(step, pull))
     position, parameter = np.nonzero(layout.pose_columns >= 0)
     by_shared[:, layout.pose_columns[position, parameter]] += by_pose[:, position, parameter]
-    _certificates(shared, drawn, at.balls, squares, by_ball)
-    _lengths(shared, drawn, at, is_start, squares, by_shared)
-    if drawn.priors.shape[1]:
-        weight = 1.0 / shared.design.priors.uncertainty
-        residual = (
-            shared.prior_residual + at.shared @ shared.prior_derivative.T - weight * drawn.priors
-        )
-        squares += (residual**2).sum(axis=1)
-        by_shared += residual @ shared.prior_derivative
+    among = Replicates(
+        shared.start, shared.truth.state, at.balls, at.shared, squares, by_ball, by_shared
+    )
+    for one, rows, errors in zip(
+        shared.design.observations, shared.rows, drawn.errors, strict=True
+    ):
+        if not isinstance(one, Lengths):
+            one.add_misfit(rows, errors, among)
+        elif shared.ends is not None:
+            _lengths(shared, drawn.ends, errors, at, is_start, squares, by_shared)
     return squares, by_ball, by_shared
 
 
@@ -300,43 +286,6 @@ def _bracket(turn: Array, before: Array) -> Array:
     return np.cross(turn, before)
 
 
-def _certificates(
-    shared: Reference, drawn: Draw, balls: Array, squares: Array, by_ball: Array
-) -> None:
-    """Add the part of calibrated distances and co-ordinates to S^2 and its gradient."""
-    design, start = shared.design, shared.start
-    true = shared.truth.state.balls
-    given = design.distances
-    if len(given):
-        counts = np.arange(design.dimension)[:, None] < given.dimensions
-        base = (start.balls[given.first] - start.balls[given.second]).T * counts
-        exact = (true[given.first] - true[given.second]).T * counts
-        difference = base + (balls[:, :, given.first] - balls[:, :, given.second]) * counts
-        length = np.sqrt((difference**2).sum(axis=1))
-        residual = (length - np.sqrt((exact**2).sum(axis=0)) - drawn.distances) / given.uncertainty
-        squares += (residual**2).sum(axis=1)
-        force = (residual / (given.uncertainty * length))[:, None] * difference
-        # A ball may stand in several pairs.
-        of_pair = force.transpose(2, 0, 1)
-        pulled = np.zeros((len(start.balls), *of_pair.shape[1:]))
-        np.add.at(pulled, given.first, of_pair)
-        np.subtract.at(pulled, given.second, of_pair)
-        by_ball += pulled.transpose(1, 2, 0)
-    known = design.coordinates
-    if len(known):
-        offset = start.balls[known.ball, known.axis] - true[known.ball, known.axis]
-        residual = (
-            offset + balls[:, known.axis, known.ball] - drawn.coordinates
-        ) / known.uncertainty
-        squares += (residual**2).sum(axis=1)
-        # A co-ordinate may be certified twice.
-        certified = np.zeros((start.balls.size, BATCH))
-        np.add.at(
-            certified, design.dimension * known.ball + known.axis, (residual / known.uncertainty).T
-        )
-        by_ball += certified.reshape(*start.balls.shape, BATCH).transpose(2, 1, 0)
-
-
 def _add_by_offset(
     by_shared: Array, layout: SharedLayout, probe: Integers, gradient: Array
 ) -> None:
@@ -353,20 +302,25 @@ def _offsets(at: Deviations, probe: Integers | None) -> Array | None:
 
 
 def _lengths(
-    shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squares: Array, by_shared: Array
+    shared: Reference,
+    ends: tuple[Array, Array],
+    errors: Array,
+    at: Deviations,
+    is_start: bool,
+    squares: Array,
+    by_shared: Array,
 ) -> None:
-    """Add the part of length standards read in the volume."""
+    """Add the part of length standards read in the volume, which the readings' noise is in."""
     step = None if is_start else at.a
-    given = shared.design.lengths
-    if shared.ends is None:
-        return
+    given = shared.design.of(Lengths)
+    assert shared.ends is not None
     first, second = shared.ends
-    design, ends = shared.design, drawn.ends
+    design = shared.design
     layout, pivoted = shared.factor.layout, given.to_pivot
     read = slice(None) if not pivoted.any() else np.flatnonzero(~pivoted)
     pivot = design.readings.position[given.first[pivoted]]
     at_ends = given.first, given.second[read]
-    probes = [design.readings.probe[k] if design.probes.free.any() else None for k in at_ends]
+    probes = [None if not design.probes.free.any() else design.readings.probe[k] for k in at_ends]
     offsets = [_offsets(at, probe) for probe in probes]
     difference = shared.end_difference.T + (ends[0] + first.change(ends[0], step, offsets[0]))
     difference[:, :, read] -= ends[1] + second.change(ends[1], step, offsets[1])
@@ -374,8 +328,8 @@ def _lengths(
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected, given.direction.T, unit)
     length = (unit * difference).sum(axis=1)
-    white = design.length_whitening
-    expected = length_values(design, shared.start) + drawn.lengths
+    white = design.once(length_whitening)
+    expected = length_values(design, shared.start) + errors
     is_free = given.free is not None and len(design.unknown_lengths.names) > 0
     if given.free is not None and is_free:
         changed = at.shared[:, layout.lengths][:, given.free]

@@ -12,6 +12,7 @@ import numpy as np
 from ballplate.montecarlo.reference import Reference
 from ballplate.montecarlo.replicates import Deviations
 from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
     BallPlaces,
     Coordinates,
@@ -23,7 +24,6 @@ from ballplate.simulator.estimation.functions import (
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.design.arrays import Readings
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, Message

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
+from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Calibration, Experiment, Position
+from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
@@ -78,7 +80,7 @@ def _same_place(one: Position, other: object) -> bool:
 def _equal(one: Calibration, other: Calibration) -> bool:
     return type(one) is type(other) and all(
         np.array_equal(getattr(one, field.name), getattr(other, field.name))
-        for field in fields(one)
+        for field in fields(cast(Any, one))
     )
 
 

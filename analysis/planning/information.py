@@ -19,20 +19,17 @@ import numpy as np
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
+from ballplate.simulator.design.observations.readings import reading_weights, rotation_sensitivity
 from ballplate.simulator.estimation.covariance import EXACT
 from ballplate.simulator.estimation.elimination import ALIKE
 from ballplate.simulator.estimation.graded import Collected, Triangle
 from ballplate.simulator.estimation.graded import triangle as triangular
-from ballplate.simulator.estimation.observations import (
-    length_deviations,
-    reading_weights,
-    rotation_sensitivity,
-)
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 
-from .rows import STEP, PoolDesign, Rows, always, calibration_rows, draw, position_rows
+from .rows import STEP, CandidateRows, PoolDesign, always, calibration_rows, draw, position_rows
 
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
@@ -195,7 +192,7 @@ def pool_information(
         raise refused(experiment.source, text, "pool")
     drawn = draw(experiment, positions)
     some = replace(experiment, positions=tuple(positions[:1]))
-    items: dict[int, list[Rows]] = {
+    items: dict[int, list[CandidateRows]] = {
         k: calibration_rows(drawn, some, candidate.item, candidate.name)
         for k, candidate in enumerate(candidates)
         if not isinstance(candidate.item, Position)
@@ -278,19 +275,15 @@ def pool_information(
     )
 
 
-def _in_amounts(rows: Rows, balls: Array) -> Array:
+def _in_amounts(rows: CandidateRows, balls: Array) -> Array:
     """Rows (m, y + c) by amounts of ball combinations and shared columns, the pose projected
     out.
     """
     y = balls.shape[2]
-    found = np.zeros((len(rows.ball), y + rows.by_shared.shape[1]))
+    found = np.zeros((len(rows), y + rows.by_shared.shape[1]))
     found[:, y:] = rows.by_shared
-    for sign, ball in ((1.0, rows.ball), (-1.0, rows.other)):
-        of_ball = np.flatnonzero(ball >= 0)
-        if len(of_ball):
-            found[of_ball, :y] += sign * np.einsum(
-                "md,mdy->my", rows.by_ball[of_ball], balls[ball[of_ball]]
-            )
+    for ball, slope in zip(rows.balls.T, rows.by_ball.swapaxes(0, 1), strict=True):
+        found[:, :y] += np.einsum("md,mdy->my", slope, balls[ball])
     if rows.by_pose.shape[1]:
         along = _range(rows.by_pose)
         found -= along @ (along.T @ found)
@@ -304,18 +297,19 @@ def _position_weight(drawn: PoolDesign) -> float:
     )
     of_lengths = (
         1.0 / length_deviations(drawn.design, drawn.state, None)[1]
-        if len(drawn.design.lengths)
+        if len(drawn.design.of(Lengths))
         else of_readings
     )
     return STEP * max(float(of_readings.max(initial=0.0)), float(of_lengths.max(initial=0.0)))
 
 
-def _sizes(rows: Rows) -> Array:
+def _sizes(rows: CandidateRows) -> Array:
     """Lengths (m,) of rows."""
-    return np.sqrt((rows.by_ball**2).sum(axis=1) + (rows.by_shared**2).sum(axis=1))
+    of_ball = (rows.by_ball**2).sum(axis=2).max(axis=1, initial=0.0)
+    return np.sqrt(of_ball + (rows.by_shared**2).sum(axis=1))
 
 
-def _differs(rows: Rows, weight: float) -> bool:
+def _differs(rows: CandidateRows, weight: float) -> bool:
     """Whether any row's weight differs from `weight` by more than plain orthogonal transformations
     keep apart.
     """
@@ -323,11 +317,12 @@ def _differs(rows: Rows, weight: float) -> bool:
     return bool((sizes > ALIKE * weight).any() or (ALIKE * sizes[sizes > 0.0] < weight).any())
 
 
-def _weighted(rows: Rows, least: float, most: float) -> Rows:
+def _weighted(rows: CandidateRows, least: float, most: float) -> CandidateRows:
     """Rows without a pose with weights between `least` and `most`."""
     sizes = _sizes(rows)[:, None]
     factor = np.clip(sizes, least, most) / np.where(sizes > 0.0, sizes, 1.0)
-    return replace(rows, by_ball=factor * rows.by_ball, by_shared=factor * rows.by_shared)
+    by_ball = factor[:, :, None] * rows.by_ball
+    return replace(rows, by_ball=by_ball, by_shared=factor * rows.by_shared)
 
 
 def _range(columns: Array) -> Array:
@@ -358,7 +353,7 @@ def _motions(design: Design) -> Array:
     return np.concatenate([np.zeros((n, d, 0)), *parts], axis=2)
 
 
-def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) -> Array:
+def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_balls: bool) -> Array:
     """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything
     that is shared.
 
@@ -371,12 +366,12 @@ def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) 
     every, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
     found = _Span(
         _motions(drawn.design).reshape(n * d, -1),
-        keeps=any(_is_framed(rows) for rows in certificates),
+        keeps=any(rows.frame for rows in certificates),
     )
     if all_balls:
         found.add(every)
     for rows in certificates:
-        found.add(_by_balls(rows, np.eye(len(rows.ball)), n) if len(rows.ball) <= n * d else every)
+        found.add(_by_balls(rows, np.eye(len(rows)), n) if len(rows) <= n * d else every)
     kinds: dict[bytes, Array] = {}
     for rows in position_rows(drawn):
         if found.rank >= most:
@@ -396,34 +391,23 @@ def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) 
     return found.vectors.reshape(n, d, -1)
 
 
-def _is_framed(rows: Rows) -> bool:
-    """Whether rows are of calibrated co-ordinates."""
-    return len(rows.ball) > 0 and bool((rows.ball >= 0).any() and (rows.other < 0).any())
-
-
-def _by_balls(rows: Rows, columns: Array, n: int) -> Array:
+def _by_balls(rows: CandidateRows, columns: Array, n: int) -> Array:
     """Products (n * d, columns) of rows' derivatives by balls with other columns (m, columns)."""
-    d = rows.by_ball.shape[1]
+    d = rows.by_ball.shape[2]
     total = np.zeros((n, d, columns.shape[1]))
-    for sign, ball in ((1.0, rows.ball), (-1.0, rows.other)):
-        chosen = np.flatnonzero(ball >= 0)
-        np.add.at(
-            total,
-            ball[chosen],
-            sign * rows.by_ball[chosen][:, :, None] * columns[chosen][:, None, :],
-        )
+    for ball, slope in zip(rows.balls.T, rows.by_ball.swapaxes(0, 1), strict=True):
+        np.add.at(total, ball, slope[:, :, None] * columns[:, None, :])
     return total.reshape(n * d, -1)
 
 
-def _kind(rows: Rows, n: int) -> Array:
+def _kind(rows: CandidateRows, n: int) -> Array:
     """Information (n, d, d) of readings on each ball, were all else known, the largest entry being
     1.
     """
-    d = rows.by_ball.shape[1]
+    d = rows.by_ball.shape[2]
     total = np.zeros((n, d, d))
-    chosen = np.flatnonzero(rows.ball >= 0)
-    some = rows.by_ball[chosen]
-    np.add.at(total, rows.ball[chosen], some[:, :, None] * some[:, None, :])
+    for ball, slope in zip(rows.balls.T, rows.by_ball.swapaxes(0, 1), strict=True):
+        np.add.at(total, ball, slope[:, :, None] * slope[:, None, :])
     return total / (np.abs(total).max(initial=0.0) or 1.0)
 
 
@@ -572,14 +556,17 @@ def _unplaced(
 
 
 def _frames(
-    drawn: PoolDesign, known: list[Rows], items: dict[int, list[Rows]], basis: InformationBasis
+    drawn: PoolDesign,
+    known: list[CandidateRows],
+    items: dict[int, list[CandidateRows]],
+    basis: InformationBasis,
 ) -> Frames:
     """How calibrated co-ordinates fix the frames of plates."""
     motions = _motions(drawn.design)
 
-    def fixed(rows: list[Rows]) -> Array:
-        framed = [r for r in rows if _is_framed(r)]
-        parts = [np.einsum("md,mdk->mk", r.by_ball, motions[r.ball]) for r in framed]
+    def fixed(rows: list[CandidateRows]) -> Array:
+        framed = [r for r in rows if r.frame]
+        parts = [np.einsum("md,mdk->mk", r.by_ball[:, 0], motions[r.balls[:, 0]]) for r in framed]
         return np.concatenate([np.zeros((0, motions.shape[2])), *parts])
 
     told = {k: found for k, rows in items.items() if len(found := fixed(rows))}

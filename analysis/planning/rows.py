@@ -13,22 +13,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.observations import (
-    coordinate_rows,
-    distance_rows,
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.lengths import (
+    Lengths,
     length_derivative,
-    prior_rows,
-    reading_blocks,
+    length_whitening,
 )
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
-from ballplate.simulator.experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    Experiment,
-    Position,
-    RadiusCalibration,
-)
+from ballplate.simulator.design.observations.priors import no_priors
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -40,19 +35,22 @@ AT_ONCE = 10_000
 
 
 @dataclass(frozen=True)
-class Rows:
+class CandidateRows:
     """Whitened rows of one candidate, columns in micrometres.
 
-    `by_ball` (m, d) is the derivative by the ball `ball` (m,), -1 where there is none, and its
-    negative that by the ball `other` (m,) of a distance; `by_shared` (m, s) that by shared
-    parameters; `by_pose` (m, q) that by the pose.
+    `by_ball` (m, k, d) are the derivatives by the `balls` (m, k) of each, none where k is 0;
+    `by_shared` (m, s) that by shared parameters; `by_pose` (m, q) that by the pose. With `frame`
+    they tell where balls are in the frame of their plate.
     """
 
-    ball: Integers
-    other: Integers
+    balls: Integers
     by_ball: Array
     by_shared: Array
     by_pose: Array
+    frame: bool = False
+
+    def __len__(self) -> int:
+        return len(self.by_shared)
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class PoolDesign:
 
     @property
     def certificates(self) -> int:
-        return int(self.design.lengths.certificate.max(initial=-1)) + 1
+        return int(self.design.of(Lengths).certificate.max(initial=-1)) + 1
 
     @property
     def shared(self) -> int:
@@ -107,7 +105,7 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     return PoolDesign(design, shared_layout(design), nominal_state(design))
 
 
-def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
+def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
     """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
@@ -135,28 +133,27 @@ def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
                 yield lengths[k]
                 continue
             own = slice(end[k] - count[k] - start, end[k] - start)
-            ball = np.repeat(readings.ball[own], d)
-            yield Rows(
-                ball,
-                np.full(len(ball), -1),
-                STEP * blocks.by_ball[own].reshape(len(ball), d),
-                by_shared[own].reshape(len(ball), drawn.shared),
-                blocks.by_pose[own].reshape(len(ball), blocks.by_pose.shape[2]),
+            balls = np.repeat(readings.ball[own], d)[:, None]
+            yield CandidateRows(
+                balls,
+                STEP * blocks.by_ball[own].reshape(len(balls), 1, d),
+                by_shared[own].reshape(len(balls), drawn.shared),
+                blocks.by_pose[own].reshape(len(balls), blocks.by_pose.shape[2]),
             )
         first = last
 
 
-def _length_rows(drawn: PoolDesign) -> dict[int, Rows]:
+def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
     """Rows of the lengths of standards and gauges, by position."""
     design, layout = drawn.design, drawn.layout
-    if not len(design.lengths):
+    if not len(design.of(Lengths)):
         return {}
-    by_position = design.length_whitening.by_position(
-        design.lengths, length_derivative(design, layout, drawn.state, None)
+    by_position = design.once(length_whitening).by_position(
+        design.of(Lengths), length_derivative(design, drawn.state, None)
     )
     derivative = by_position.rows
     shared = np.concatenate([derivative[:, drawn.own], by_position.by_error], axis=1) * drawn.scale
-    place = design.readings.position[design.lengths.first[by_position.length]]
+    place = design.readings.position[design.of(Lengths).first[by_position.length]]
     found = {}
     for k in np.unique(place).tolist():
         chosen, columns = np.flatnonzero(place == k), layout.pose_columns[k]
@@ -167,36 +164,24 @@ def _length_rows(drawn: PoolDesign) -> dict[int, Rows]:
     return found
 
 
-def _of_shared(drawn: PoolDesign, shared: Array) -> Rows:
+def _of_shared(drawn: PoolDesign, shared: Array) -> CandidateRows:
     """Rows (m, s) that no ball takes part in."""
-    none = np.full(len(shared), -1)
-    return Rows(
-        none,
-        none,
-        np.zeros((len(shared), drawn.design.dimension)),
-        shared,
-        np.zeros((len(shared), 0)),
-    )
+    m = len(shared)
+    none = np.zeros((m, 0, drawn.design.dimension))
+    return CandidateRows(np.zeros((m, 0), np.int64), none, shared, np.zeros((m, 0)))
 
 
-def always(drawn: PoolDesign) -> list[Rows]:
+def always(drawn: PoolDesign) -> list[CandidateRows]:
     """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
     certificates.
     """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
-    found = [*_of_calibration(drawn, drawn.design), _of_shared(drawn, unit)]
-    if len(drawn.design.priors):
-        _, derivative = prior_rows(drawn.design, drawn.layout, drawn.state)
-        own = derivative[:, drawn.own]
-        shared = np.zeros((len(own), drawn.shared))
-        shared[:, : own.shape[1]] = own
-        found.append(_of_shared(drawn, shared * drawn.scale))
-    return found
+    return [*_of_observations(drawn, drawn.design), _of_shared(drawn, unit)]
 
 
 def calibration_rows(
     drawn: PoolDesign, experiment: Experiment, item: Calibration, name: str
-) -> list[Rows]:
+) -> list[CandidateRows]:
     """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
     `experiment` has some position, whichever.
@@ -204,36 +189,43 @@ def calibration_rows(
     :raises ExperimentError: it is of a length standard that has a certificate already, or more than
         one length.
     """
-    if experiment.artefacts[item.artefact].role == "plate" and not isinstance(
-        item, RadiusCalibration
-    ):
-        return _of_calibration(drawn, lay_out(replace(experiment, calibration=(item,), priors=())))
+    if experiment.artefacts[item.artefact].role == "plate":
+        design = lay_out(replace(experiment, calibration=(item,), priors=()))
+        return _of_observations(drawn, design.observed(no_priors()))
     named = drawn.design.unknown_lengths.of(drawn.design.artefacts.names.index(item.artefact))
-    if len(named) != 1 or isinstance(item, CoordinateCalibration):
+    if len(named) != 1:
         text = (
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
             " its certificates"
         )
         raise refused(experiment.source, text, "pool.calibration")
-    if isinstance(item, RadiusCalibration):
-        uncertainty = item.standard_uncertainty
-    else:
-        uncertainty = float(item.standard_uncertainties[0])
+    stated = next(item.certified_values(experiment.layouts[item.artefact]))
     row = np.zeros((1, drawn.shared))
-    row[0, drawn.layout.lengths.start - drawn.own.start + named[0]] = 1.0 / uncertainty
+    row[0, drawn.layout.lengths.start - drawn.own.start + named[0]] = (
+        1.0 / stated.standard_uncertainty
+    )
     return [_of_shared(drawn, row * drawn.scale)]
 
 
-def _of_calibration(drawn: PoolDesign, design: Design) -> list[Rows]:
-    """Rows of calibrated distances and co-ordinates of a design with the same balls."""
-    given, distances = distance_rows(design, drawn.state), design.distances
-    coordinates = coordinate_rows(design, drawn.state)
-
-    def rows(ball: Integers, other: Integers, derivative: Array) -> Rows:
-        m = len(ball)
-        return Rows(ball, other, STEP * derivative, np.zeros((m, drawn.shared)), np.zeros((m, 0)))
-
-    return [
-        rows(distances.first, distances.second, given.derivative),
-        rows(design.coordinates.ball, np.full(len(design.coordinates), -1), coordinates.derivative),
-    ]
+def _of_observations(drawn: PoolDesign, design: Design) -> list[CandidateRows]:
+    """Rows of all observations that are not formed of readings, of a design with the same balls and
+    parameters.
+    """
+    found = []
+    for one in design.observations:
+        if len(one) and not isinstance(one, Lengths):
+            rows = one.rows(design, drawn.state, None)
+            by_shared = np.zeros((len(one), drawn.shared))
+            if rows.by_shared is not None:
+                own = rows.by_shared[:, design.once(shared_layout).model.start :]
+                by_shared[:, : own.shape[1]] = own
+            found.append(
+                CandidateRows(
+                    one.balls,
+                    STEP * rows.by_ball,
+                    by_shared * drawn.scale,
+                    np.zeros((len(one), 0)),
+                    len(one.fixing()[0]) > 0,
+                )
+            )
+    return found

@@ -13,7 +13,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array
 
@@ -24,13 +25,13 @@ AXES = "xyz"
 
 def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
     """What bars and gauges lack, given what changes of the shared parameters (s, k) are open."""
-    if not len(design.lengths) or not open_.shape[1] or not len(design.evaluation.points):
+    if not len(design.of(Lengths)) or not open_.shape[1] or not len(design.evaluation.points):
         return ()
     strains = _open_strains(design, layout, open_)
     if not strains.shape[1]:
         return ()
     found = []
-    unknown = design.lengths.free is not None and bool((design.lengths.free >= 0).all())
+    unknown = not design.of(Lengths).is_known.any()
     overall = _unit_strain(np.eye(design.dimension))
     is_free = unknown and _is_among(overall, strains)
     if is_free:
@@ -87,7 +88,7 @@ def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
     `left` is what remains of the open strains without the overall scale of a machine whose lengths
     are all unknown.
     """
-    given, d = design.lengths, design.dimension
+    given, d = design.of(Lengths), design.dimension
     position = design.readings.position[given.first]
     directions = given.direction.copy()
     for k in np.unique(position[given.to_pivot]):

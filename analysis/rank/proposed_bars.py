@@ -9,6 +9,7 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.directions import directions
 from ballplate.simulator.machines.protocol import Array
 
@@ -36,7 +37,7 @@ def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
     Every proposal is verified by the rank of what all lengths together tell of strains, pivots and
     unknown lengths.
     """
-    given = design.lengths
+    given = design.of(Lengths)
     gauge_only = bool(given.to_pivot.all())
     if gauge_only and design.dimension != 3:
         return ""
@@ -59,7 +60,7 @@ def _rows(design: Design, u: Array, like: np.ndarray) -> Array:
     """Derivatives (m, products + pivots + lengths) of lengths in directions u (m, d) that are
     otherwise as others.
     """
-    given, d = design.lengths, design.dimension
+    given, d = design.of(Lengths), design.dimension
     position = design.readings.position[given.first[like]]
     pivots = np.zeros((len(u), len(design.positions.names), d))
     pivoted = np.flatnonzero(given.to_pivot[like])

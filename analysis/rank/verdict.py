@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines
@@ -172,7 +172,7 @@ def verdict(
     open_ = np.concatenate([at.shared_null, weak], axis=1)
     return Verdict(
         design.parameter_count,
-        design.observations,
+        design.observation_count,
         found.deficiency,
         expected,
         found.values,

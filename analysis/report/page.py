@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing

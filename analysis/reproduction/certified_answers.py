@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.reading_files import read_readings
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.readings import rotation_sensitivity
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.observations import rotation_sensitivity
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
 from ballplate.simulator.machines.protocol import Array

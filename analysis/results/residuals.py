@@ -6,14 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
+from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.estimation.observations import (
-    length_deviations,
-    reading_blocks,
-    reading_weights,
-)
 from ballplate.simulator.machines.protocol import Array
 
 # Residuals that a fit names.
@@ -60,10 +56,10 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
     for place in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
         i, axis = divmod(place, design.dimension)
         k = place - residual.size
-        reading = int(chosen[i] if k < 0 else design.lengths.first[k])
+        reading = int(chosen[i] if k < 0 else design.of(Lengths).first[k])
         ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
         if k >= 0:
-            words, second = "radius", design.lengths.second[k]
+            words, second = "radius", design.of(Lengths).second[k]
             if second >= 0:
                 other = design.balls.names[design.readings.ball[second]]
                 ball, words = f"{ball}-{other}", "length"

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 
@@ -110,7 +110,7 @@ def fit(
         return Fit(*names, observed, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    freedom = design.observations - design.parameter_count + judged.deficiency
+    freedom = design.observation_count - design.parameter_count + judged.deficiency
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
     untested = too_many_entries(design)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 

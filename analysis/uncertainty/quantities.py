@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
     BallPlaces,
     Coordinates,
@@ -20,7 +21,6 @@ from ballplate.simulator.estimation.functions import (
     MeasuredPoints,
     Parameters,
 )
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Unit
 
 

@@ -13,9 +13,9 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing

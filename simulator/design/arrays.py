@@ -4,31 +4,63 @@ units.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..experiment.model import Machine
-from ..machines.protocol import Array, ErrorModel, Integers
-from .joint_lengths import LengthWhitening, length_whitening
+from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
+    Machine,
     Positions,
     Probes,
     Tasks,
     UnknownLengths,
 )
-from .observations import (
-    CalibratedCoordinates,
-    CalibratedDistances,
-    Lengths,
-    Priors,
-    Readings,
-    no_priors,
-)
+
+Made = TypeVar("Made")
+Kind = TypeVar("Kind", bound="Observations")
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Which ball is read in which position with which probe, and how often; all arrays (m,).
+
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None
+    where all have the machine's repeatability.
+    """
+
+    ball: Integers
+    position: Integers
+    probe: Integers
+    repeats: Integers
+    uncertainty: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.ball)
+
+    def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
+        """The readings at the given indices."""
+        uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
+        return Readings(
+            self.ball[chosen],
+            self.position[chosen],
+            self.probe[chosen],
+            self.repeats[chosen],
+            uncertainty,
+        )
+
+    def expanded(self) -> Readings:
+        """One row for each repeat."""
+        chosen = np.repeat(np.arange(len(self)), self.repeats)
+        return replace(self.select(chosen), repeats=np.ones(len(chosen), np.int64))
 
 
 @dataclass(frozen=True)
@@ -37,7 +69,8 @@ class Design:
 
     `model` is the error model whose parameters are estimated. Balls and positions of length
     standards stand in the same lists as those of plates: balls and poses of plates are parameters,
-    and the pivots of Bryan gauges, the origins of their positions.
+    and the pivots of Bryan gauges, the origins of their positions. `observations` are all others
+    than readings of plates, one of each kind, in the order of their rows.
     """
 
     model: ErrorModel
@@ -47,13 +80,10 @@ class Design:
     balls: Balls
     positions: Positions
     readings: Readings
-    distances: CalibratedDistances
-    coordinates: CalibratedCoordinates
-    lengths: Lengths
+    observations: tuple[Observations, ...]
     unknown_lengths: UnknownLengths
     evaluation: EvaluationPoints
     tasks: Tasks
-    priors: Priors = field(default_factory=no_priors)
 
     @property
     def dimension(self) -> int:
@@ -85,25 +115,41 @@ class Design:
         return np.sort(np.concatenate([self.plate_positions, self.gauge_positions]))
 
     @cached_property
-    def length_whitening(self) -> LengthWhitening:
-        """What makes uncorrelated observations of unit variance of the lengths of standards."""
-        given, readings = self.lengths, self.readings
-        noise = reading_uncertainties(self, readings) / np.sqrt(readings.repeats)[:, None]
-        standard = self.balls.artefact[readings.ball[given.first]]
-        count = len(self.probes.names)
-        place = readings.position[given.first] * count + readings.probe[given.first]
-        return length_whitening(given, noise, standard, place)
+    def _made(self) -> dict[Callable[[Design], Any], Any]:
+        return {}
+
+    def once(self, make: Callable[[Design], Made]) -> Made:
+        """What `make` makes of the design, made when it is asked for first."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return cast(Made, self._made[make])
+
+    def of(self, kind: type[Kind]) -> Kind:
+        """The observations of a kind."""
+        return next(one for one in self.observations if isinstance(one, kind))
+
+    def observed(self, *changed: Observations) -> Design:
+        """The design with other observations of some kinds."""
+        by_kind = {type(one): one for one in changed}
+        return replace(
+            self, observations=tuple(by_kind.get(type(one), one) for one in self.observations)
+        )
+
+    @cached_property
+    def tied_balls(self) -> Integers:
+        """Indices of the balls of plates that observations tie to others."""
+        ends = [one.balls.ravel() for one in self.observations if one.balls.shape[1] > 1]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *ends]))
 
     @property
-    def observations(self) -> int:
+    def observation_count(self) -> int:
         """Number of scalar observations: co-ordinates of all readings of plates, and calibration
         items.
 
         Of lengths that are read together only those count that do not follow from the others.
         """
         count = int(self.readings.repeats[self.plate_readings].sum())
-        calibration = len(self.distances) + len(self.coordinates) + len(self.length_whitening)
-        return self.dimension * count + calibration + len(self.priors)
+        return self.dimension * count + sum(one.count(self) for one in self.observations)
 
     @property
     def parameter_count(self) -> int:
@@ -164,3 +210,152 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
     """True positions (m, d) of the balls that are read, T(y, t) in metres."""
     turned = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
     return np.asarray(turned + state.origins[readings.position])
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Whitened rows (m,) of observations at a state.
+
+    `residual` (m,), `by_shared` (m, s) the derivative by the shared parameters, None where these
+    have no part, and `by_ball` (m, k, d) that by the `balls` (m, k) of the observations.
+    """
+
+    residual: Array
+    by_shared: Array | None
+    by_ball: Array
+
+
+@dataclass(frozen=True)
+class Words:
+    """How a wrong one among observations is told: "certified 3 um too high; check the
+    certificate".
+    """
+
+    verb: str = "certified"
+    more: str = "high"
+    less: str = "low"
+    cure: str = "check the certificate"
+
+
+class Observations(ABC):
+    """All observations (m,) of one kind in a design; a frozen dataclass of arrays.
+
+    `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
+    too long by one ratio where its scale is wrong. `words` tell what is wrong with a wrong one.
+    """
+
+    word: ClassVar[str]
+    scales: ClassVar[bool] = False
+    words: ClassVar[Words] = Words()
+    value: Array
+    uncertainty: Array
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    @property
+    def balls(self) -> Integers:
+        """The balls (rows, k) that each row is about; k is 0 where no ball takes part.
+
+        Rows of one ball are eliminated with it; balls that rows tie together are kept to the end.
+        """
+        return np.zeros((len(self), 0), np.int64)
+
+    @property
+    def along(self) -> Integers:
+        """The axis (m,) that each is along, -1 without one."""
+        return np.full(len(self), -1)
+
+    def count(self, design: Design) -> int:
+        """Number of independent rows."""
+        return len(self)
+
+    @abstractmethod
+    def rows(self, design: Design, state: State, x: Array | None) -> Rows:
+        """Whitened rows at `state`, with scale readings `x` (readings, d) or error-free ones."""
+
+    @abstractmethod
+    def name(self, design: Design, k: int) -> str:
+        """What one of them is, as a metrologist would say it."""
+
+    @abstractmethod
+    def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
+        """Values (m,) where balls, poses and the machine are `truth`, whose error model is
+        `model`.
+        """
+
+    def unit(self, design: Design, k: int) -> Unit:
+        """The unit of a value."""
+        return "m"
+
+    def errors(self, generator: np.random.Generator, count: int) -> Array:
+        """Random errors (count, m) of the values."""
+        return self.uncertainty * generator.standard_normal((count, len(self)))
+
+    def weights(self, design: Design, state: State) -> Array:
+        """How heavy rows are, by the reciprocal of a length; what weighs nothing is left out."""
+        return 1.0 / self.uncertainty
+
+    def alike(self, design: Design, state: State) -> Self:
+        """The same observations with weights of about one each."""
+        return self.given(uncertainty=np.ones(len(self)))
+
+    def given(self, **changed: Array) -> Self:
+        """The same observations with other values or uncertainties (m,)."""
+        return cast(Self, replace(cast(Any, self), **changed))
+
+    def fixing(self) -> tuple[Integers, Integers]:
+        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter."""
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+
+    def started(self, design: Design, x: Array, state: State) -> State:
+        """Starting values with what these observations tell of them."""
+        return state
+
+    def reread(self, design: Design, place: Integers) -> Self:
+        """The same where the design's readings stand at other places (readings,)."""
+        return self
+
+    def add_misfit(self, rows: Rows, errors: Array, at: Replicates) -> None:
+        """Add what these contribute to S^2 of replicates and its gradient, with errors (b, m) of
+        their true values.
+
+        Linear about the `rows` at the start; what is not linear has a method of its own.
+        """
+        if not len(self):
+            return
+        residual = rows.residual - errors / self.uncertainty
+        if rows.by_shared is not None:
+            residual = residual + at.shared @ rows.by_shared.T
+        for ball, slope in zip(self.balls.T, rows.by_ball.swapaxes(0, 1), strict=True):
+            residual = residual + np.einsum("md,bdm->bm", slope, at.balls[:, :, ball])
+        at.squares[:] += (residual**2).sum(axis=1)
+        if rows.by_shared is not None:
+            at.by_shared[:] += residual @ rows.by_shared
+        at.pull(self.balls, residual[:, :, None, None] * rows.by_ball)
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """What b replicates differ by from the estimate `start` of readings without noise, which are of
+    the `truth`.
+
+    `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
+    S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
+    """
+
+    start: State
+    truth: State
+    balls: Array
+    shared: Array
+    squares: Array
+    by_ball: Array
+    by_shared: Array
+
+    def pull(self, balls: Integers, forces: Array) -> None:
+        """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""
+        for ball, force in zip(balls.T, forces.transpose(2, 1, 0, 3), strict=True):
+            # A ball may take part in several.
+            order = np.argsort(ball, kind="stable")
+            pulled, start = np.unique(ball[order], return_index=True)
+            self.by_ball[:, :, pulled] += np.add.reduceat(force[order], start).transpose(1, 2, 0)

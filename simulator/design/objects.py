@@ -14,6 +14,49 @@ from ..machines.protocol import Array, Integers
 
 Flags = NDArray[np.bool_]
 
+# Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
+# round numbers, and artefacts are not set up just as drawn.
+SLIGHTLY = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """The measuring volume: ``lower`` and ``upper`` (d,) in metres."""
+
+    lower: Array
+    upper: Array
+
+    @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The lower and the upper corner, as numbers."""
+        return tuple(self.lower.tolist()), tuple(self.upper.tolist())
+
+    @property
+    def size(self) -> Array:
+        """Lengths (d,) of the sides."""
+        return np.asarray(self.upper - self.lower)
+
+    @property
+    def of_readings(self) -> tuple[Array, Array]:
+        """Limits (d,) of scale readings, a thousandth of the volume outside it."""
+        slightly = SLIGHTLY * self.size
+        return self.lower - slightly, self.upper + slightly
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """The machine. ``repeatability``: (d,) standard uncertainty of a reading per co-ordinate, in
+    metres.
+    """
+
+    volume: Volume
+    repeatability: Array
+
+    @property
+    def dimension(self) -> int:
+        """Number of co-ordinates, 2 or 3."""
+        return len(self.volume.lower)
+
 
 @dataclass(frozen=True)
 class Probes:

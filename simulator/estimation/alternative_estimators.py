@@ -36,10 +36,13 @@ import numpy as np
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, nominal_state, reading_uncertainties
+from ..design.observations.distances import CalibratedDistances
+from ..design.observations.lengths import Lengths
+from ..design.observations.priors import Priors
+from ..design.parameters import shared_layout
 from ..machines.protocol import Array, Integers
 from .covariance import EXACT, MICROMETRE
 from .gauss_newton import GaussNewtonSettings, Iteration, Status
-from .observations import length_rows
 
 # Share of a distance as read below which an estimate is no machine's.
 COLLAPSE_LIMIT = 0.5
@@ -183,7 +186,7 @@ def _points(design: Design, x: Array) -> _Points:
 
 
 def _measured(design: Design, points: _Points, pairs: Integers, across_probes: bool) -> _Measured:
-    given = design.distances
+    given = design.of(CalibratedDistances)
     known = np.stack([given.first, given.second], axis=1)
     ends, of = np.unique(
         np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True
@@ -225,9 +228,12 @@ def _all_rows(
         # Without a known length a machine that shrinks everything to a point fits best of all.
         length = np.full_like(length, np.nan)
     found = [rows(measured, length, by_model)]
-    if len(design.lengths):
-        found.append(length_rows(design, replace(nominal_state(design), a=a), x))
-    priors = design.priors
+    if len(design.of(Lengths)):
+        of_lengths = design.of(Lengths).rows(design, replace(nominal_state(design), a=a), x)
+        assert of_lengths.by_shared is not None
+        by_shared = of_lengths.by_shared[:, design.once(shared_layout).model]
+        found.append((of_lengths.residual, by_shared))
+    priors = design.of(Priors)
     of_model = np.flatnonzero((priors.position < 0) & (priors.probe < 0))
     if len(of_model):
         weight, of_parameters = 1.0 / priors.uncertainty[of_model], priors.by_model[of_model]

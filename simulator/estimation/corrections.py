@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..design.arrays import Design, State
+from ..design.observations.readings import offset_sensitivity
+from ..design.parameters import SharedLayout
 from ..machines.protocol import Array, Integers
-from .observations import offset_sensitivity
-from .parameters import SharedLayout
 
 
 def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:

@@ -13,10 +13,10 @@ import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design
+from ..design.parameters import SharedLayout
 from ..machines.protocol import Array
 from .elimination import Factor
 from .graded import triangle
-from .parameters import SharedLayout
 from .substitution import in_order, solve_balls, solve_kept
 
 # Below this fraction of the largest singular value a direction is undetermined: rounding leaves

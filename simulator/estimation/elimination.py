@@ -5,7 +5,8 @@ one ball involve that ball and the shared parameters, poses and machine errors. 
 multiplied by an orthogonal matrix that leaves three rows for the ball and the rest for the shared
 parameters alone; the rest goes into one small triangular factor. Neither the whole Jacobian nor any
 normal equation is ever formed, so that time and memory grow in proportion to the readings. Balls
-tied to one another by calibrated distances are kept and eliminated together at the end.
+tied to one another by observations, such as calibrated distances, are kept and eliminated together
+at the end.
 """
 
 from __future__ import annotations
@@ -16,19 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
-from ..design.arrays import Design, State
+from ..design.arrays import Design, Rows, State
+from ..design.observations.readings import reading_blocks, reading_weights
+from ..design.parameters import SharedLayout
 from ..machines.protocol import Array, Integers
 from .graded import Collected, without_balls
-from .observations import (
-    BallRows,
-    coordinate_rows,
-    distance_rows,
-    length_shared_rows,
-    prior_rows,
-    reading_blocks,
-    reading_weights,
-)
-from .parameters import SharedLayout
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
 ROWS_AT_ONCE = 2048
@@ -36,8 +29,8 @@ ROWS_AT_ONCE = 2048
 # Columns that are eliminated before the rest is multiplied by them.
 PANEL = 16
 
-# Calibrated distances absorbed at once, and columns below which a plain decomposition is as fast.
-DISTANCES_AT_ONCE = 1024
+# Rows of tied balls absorbed at once, and columns below which a plain decomposition is as fast.
+TIED_AT_ONCE = 1024
 SMALL = 500
 
 
@@ -89,6 +82,38 @@ class Factor:
     alike: Factor | None = None
 
 
+@dataclass(frozen=True)
+class _Gathered:
+    """Rows of all observations but readings, sorted by what they are about: a single ball (m,)
+    each, several balls (m, k) together, the shared parameters alone.
+    """
+
+    single: tuple[tuple[Integers, Rows], ...]
+    tied: tuple[tuple[Integers, Rows], ...]
+    shared: tuple[Rows, ...]
+
+    @property
+    def sum_of_squares(self) -> float:
+        """That of the rows that are not eliminated with a ball."""
+        rows = [*self.shared, *(rows for _, rows in self.tied)]
+        return sum(float(one.residual @ one.residual) for one in rows)
+
+
+def _gathered(design: Design, state: State, x: Array | None) -> _Gathered:
+    sorted_: tuple[list[tuple[Integers, Rows]], ...] = ([], [], [])
+    for one in design.observations:
+        if len(one):
+            balls = one.balls
+            width = balls.shape[1]
+            sorted_[min(width, 2)].append((balls, one.rows(design, state, x)))
+    shared, single, tied = sorted_
+    return _Gathered(
+        tuple((balls[:, 0], rows) for balls, rows in single),
+        tuple(tied),
+        tuple(rows for _, rows in shared),
+    )
+
+
 @single_threaded
 def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | None = None) -> Factor:
     """Factor the observations of a design at `state`.
@@ -96,7 +121,7 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     `x` (readings, d) holds a scale reading for each of the design's readings, in order. Without it
     the machine is taken to read without error, as for planning.
     """
-    if _differ(design, layout, state):
+    if _differ(design, state):
         return _eliminate_graded(design, layout, state, x)
     return _eliminate_alike(design, layout, state, x)
 
@@ -105,13 +130,14 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
 # leaves.
 def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
     d, s = design.dimension, len(layout)
-    kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
+    kept, gathered = design.tied_balls, _gathered(design, state, x)
     single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
     shared = np.zeros((0, s + 1))
     total = 0.0
     roots, tops = [], []
     order = []
-    for balls, by_ball, rest in _batches(design, layout, state, x, np.concatenate([single, kept])):
+    every = np.concatenate([single, kept])
+    for balls, by_ball, rest in _batches(design, layout, state, x, every, gathered.single):
         total += float((rest[:, :, -1] ** 2).sum())
         q, r = np.linalg.qr(by_ball)
         top = q.transpose(0, 2, 1) @ rest
@@ -124,39 +150,20 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     root = np.concatenate(roots) if roots else np.zeros((0, d, d))
     top = np.concatenate(tops) if tops else np.zeros((0, d, s + 1))
 
-    if len(design.lengths):
-        residual, derivative = length_shared_rows(design, layout, state, x)
-        total += float(residual @ residual)
-        shared = np.concatenate([shared, np.column_stack([derivative, residual])])
-
-    if len(design.priors):
-        residual, derivative = prior_rows(design, layout, state)
-        total += float(residual @ residual)
-        shared = np.concatenate([shared, np.column_stack([derivative, residual])])
+    shared = np.concatenate([shared, *(_with_residual(rows, s) for rows in gathered.shared)])
+    total += gathered.sum_of_squares
 
     is_kept = np.isin(balls, kept)
     kept = balls[is_kept]
     columns = d * len(kept)
-    distances = distance_rows(design, state)
-    total += float(distances.residual @ distances.residual)
-    # Triangular already but for the distances, which are absorbed some at a time: there may be far
-    # more than columns.
+    # Triangular already but for the rows of tied balls, which are absorbed some at a time: there
+    # may be far more than columns.
     triangle = np.zeros((columns + s + 1, columns + s + 1), order="F")
     for place, own in enumerate(root[is_kept]):
         triangle[d * place : d * place + d, d * place : d * place + d] = own
     triangle[:columns, columns:] = top[is_kept].reshape(columns, s + 1)
     triangle[columns:, columns:] = _square(_triangle(shared), s + 1)
-    place_of = np.zeros(len(design.balls.names), np.int64)
-    place_of[kept] = np.arange(len(kept))
-    for start in range(0, len(design.distances), DISTANCES_AT_ONCE):
-        some = slice(start, start + DISTANCES_AT_ONCE)
-        first, second = design.distances.first[some], design.distances.second[some]
-        rows = np.zeros((len(first), len(triangle)), order="F")
-        at = np.arange(len(first))
-        for axis in range(d):
-            rows[at, d * place_of[first] + axis] = distances.derivative[some, axis]
-            rows[at, d * place_of[second] + axis] = -distances.derivative[some, axis]
-        rows[:, -1] = distances.residual[some]
+    for rows in _tied_rows(gathered, _places(design, kept), columns, s):
         triangle = _with_rows(triangle, rows)
     return Factor(
         layout=layout,
@@ -174,50 +181,29 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     )
 
 
-def _differ(design: Design, layout: SharedLayout, state: State) -> bool:
+def _differ(design: Design, state: State) -> bool:
     """Whether the weights of a design's rows differ by more than `ALIKE`."""
-    given = design.lengths
-    known = _prior_weights(design, layout, state)
     weights = [
         reading_weights(design, design.readings.select(design.plate_readings)),
-        1.0 / design.distances.uncertainty,
-        1.0 / design.coordinates.uncertainty,
-        1.0 / given.uncertainty[given.uncertainty > 0.0],
-        1.0 / design.machine.repeatability if given.with_repeatability.any() else np.zeros(0),
-        known[known > 0.0],
+        *(one.weights(design, state) for one in design.observations if len(one)),
     ]
+    weights = [some[some > 0.0] for some in weights]
     largest = max(float(some.max(initial=0.0)) for some in weights)
     smallest = min(float(some.min(initial=np.inf)) for some in weights)
     return largest > ALIKE * smallest
 
 
-def _prior_weights(design: Design, layout: SharedLayout, state: State) -> Array:
-    """Largest derivative (m,) of each prior's row by a parameter, in its effect."""
-    return np.abs(prior_rows(design, layout, state)[1] * layout.scale).max(axis=1, initial=0.0)
-
-
-def _weighted_alike(design: Design, layout: SharedLayout, state: State) -> Design:
+def _weighted_alike(design: Design, state: State) -> Design:
     """The same observations with weights of about one each."""
-    given, known = design.lengths, design.priors
-    weights = _prior_weights(design, layout, state)
-    return replace(
+    readings = replace(
+        design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)
+    )
+    alike = replace(
         design,
         machine=replace(design.machine, repeatability=np.ones(design.dimension)),
-        readings=replace(
-            design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)
-        ),
-        distances=replace(design.distances, uncertainty=np.ones(len(design.distances))),
-        coordinates=replace(design.coordinates, uncertainty=np.ones(len(design.coordinates))),
-        lengths=replace(
-            given,
-            uncertainty=np.ones(len(given)),
-            with_repeatability=np.zeros(len(given), bool),
-            certificate=np.arange(len(given)),
-        ),
-        priors=replace(
-            known, uncertainty=known.uncertainty * np.where(weights > 0.0, weights, 1.0)
-        ),
+        readings=readings,
     )
+    return alike.observed(*(one.alike(design, state) for one in design.observations))
 
 
 # In one piece: the steps of one elimination, each of which uses up the rows that the one before
@@ -227,16 +213,15 @@ def _eliminate_graded(
 ) -> Factor:
     """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
     d, s = design.dimension, len(layout)
-    kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
-    place_of = np.zeros(len(design.balls.names), np.int64)
-    place_of[kept] = np.arange(len(kept))
+    kept, gathered = design.tied_balls, _gathered(design, state, x)
+    place_of = _places(design, kept)
     columns = d * len(kept)
     scale = np.append(layout.scale, 1.0)
     single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
     balls, roots, orders, tops = [], [], [], []
     total, shared, tied = 0.0, Collected(s, 1), Collected(columns, s + 1)
     for is_tied, chosen in ((False, single), (True, kept)):
-        for batch, by_ball, rest in _batches(design, layout, state, x, chosen):
+        for batch, by_ball, rest in _batches(design, layout, state, x, chosen, gathered.single):
             total += float((rest[:, :, -1] ** 2).sum())
             rest *= scale
             weights = np.maximum(
@@ -258,25 +243,12 @@ def _eliminate_graded(
             roots.append(root)
             orders.append(order)
             tops.append(top)
-    if len(design.lengths):
-        residual, derivative = length_shared_rows(design, layout, state, x)
-        total += float(residual @ residual)
-        shared.add(np.column_stack([derivative, residual]) * scale)
-    if len(design.priors):
-        residual, derivative = prior_rows(design, layout, state)
-        total += float(residual @ residual)
-        shared.add(np.column_stack([derivative, residual]) * scale)
-    distances = distance_rows(design, state)
-    total += float(distances.residual @ distances.residual)
-    for start in range(0, len(design.distances), DISTANCES_AT_ONCE):
-        rows = _distance_columns(
-            design, distances, place_of, slice(start, start + DISTANCES_AT_ONCE)
-        )
-        tied.add(
-            np.concatenate(
-                [rows, np.zeros((len(rows), s)), distances.residual[start:][: len(rows), None]], 1
-            )
-        )
+    total += gathered.sum_of_squares
+    for some in gathered.shared:
+        shared.add(_with_residual(some, s) * scale)
+    for rows in _tied_rows(gathered, place_of, columns, s):
+        rows[:, columns:] *= scale
+        tied.add(rows)
     of_kept = tied.found()
     shared.add(of_kept.rest)
     of_shared = shared.found()
@@ -298,21 +270,43 @@ def _eliminate_graded(
         orders=Orders(
             np.concatenate([np.zeros((0, d), np.int64), *orders]), of_kept.order, of_shared.order
         ),
-        alike=_eliminate_alike(_weighted_alike(design, layout, state), layout, state, x),
+        alike=_eliminate_alike(_weighted_alike(design, state), layout, state, x),
     )
 
 
-def _distance_columns(
-    design: Design, distances: BallRows, place_of: Integers, some: slice
-) -> Array:
-    """Derivatives (m, d k) of some calibrated distances by the balls that they tie together."""
-    d, first, second = design.dimension, design.distances.first[some], design.distances.second[some]
-    rows = np.zeros((len(first), d * (int(place_of.max()) + 1)))
-    at = np.arange(len(first))
-    for axis in range(d):
-        rows[at, d * place_of[first] + axis] = distances.derivative[some, axis]
-        rows[at, d * place_of[second] + axis] = -distances.derivative[some, axis]
-    return rows
+def _places(design: Design, kept: Integers) -> Integers:
+    """Place (n,) of each ball among those kept."""
+    place_of = np.zeros(len(design.balls.names), np.int64)
+    place_of[kept] = np.arange(len(kept))
+    return place_of
+
+
+def _with_residual(rows: Rows, s: int) -> Array:
+    """Derivatives by the shared parameters with the residual beside them (m, s + 1)."""
+    found = np.zeros((len(rows.residual), s + 1))
+    if rows.by_shared is not None:
+        found[:, :-1] = rows.by_shared
+    found[:, -1] = rows.residual
+    return found
+
+
+def _tied_rows(gathered: _Gathered, place_of: Integers, columns: int, s: int) -> Iterator[Array]:
+    """Rows (m, columns + s + 1) of observations that tie balls together, some at a time, in
+    Fortran's order.
+    """
+    for balls, of_all in gathered.tied:
+        for start in range(0, len(balls), TIED_AT_ONCE):
+            some = slice(start, start + TIED_AT_ONCE)
+            by_ball = of_all.by_ball[some]
+            rows = np.zeros((len(by_ball), columns + s + 1), order="F")
+            at, d = np.arange(len(by_ball)), by_ball.shape[2]
+            for ball, slope in zip(balls[some].T, by_ball.swapaxes(0, 1), strict=True):
+                for axis in range(d):
+                    rows[at, d * place_of[ball] + axis] += slope[:, axis]
+            if of_all.by_shared is not None:
+                rows[:, columns:-1] = of_all.by_shared[some]
+            rows[:, -1] = of_all.residual[some]
+            yield rows
 
 
 def _absorbed(triangle: Array, rows: Array) -> Array:
@@ -357,12 +351,18 @@ def _square(triangle: Array, size: int) -> Array:
 
 
 def _batches(
-    design: Design, layout: SharedLayout, state: State, x: Array | None, balls: Integers
+    design: Design,
+    layout: SharedLayout,
+    state: State,
+    x: Array | None,
+    balls: Integers,
+    known: tuple[tuple[Integers, Rows], ...],
 ) -> Iterator[tuple[Integers, Array, Array]]:
     """Balls a batch at a time: their indices (b,), rows by the ball (b, rows, d), by the rest (b,
     rows, s + 1).
 
-    Balls with fewer rows than the most in their batch are filled up with rows of zeros.
+    `known` are the balls (m,) of observations of single ones, and their rows. Balls with fewer rows
+    than the most in their batch are filled up with rows of zeros.
     """
     d, s = design.dimension, len(layout)
     readings = design.readings
@@ -370,11 +370,15 @@ def _batches(
     chosen = chosen[np.argsort(readings.ball[chosen], kind="stable")]
     count = np.bincount(readings.ball[chosen], minlength=len(design.balls.names))
     start = np.cumsum(count) - count
-    given = design.coordinates
-    by_axis = np.argsort(given.ball, kind="stable")
-    extra = np.bincount(given.ball, minlength=len(design.balls.names))
+    certified = np.concatenate([np.zeros(0, np.int64), *(ball for ball, _ in known)])
+    slope = np.concatenate([np.zeros((0, d)), *(one.by_ball[:, 0] for _, one in known)])
+    by_ball_first = np.argsort(certified, kind="stable")
+    extra = np.bincount(certified, minlength=len(design.balls.names))
     extra_start = np.cumsum(extra) - extra
-    certificate = coordinate_rows(design, state)
+    # Where no shared parameter has a part, columns of zeros are not formed.
+    is_mixed = any(one.by_shared is not None for _, one in known)
+    beside = [_with_residual(one, s) if is_mixed else one.residual[:, None] for _, one in known]
+    known_rest = np.concatenate([np.zeros((0, s + 1 if is_mixed else 1)), *beside])
 
     rows = d * count + extra
     balls = balls[np.argsort(rows[balls], kind="stable")]
@@ -401,9 +405,10 @@ def _batches(
             _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout.model, present)
         if c:
             member = np.arange(c) < extra[batch][:, None]
-            source = by_axis[np.where(member, extra_start[batch][:, None] + np.arange(c), 0)]
-            by_ball[:, d * m : d * m + c] = certificate.derivative[source] * member[:, :, None]
-            rest[:, d * m : d * m + c, -1] = certificate.residual[source] * member
+            source = by_ball_first[np.where(member, extra_start[batch][:, None] + np.arange(c), 0)]
+            by_ball[:, d * m : d * m + c] = slope[source] * member[:, :, None]
+            beside_ball = rest[:, d * m : d * m + c, -known_rest.shape[1] :]
+            beside_ball[:] = known_rest[source] * member[:, :, None]
         yield batch, by_ball, rest
 
 

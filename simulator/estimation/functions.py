@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..design.arrays import Design, State
+from ..design.parameters import SharedLayout
 from ..geometry.motions import AXIS_NAMES
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, Integers, Unit
 from .corrections import corrected_points, correction_rows
 from .covariance import MICROMETRE, blank
 from .linearisation import LinearFunctions, Linearisation
-from .parameters import SharedLayout
 
 # Places whose derivatives by all shared parameters are formed at once.
 PLACES_AT_ONCE = 1000

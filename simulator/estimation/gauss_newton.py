@@ -9,6 +9,8 @@ import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, State
+from ..design.observations.lengths import Lengths
+from ..design.parameters import SharedLayout, shared_layout
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from .covariance import Spectrum, no_spectrum, spectrum
@@ -16,7 +18,6 @@ from .elimination import Factor, eliminate
 from .graded import triangle
 from .initial import initial_state
 from .linearisation import Linearisation, linearise
-from .parameters import SharedLayout, shared_layout
 from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
 Status = Literal["converged", "not converged", "diverged"]
@@ -78,7 +79,7 @@ def gauss_newton(
     failure to converge is a status, not an exception.
     """
     settings = settings or GaussNewtonSettings()
-    layout = shared_layout(design)
+    layout = design.once(shared_layout)
     state = start
     record: list[Iteration] = []
     length, previous = 0.0, np.inf
@@ -119,7 +120,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
-    if not drawn.deficiency or len(design.lengths):
+    if not drawn.deficiency or len(design.of(Lengths)):
         return gauss_newton(design, x, start, settings, drawn)
     solution = gauss_newton(design, x, start, settings)
     went_far = max(one.step for one in solution.iterations) > NEIGHBOURHOOD

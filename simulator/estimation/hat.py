@@ -15,35 +15,11 @@ import numpy as np
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, State
+from ..design.observations.readings import reading_blocks
+from ..design.parameters import SharedLayout
 from ..machines.protocol import Array, Integers
 from .elimination import ROWS_AT_ONCE
 from .linearisation import Linearisation
-from .observations import (
-    coordinate_rows,
-    distance_rows,
-    length_shared_rows,
-    prior_rows,
-    reading_blocks,
-)
-from .parameters import SharedLayout
-
-
-@dataclass(frozen=True)
-class RowPlaces:
-    """Where the whitened rows of each kind stand: d for each reading of a plate, one for each other
-    observation.
-
-    Of lengths read together there are as many rows as lengths that do not follow from others.
-    """
-
-    readings: slice
-    lengths: slice
-    priors: slice
-    coordinates: slice
-    distances: slice
-
-    def __len__(self) -> int:
-        return int(self.distances.stop)
 
 
 @dataclass(frozen=True)
@@ -58,39 +34,34 @@ class HatRows:
     ball: Integers
 
 
-def row_places(design: Design) -> RowPlaces:
-    """Lay out the rows of all observations of a design."""
-    counts = [
-        design.dimension * len(design.plate_readings),
-        len(design.length_whitening),
-        len(design.priors),
-        len(design.coordinates),
-        len(design.distances),
-    ]
-    ends = np.cumsum(counts).tolist()
-    return RowPlaces(*(slice(end - count, end) for end, count in zip(ends, counts, strict=True)))
+def row_places(design: Design) -> dict[str, slice]:
+    """Where the whitened rows of each kind stand, by its word: d for each reading of a plate, one
+    for each other observation.
+
+    Of lengths read together there are as many rows as lengths that do not follow from others.
+    """
+    counts = {"reading": design.dimension * len(design.plate_readings)}
+    counts |= {one.word: one.count(design) for one in design.observations}
+    ends = np.cumsum(list(counts.values())).tolist()
+    return {
+        word: slice(end - count, end)
+        for (word, count), end in zip(counts.items(), ends, strict=True)
+    }
 
 
-def whitened_residuals(
-    design: Design, layout: SharedLayout, state: State, x: Array | None
-) -> Array:
+def row_count(design: Design) -> int:
+    """Number of the whitened rows of all observations."""
+    return max(rows.stop for rows in row_places(design).values())
+
+
+def whitened_residuals(design: Design, state: State, x: Array | None) -> Array:
     """Residuals (rows,) of all observations, in units of their standard uncertainties."""
     chosen = design.plate_readings
     of_readings = reading_blocks(
         design, state, design.readings.select(chosen), None if x is None else x[chosen]
     )
-    of_lengths = (
-        length_shared_rows(design, layout, state, x)[0] if len(design.lengths) else np.zeros(0)
-    )
-    return np.concatenate(
-        [
-            of_readings.residual.ravel(),
-            of_lengths,
-            prior_rows(design, layout, state)[0],
-            coordinate_rows(design, state).residual,
-            distance_rows(design, state).residual,
-        ]
-    )
+    others = [one.rows(design, state, x).residual for one in design.observations]
+    return np.concatenate([of_readings.residual.ravel(), *others])
 
 
 @single_threaded
@@ -105,10 +76,6 @@ def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
         common[..., :rank] = shared @ at.shared
         return common
 
-    def by_shared(start: int, derivative: Array) -> HatRows:
-        m = len(derivative)
-        return HatRows(start + np.arange(m), widened(derivative), np.zeros((m, d)), np.full(m, -1))
-
     for some in _reading_batches(design):
         ball = design.readings.ball[design.plate_readings[some]]
         shared, by_ball = _reading_rows(design, layout, state, x, design.plate_readings[some])
@@ -121,25 +88,22 @@ def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
             own.reshape(-1, d),
             np.repeat(ball, d),
         )
-    if len(design.lengths):
-        yield by_shared(places.lengths.start, length_shared_rows(design, layout, state, x)[1])
-    if len(design.priors):
-        yield by_shared(places.priors.start, prior_rows(design, layout, state)[1])
-    for part in _slices(len(design.coordinates)):
-        ball, derivative = (
-            design.coordinates.ball[part],
-            coordinate_rows(design, state).derivative[part, None],
-        )
-        own = (derivative @ balls.own[ball])[:, 0]
-        rows = places.coordinates.start + np.arange(part.start, part.stop)
-        yield HatRows(rows, (derivative @ balls.common[ball])[:, 0], own, ball)
-    for part in _slices(len(design.distances)):
-        first, second = design.distances.first[part], design.distances.second[part]
-        derivative = distance_rows(design, state).derivative[part, None]
-        common = (derivative @ (balls.common[first] - balls.common[second]))[:, 0]
-        rows = places.distances.start + np.arange(part.start, part.stop)
-        # Balls that distances tie to others have no part of their own.
-        yield HatRows(rows, common, np.zeros((len(rows), d)), np.full(len(rows), -1))
+    for one in design.observations:
+        found, of = one.rows(design, state, x), one.balls
+        is_single = of.shape[1] == 1
+        for part in _slices(len(found.residual)):
+            shape = (part.stop - part.start, width)
+            common = np.zeros(shape) if found.by_shared is None else widened(found.by_shared[part])
+            for ball, slope in zip(of[part].T, found.by_ball[part].swapaxes(0, 1), strict=True):
+                common += (slope[:, None] @ balls.common[ball])[:, 0]
+            # Balls that are tied to others have no part of their own.
+            own, alone = np.zeros((len(common), d)), np.full(len(common), -1)
+            if is_single:
+                alone = of[part, 0]
+                own = (found.by_ball[part] @ balls.own[alone])[:, 0]
+            yield HatRows(
+                places[one.word].start + np.arange(part.start, part.stop), common, own, alone
+            )
 
 
 def _slices(count: int) -> list[slice]:

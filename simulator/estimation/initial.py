@@ -60,31 +60,10 @@ def initial_state(design: Design, x: Array) -> State:
             origins[k] = fit_sphere(
                 x[rows] + design.probes.offsets[readings.probe[rows]], origins[k]
             )[0]
-    return replace(
-        nominal_state(design),
-        balls=balls,
-        rotations=rotations,
-        origins=origins,
-        lengths=_measured_lengths(design, origins, x),
-    )
-
-
-def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
-    """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
-    given = design.lengths
-    if given.free is None or not len(design.unknown_lengths.names):
-        return design.unknown_lengths.drawn
-    seen = x + design.probes.offsets[design.readings.probe]
-    other = np.where(
-        given.to_pivot[:, None],
-        origins[design.readings.position[given.first]],
-        seen[np.maximum(given.second, 0)],
-    )
-    length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
-    found = design.unknown_lengths.drawn.copy()
-    for number in np.unique(given.free[given.free >= 0]):
-        found[number] = length[given.free == number].mean()
-    return found
+    state = replace(nominal_state(design), balls=balls, rotations=rotations, origins=origins)
+    for one in design.observations:
+        state = one.started(design, x, state)
+    return state
 
 
 def _mean_locations(design: Design, x: Array) -> Array:
@@ -162,10 +141,12 @@ def _into_frame(
         return turn, design.positions.rotations[held[0]].T @ (
             origin - design.positions.origins[held[0]]
         )
-    target = design.balls.places.copy()
-    given = design.coordinates
-    target[given.ball, given.axis] = given.value
-    certified = np.isin(members, given.ball)
+    target, certified = design.balls.places.copy(), np.zeros(len(members), bool)
+    for one in design.observations:
+        ball, axis = one.fixing()
+        if len(ball):
+            target[ball, axis] = one.value
+            certified |= np.isin(members, ball)
     known = ~np.isnan(shape[:, 0])
     chosen = certified & known
     if _strength(target[members[chosen]], design.dimension) == 0.0:

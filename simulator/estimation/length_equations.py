@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design
-from ..design.joint_lengths import equation_root
+from ..design.observations.joint_lengths import equation_root
+from ..design.observations.lengths import Lengths, length_whitening
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
 from .covariance import EXACT, MICROMETRE
@@ -204,7 +205,7 @@ class _Unknowns:
 
 
 def _equations(design: Design, x: Array) -> _Equations:
-    given = design.lengths
+    given = design.of(Lengths)
     seen = x + design.probes.offsets[design.readings.probe]
     place = seen[given.first]
     place[~given.to_pivot] -= seen[given.second[~given.to_pivot]]
@@ -213,7 +214,7 @@ def _equations(design: Design, x: Array) -> _Equations:
     number[design.gauge_positions] = np.arange(len(design.gauge_positions))
     free = np.full(len(given), -1) if given.free is None else given.free
     pivot = np.where(given.to_pivot, number[position], -1)
-    groups = [one.rows for joint in design.length_whitening.joint for one in joint.together]
+    groups = [one.rows for joint in design.once(length_whitening).joint for one in joint.together]
     together = tuple((rows, equation_root(given, rows)) for rows in groups)
     return _Equations(place, given.direction, pivot, given.value, free, together)
 

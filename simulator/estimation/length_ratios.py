@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..design.arrays import Design
+from ..design.observations.lengths import Lengths
 from ..machines.protocol import Array
 from .spheres import FLAT, fit_sphere
 
@@ -51,7 +52,7 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
 
     Of unknown lengths the drawn ones, if they are off by more than 30 %.
     """
-    given, readings = design.lengths, design.readings
+    given, readings = design.of(Lengths), design.readings
     known = np.ones(len(given), bool) if given.free is None else given.free < 0
     seen = x + design.probes.offsets[readings.probe]
     artefact = design.balls.artefact[readings.ball[given.first]]
@@ -82,7 +83,7 @@ def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
     """Radii of the spheres through the readings over the stated one, without those that the
     readings hardly show.
     """
-    given = design.lengths
+    given = design.of(Lengths)
     position = design.readings.position[given.first[rows]]
     found = []
     for k in np.unique(position):

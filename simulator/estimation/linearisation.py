@@ -11,10 +11,10 @@ import numpy as np
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, State, nominal_state
+from ..design.parameters import SharedLayout, shared_layout
 from ..machines.protocol import Array
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, blank, spectrum
 from .elimination import Factor, eliminate
-from .parameters import SharedLayout, shared_layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +139,6 @@ def linearise(
     `spectrum`.
     """
     state = nominal_state(design) if state is None else state
-    layout = shared_layout(design)
+    layout = design.once(shared_layout)
     factor = eliminate(design, layout, state, x)
     return Linearisation(design, layout, state, factor, spectrum(factor, drawn))

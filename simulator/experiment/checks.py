@@ -9,6 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..design.lookup import Floats, References
+from ..design.objects import SLIGHTLY, Machine, Volume
+from ..design.observations.calibration import Calibration
+from ..design.observations.distances import DistanceCalibration
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.motions import pose_size
 from ..geometry.positions import ball_coordinates
@@ -31,18 +36,7 @@ from ..machines.true_machine_settings import CurvesSettings, RandomSettings, Tru
 from ..machines.truth import TruthError, true_machine
 from .curve_files import read_curves
 from .machine_file import load_machine
-from .model import (
-    SLIGHTLY,
-    Calibration,
-    DistanceCalibration,
-    Evaluation,
-    Floats,
-    Machine,
-    Position,
-    RadiusCalibration,
-    Volume,
-)
-from .references import References
+from .model import Evaluation, Position
 from .structure import Sections
 
 TOLERANCE = 1e-9
@@ -406,21 +400,17 @@ def check_calibration_read(
     reported.
     """
     is_standard = references.artefacts[calibration.artefact].role == "length_standard"
-    if (
-        not is_standard
-        or isinstance(calibration, RadiusCalibration)
-        or len(positions) < position_count
-    ):
+    if not isinstance(calibration, DistanceCalibration) or not is_standard:
+        return
+    if len(positions) < position_count:
         return
     own = [position for position in positions.values() if position.artefact == calibration.artefact]
-    used = calibration.pairs if isinstance(calibration, DistanceCalibration) else calibration.balls
     layout = references.layouts[calibration.artefact]
-    unread = np.setdiff1d(used, read_balls(own))
+    unread = np.setdiff1d(calibration.pairs, read_balls(own))
     if own and len(unread):
         names = listing(layout.names[i] for i in unread)
-        key = "pairs" if isinstance(calibration, DistanceCalibration) else "balls"
         references.problems.add(
-            (*steps, key),
+            (*steps, "pairs"),
             f"no position reads {_balls(len(unread))} {names}; read them, or leave them out",
         )
 

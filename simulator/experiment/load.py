@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..design.observations.calibration import Calibration
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
@@ -27,7 +28,7 @@ from .checks import (
     check_use,
 )
 from .machine import resolve_evaluation, resolve_machine, target_of
-from .model import Calibration, Experiment
+from .model import Experiment
 from .modules import refused_modules
 from .placements import resolve_position
 from .pool import placed_only
@@ -191,7 +192,9 @@ def _build(
     calibrations: dict[int, Calibration] = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
-        calibration = resolve_calibration(settings, ("calibration", i), references)
+        calibration = resolve_calibration(
+            settings, settings.artefact, ("calibration", i), references
+        )
         if calibration is not None:
             calibrations[i] = calibration
             check_calibration_read(

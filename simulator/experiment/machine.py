@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..design.lookup import Floats, References
+from ..design.objects import Machine, Volume
 from ..geometry.artefacts import frozen
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems
@@ -16,8 +18,7 @@ from ..inputs.quantities import LengthFunction, Target, format_length
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
-from .model import Evaluation, Floats, Machine, Task, Volume
-from .references import References
+from .model import Evaluation, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 

@@ -16,13 +16,13 @@ from ..inputs.quantities import (
     PositiveTemperatureDifference,
     TemperatureDifference,
 )
-from ..inputs.settings import Forms, Settings
+from ..inputs.settings import Forms, Settings, Text
 from ..machines.curves import NAMES, Interpolation
 from ..machines.kinematic import ROTATIONS, describe
 from ..machines.settings import ARRANGEMENT, ArrangementName, ArrangementSettings
 from ..machines.straightness import Criterion
 from ..machines.volumetric import SQUARENESS, meaning
-from .position_sections import Edges, Text
+from .position_sections import Edges
 from .sections import Line, VolumeSettings
 
 # Polynomials go to the tenth order.

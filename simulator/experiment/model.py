@@ -11,64 +11,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..design.lookup import Floats, Indices
+from ..design.objects import Machine
+from ..design.observations.calibration import Calibration
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
-from ..inputs.quantities import LengthFunction, Target
+from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, written
 from .changes import changed_tree
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
-
-# Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
-# round numbers, and artefacts are not set up just as drawn.
-SLIGHTLY = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Volume:
-    """The measuring volume: ``lower`` and ``upper`` (d,) in metres."""
-
-    lower: Floats
-    upper: Floats
-
-    @property
-    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The lower and the upper corner, as numbers."""
-        return tuple(self.lower.tolist()), tuple(self.upper.tolist())
-
-    @property
-    def size(self) -> Floats:
-        """Lengths (d,) of the sides."""
-        return np.asarray(self.upper - self.lower)
-
-    @property
-    def of_readings(self) -> tuple[Floats, Floats]:
-        """Limits (d,) of scale readings, a thousandth of the volume outside it."""
-        slightly = SLIGHTLY * self.size
-        return self.lower - slightly, self.upper + slightly
-
-
-@dataclass(frozen=True, eq=False)
-class Machine:
-    """The machine. ``repeatability``: (d,) standard uncertainty of a reading per co-ordinate, in
-    metres.
-    """
-
-    volume: Volume
-    repeatability: Floats
-
-    @property
-    def dimension(self) -> int:
-        """Number of co-ordinates, 2 or 3."""
-        return len(self.volume.lower)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,58 +70,6 @@ class Position:
     def balls(self) -> Indices:
         """Indices (k,) of the balls that are read, in order."""
         return np.unique(np.concatenate([group.ball_indices for group in self.readings]))
-
-
-@dataclass(frozen=True, eq=False)
-class DistanceCalibration:
-    """Calibrated distances of an artefact.
-
-    ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
-    ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
-    the function ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability``
-    matter for length standards only.
-    """
-
-    artefact: str
-    pairs: Indices
-    dimensions: Literal[2, 3]
-    values: Floats
-    certified: bool
-    standard_uncertainty: LengthFunction
-    standard_uncertainties: Floats
-    form: Literal["distance", "projection"]
-    repeatability: Literal["included", "ignored"]
-    kind: Literal["distances"] = "distances"
-
-
-@dataclass(frozen=True, eq=False)
-class CoordinateCalibration:
-    """Calibrated ball co-ordinates in the artefact's frame.
-
-    ``balls``: (k,) indices. ``axes``: the a calibrated axes, 0 to 2. ``values``: (k, a) metres,
-    nominal unless ``certified``. ``standard_uncertainties``: (a,) metres.
-    """
-
-    artefact: str
-    balls: Indices
-    axes: tuple[int, ...]
-    values: Floats
-    certified: bool
-    standard_uncertainties: Floats
-    kind: Literal["coordinates"] = "coordinates"
-
-
-@dataclass(frozen=True, eq=False)
-class RadiusCalibration:
-    """The calibrated radius of a Bryan gauge: ``value`` and ``standard_uncertainty`` in metres."""
-
-    artefact: str
-    value: float
-    standard_uncertainty: float
-    kind: Literal["radius"] = "radius"
-
-
-Calibration = DistanceCalibration | CoordinateCalibration | RadiusCalibration
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +237,7 @@ class Experiment:
         read = sum(
             len(group.ball_indices) for one in (*self.positions, *offered) for group in one.readings
         )
-        known = sum(len(one.values) for one in self.calibration if one.kind != "radius")
+        known = sum(one.size for one in self.calibration)
         balls = sum(len(layout.names) for layout in self.layouts.values())
         return balls + read + known + len(self.priors) + len(self.evaluation.points)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from ..design.lookup import References, lengths_per_axis
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     IN_PLANE_AXES,
@@ -15,7 +16,6 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
-from .references import References, lengths_per_axis
 
 PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")

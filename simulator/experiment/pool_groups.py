@@ -11,6 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..design.lookup import Floats, Indices, References, lengths_per_axis
+from ..design.objects import Volume
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
@@ -25,7 +27,7 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from ..inputs.quantities import format_length, length_text
 from ..inputs.yamltree import to_python, written
-from .model import Floats, Indices, Position, ReadingGroup, Volume
+from .model import Position, ReadingGroup
 from .placements import check_turns
 from .pool_sections import (
     GroupSettings,
@@ -34,7 +36,6 @@ from .pool_sections import (
     RangeSettings,
     form_of_balls,
 )
-from .references import References, lengths_per_axis
 
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000

@@ -4,27 +4,17 @@ on the choice.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, Union
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
-from ..geometry.artefacts import Name
+from ..design.observations.coordinates import CalibratedBalls
+from ..design.observations.kinds import CALIBRATIONS
+from ..geometry.artefacts import BallNames, Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Duration, Length
-from ..inputs.settings import Forms, NonEmpty, Settings, Several
-from .position_sections import (
-    BallNames,
-    CalibratedBalls,
-    CoordinatesSettings,
-    Count,
-    DistancesSettings,
-    LengthPerAxis,
-    PositionSettings,
-    ProbeNames,
-    QuarterTurns,
-    RadiusSettings,
-    Text,
-)
+from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
+from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
 AXES = ("x", "y", "z")
 GROUP_KEYS = ("planes", "levels", "corners", "centres")
@@ -231,22 +221,19 @@ class _Priced(Settings):
     )
 
 
-class PricedDistancesSettings(_Priced, DistancesSettings):
-    """Calibrated distances that can be had at a price."""
+def _priced(kind: type[Settings]) -> Any:
+    """Settings of a kind of calibration that can be had at a price."""
+    words = f"{(kind.__doc__ or '').rstrip('.')}, to be had at a price."
+    return create_model(f"Priced{kind.__name__}", __base__=(_Priced, kind), __doc__=words)
 
 
-class PricedCoordinatesSettings(_Priced, CoordinatesSettings):
-    """Calibrated co-ordinates that can be had at a price."""
-
-
-class PricedRadiusSettings(_Priced, RadiusSettings):
-    """The calibrated radius of a Bryan gauge that can be had at a price."""
-
-
-PricedSettings = Annotated[
-    PricedDistancesSettings | PricedCoordinatesSettings | PricedRadiusSettings,
-    Field(discriminator="kind"),
-]
+if TYPE_CHECKING:
+    PricedSettings = _Priced
+else:
+    PricedSettings = Annotated[
+        Union[tuple(_priced(kind) for kind in CALIBRATIONS)],  # noqa: UP007
+        Field(discriminator="kind"),
+    ]
 
 
 class SelectorSettings(Settings):

@@ -13,6 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from ..design.lookup import Floats, ReadingCount, References
+from ..design.objects import Machine
+from ..design.observations.calibration import Calibration
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import frozen
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
 from ..inputs.messages import Steps, format_path
@@ -22,17 +26,7 @@ from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
-from .model import (
-    AtMost,
-    Calibration,
-    Candidate,
-    ChangeTimes,
-    Floats,
-    Machine,
-    Pool,
-    Position,
-    RadiusCalibration,
-)
+from .model import AtMost, Candidate, ChangeTimes, Pool, Position
 from .placements import resolve_position
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (
@@ -44,7 +38,6 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .references import ReadingCount, References
 from .structure import Sections
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
@@ -225,7 +218,11 @@ def resolve_pool(
         settings = sections.get(*steps)
         if settings is None:
             references.check_written(steps)
-        item = resolve_calibration(settings, steps, references) if settings is not None else None
+        item = (
+            resolve_calibration(settings, settings.artefact, steps, references)
+            if settings is not None
+            else None
+        )
         if item is None:
             complete = False
             continue

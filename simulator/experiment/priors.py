@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..design.lookup import Floats, References
+from ..design.objects import Machine
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names
 from ..inputs.messages import Steps, format_path
@@ -13,8 +15,7 @@ from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
-from .model import Floats, Machine, Position, Prior
-from .references import References
+from .model import Position, Prior
 from .sections import PriorSettings
 from .structure import Sections
 

@@ -8,13 +8,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
+from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name
 from ..inputs.quantities import Length, LengthFunction
-from ..inputs.settings import Forms, NonEmpty, Settings, Several
+from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from .pool_sections import PoolSettings
-from .position_sections import CalibrationSettings, Edges, LengthPerAxis, PositionSettings, Text
+from .position_sections import Edges, LengthPerAxis, PositionSettings
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]

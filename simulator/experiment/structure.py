@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 
 from pydantic import TypeAdapter, ValidationError
 
+from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
@@ -19,7 +20,7 @@ from ..inputs.settings import describe, hint, nearest
 from ..inputs.wording import explain
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
-from .position_sections import CalibrationSettings, PositionSettings
+from .position_sections import PositionSettings
 from .sections import AnyProbe, ExperimentSettings, PriorSettings
 from .variants import ALIASES
 

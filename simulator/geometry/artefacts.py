@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 
 from ..inputs.quantities import Length, PositiveLength
-from ..inputs.settings import Settings, listing
+from ..inputs.settings import NonEmpty, Settings, listing
 from .directions import DIRECTIONS, DirectionsSettings, directions
 
 MOST_BALLS = 40_000
@@ -92,6 +92,7 @@ def _text_of_whole_number(value: object) -> object:
 
 # Numbers are usual as names of balls, and YAML reads them as numbers.
 Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
+BallNames = NonEmpty[Name]
 Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 

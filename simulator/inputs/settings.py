@@ -8,7 +8,7 @@ import difflib
 from collections.abc import Iterable
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
 
 
 def _form(value: Any) -> str:
@@ -41,6 +41,8 @@ Forms = Annotated[
 """A value that is one thing, a list or a mapping; of a form that is none, it stands for the form
 whose message says what is expected.
 """
+
+Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Settings(BaseModel):

@@ -13,29 +13,23 @@ is of) and value:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
 from ..design.arrays import Design, State
-from ..experiment.calibrations import FAR_FROM_DRAWING, far_from_drawing, far_spread
-from ..experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    RadiusCalibration,
-)
+from ..design.observations.calibration import FAR_FROM_DRAWING, CertifiedValue, far_from_drawing
+from ..design.observations.priors import Priors
+from ..experiment.model import Experiment
 from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path
 from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, read_table
 from ..inputs.yamltree import GivenText
-from ..machines.protocol import Array, ErrorModel, Unit
-from .generate import true_priors
+from ..machines.protocol import Array, ErrorModel
 from .simulated import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
@@ -44,37 +38,12 @@ PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 UNIT_NAMES = {"rad": "rad", "1": "m/m"}
 
 
-@dataclass(frozen=True)
-class CertifiedValue:
-    """A value that a certificate states: its item's path, what it is of, and value and standard
-    uncertainty in `unit`.
-
-    `is_pair`: the two names are balls, in either order. `drawn` is what the drawing has for a
-    length, otherwise None.
-    """
-
-    item: str
-    first: str
-    second: str
-    value: float
-    standard_uncertainty: float
-    unit: Unit = "m"
-    is_pair: bool = False
-    drawn: float | None = None
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What tells this value from all others."""
-        names = sorted((self.first, self.second)) if self.is_pair else (self.first, self.second)
-        return self.item, names[0], names[1]
-
-
 def certified_values(experiment: Experiment) -> list[CertifiedValue]:
     """All values that certificates, probes and priors of an experiment state, in its order."""
     found = [
-        one
+        replace(one, item=format_path(("calibration", k)))
         for k, item in enumerate(experiment.calibration)
-        for one in _of_calibration(experiment, k, item)
+        for one in item.certified_values(experiment.layouts[item.artefact])
     ]
     for name, axis in _certified_offsets(experiment):
         value, u = (
@@ -90,29 +59,6 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
             )
         )
     return found
-
-
-def _of_calibration(
-    experiment: Experiment, number: int, item: Calibration
-) -> Iterator[CertifiedValue]:
-    path, layout = format_path(("calibration", number)), experiment.layouts[item.artefact]
-    if isinstance(item, DistanceCalibration):
-        between = layout.coordinates[item.pairs[:, 0]] - layout.coordinates[item.pairs[:, 1]]
-        drawn = np.sqrt((between[:, : item.dimensions] ** 2).sum(axis=1)).tolist()
-        for (i, j), value, u, length in zip(
-            item.pairs, item.values, item.standard_uncertainties, drawn, strict=True
-        ):
-            names = layout.names[i], layout.names[j]
-            yield CertifiedValue(path, *names, float(value), float(u), is_pair=True, drawn=length)
-    elif isinstance(item, CoordinateCalibration):
-        for ball, values in zip(item.balls, item.values, strict=True):
-            for axis, value, u in zip(item.axes, values, item.standard_uncertainties, strict=True):
-                yield CertifiedValue(path, layout.names[ball], AXES[axis], float(value), float(u))
-    else:
-        radius = float(np.sqrt((layout.coordinates[0] ** 2).sum()))
-        yield CertifiedValue(
-            path, item.artefact, "radius", item.value, item.standard_uncertainty, drawn=radius
-        )
 
 
 def _certified_offsets(experiment: Experiment) -> Iterator[tuple[str, int]]:
@@ -135,20 +81,15 @@ def with_values(experiment: Experiment, values: Array) -> Experiment:
         part.setflags(write=False)
         return part
 
-    calibration: list[Calibration] = []
-    for item in experiment.calibration:
-        if isinstance(item, RadiusCalibration):
-            calibration.append(replace(item, value=float(taken(1)[0])))
-        elif isinstance(item, DistanceCalibration):
-            calibration.append(replace(item, values=taken(item.values.size), certified=True))
-        else:
-            own = taken(item.values.size).reshape(item.values.shape)
-            calibration.append(replace(item, values=own, certified=True))
+    calibration = tuple(
+        item.with_values(taken(len(list(item.certified_values(experiment.layouts[item.artefact])))))
+        for item in experiment.calibration
+    )
     probes = {name: np.array(offset) for name, offset in experiment.probes.items()}
     for name, axis in _certified_offsets(experiment):
         probes[name][axis] = taken(1)[0]
     priors = tuple(replace(prior, value=float(taken(1)[0])) for prior in experiment.priors)
-    return replace(experiment, calibration=tuple(calibration), probes=probes, priors=priors)
+    return replace(experiment, calibration=calibration, probes=probes, priors=priors)
 
 
 def drawn_values(
@@ -166,18 +107,14 @@ def drawn_values(
     about another model's parameters are drawn about what the file states.
     """
     true: list[float] = []
-    first_ball = {name: int(design.balls.of(k)[0]) for k, name in enumerate(design.artefacts.names)}
+    names = list(experiment.artefacts)
+    first_ball = {
+        name: int(np.flatnonzero(design.balls.artefact == names.index(name))[0]) for name in names
+    }
     for item in experiment.calibration:
-        balls = truth.balls[first_ball[item.artefact] :]
-        if isinstance(item, DistanceCalibration):
-            between = (balls[item.pairs[:, 0]] - balls[item.pairs[:, 1]])[:, : item.dimensions]
-            true += np.sqrt((between**2).sum(axis=1)).tolist()
-        elif isinstance(item, CoordinateCalibration):
-            true += balls[item.balls][:, list(item.axes)].ravel().tolist()
-        else:
-            true.append(float(np.sqrt((balls[0] ** 2).sum())))
+        true += item.true_values(truth.balls, first_ball[item.artefact]).tolist()
     # Those of offsets come last in the design, and first here.
-    priors = true_priors(design, model, truth).value
+    priors = design.of(Priors).true_values(design, truth, model)
     true += [*priors[len(experiment.priors) :], *priors[: len(experiment.priors)]]
     if generator is None:
         return np.array(true, float)
@@ -274,10 +211,8 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
         raise ExperimentError(sorted(problems)[:MOST_MESSAGES])
     found = with_values(experiment, values)
     for one in found.calibration:
-        if isinstance(one, CoordinateCalibration):
-            as_drawn = found.layouts[one.artefact].coordinates[one.balls][:, list(one.axes)]
-            if text := far_spread(one.values, as_drawn):
-                problems.append(Message(str(path), 1, 1, "", text))
+        if text := one.doubt(found.layouts[one.artefact]):
+            problems.append(Message(str(path), 1, 1, "", text))
     if problems:
         raise ExperimentError(problems)
     return found

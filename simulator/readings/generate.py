@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design, State, locations, nominal_state, reading_uncertainties
-from ..design.joint_lengths import FLAT
-from ..design.observations import Priors, Readings
-from ..estimation.observations import distance_rows, prior_values
+from ..design.arrays import Design, Readings, State, locations, nominal_state, reading_uncertainties
+from ..design.observations.joint_lengths import FLAT
+from ..design.observations.lengths import Lengths
 from ..machines.protocol import Array, ErrorModel, Integers
 from ..machines.truth import TrueMachine
 
@@ -77,45 +76,41 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     certificates are as drawn.
     """
     balls = design.balls.places.copy()
-    tied = distance_rows(design, nominal_state(design))
-    known = design.coordinates
-    stated = design.dimension * known.ball + known.axis
-    off = np.concatenate(
-        [tied.residual, (balls[known.ball, known.axis] - known.value) / known.uncertainty]
+    known = [one for one in design.observations if one.balls.shape[1]]
+    rows = [one.rows(design, nominal_state(design), None) for one in known]
+    d, off = design.dimension, np.concatenate([np.zeros(0), *(one.residual for one in rows)])
+    sought = np.split(
+        generator.standard_normal(len(off)) - off, np.cumsum([len(one) for one in known])
     )
-    wanted = generator.standard_normal(len(off)) - off
-    # Balls that no distance ties to others vary by themselves, however many there are.
-    ends = np.unique(np.concatenate([design.distances.first, design.distances.second]))
-    alone = ~np.isin(known.ball, ends)
-    weight = 1.0 / known.uncertainty[alone]
-    pull = np.bincount(stated[alone], weight * wanted[len(tied.residual) :][alone], balls.size)
-    stiffness = np.bincount(stated[alone], weight**2, balls.size)
-    balls += np.divide(pull, stiffness, out=np.zeros(balls.size), where=stiffness > 0).reshape(
-        balls.shape
-    )
-    among = np.zeros(len(design.balls.places), np.int64)
+    # Balls that nothing ties to others vary along each axis by themselves, however many there are.
+    oblique = [one.balls[one.along < 0].ravel() for one in known]
+    ends = np.unique(np.concatenate([np.zeros(0, np.int64), *oblique]))
+    among = np.zeros(len(balls), np.int64)
     among[ends] = np.arange(len(ends))
-    together = ~np.concatenate([np.zeros(len(tied.residual), bool), alone])
-    if len(tied.residual):
-        rows = np.zeros((int(together.sum()), design.dimension * len(ends)))
-        at = np.arange(len(tied.residual))
-        for axis in range(design.dimension):
-            rows[at, design.dimension * among[design.distances.first] + axis] = tied.derivative[
-                :, axis
-            ]
-            rows[at, design.dimension * among[design.distances.second] + axis] = -tied.derivative[
-                :, axis
-            ]
-        at = len(at) + np.arange(len(rows) - len(at))
-        rows[at, design.dimension * among[known.ball[~alone]] + known.axis[~alone]] = (
-            1.0 / known.uncertainty[~alone]
-        )
-        used = np.flatnonzero(rows.any(axis=0))
-        move = np.zeros(rows.shape[1])
-        move[used] = np.linalg.lstsq(rows[:, used], wanted[together], rcond=None)[0]
-        balls[ends] += move.reshape(-1, design.dimension)
-    given = design.lengths
-    given = given.select(np.ones(len(given), bool) if given.free is None else given.free < 0)
+    pull, stiffness = np.zeros(balls.shape), np.zeros(balls.shape)
+    together, sides = [np.zeros((0, d * len(ends)))], [np.zeros(0)]
+    for one, of_one, side in zip(known, rows, sought, strict=False):
+        alone = np.flatnonzero((one.along >= 0) & ~np.isin(one.balls[:, 0], ends))
+        place = one.balls[alone, 0], one.along[alone]
+        slope = of_one.by_ball[alone, 0, place[1]]
+        np.add.at(pull, place, slope * side[alone])
+        np.add.at(stiffness, place, slope**2)
+        others = np.setdiff1d(np.arange(len(one)), alone)
+        if len(ends):
+            columns = d * among[one.balls[others]][:, :, None] + np.arange(d)
+            together.append(np.zeros((len(others), d * len(ends))))
+            at = np.broadcast_to(np.arange(len(others))[:, None, None], columns.shape)
+            np.add.at(together[-1], (at, columns), of_one.by_ball[others])
+            sides.append(side[others])
+    balls += np.divide(pull, stiffness, out=np.zeros(balls.shape), where=stiffness > 0)
+    if len(ends):
+        tied = np.concatenate(together)
+        used = np.flatnonzero(tied.any(axis=0))
+        move = np.zeros(tied.shape[1])
+        move[used] = np.linalg.lstsq(tied[:, used], np.concatenate(sides), rcond=None)[0]
+        balls[ends] += move.reshape(-1, d)
+    given = design.of(Lengths)
+    given = given.select(given.is_known)
     pivoted = given.select(given.to_pivot)
     for certificate in np.unique(pivoted.certificate):
         k = int(np.flatnonzero(pivoted.certificate == certificate)[0])
@@ -161,39 +156,6 @@ def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty:
     return moved
 
 
-def true_lengths(design: Design, truth: State) -> Array:
-    """Lengths (m,) of the design's standards as they truly are; the same wherever one certificate's
-    is read.
-    """
-    given = design.lengths
-    if not len(given):
-        return given.value
-    there = locations(design, truth, design.readings)
-    pivot = truth.origins[design.readings.position[given.first]]
-    between = there[given.first] - np.where(
-        given.to_pivot[:, None], pivot, there[np.maximum(given.second, 0)]
-    )
-    along = np.abs(np.einsum("md,md->m", given.direction, between))
-    length = np.where(given.projected, along, np.sqrt((between**2).sum(axis=1)))
-    _, first = np.unique(given.certificate, return_index=True)
-    return np.asarray(length[first][given.certificate])
-
-
-def true_priors(design: Design, model: ErrorModel, truth: State) -> Priors:
-    """The design's priors with the values of the truth, whose error model is `model`.
-
-    Priors about an error model that is not the true machine's stay what they are.
-    """
-    priors = design.priors
-    if not len(priors):
-        return priors
-    if model == design.model:
-        return replace(priors, value=prior_values(design, truth))
-    of_model = (priors.position < 0) & (priors.probe < 0)
-    elsewhere = replace(truth, a=np.zeros(priors.by_model.shape[1]))
-    return replace(priors, value=np.where(of_model, priors.value, prior_values(design, elsewhere)))
-
-
 def noisy_certificate(
     design: Design, truth: State, generator: np.random.Generator, model: ErrorModel | None = None
 ) -> Design:
@@ -202,24 +164,8 @@ def noisy_certificate(
 
     `model` is the error model of the true machine where it is not the design's.
     """
-    distances, coordinates, lengths = design.distances, design.coordinates, design.lengths
-    difference = truth.balls[distances.first] - truth.balls[distances.second]
-    difference *= np.arange(design.dimension) < distances.dimensions[:, None]
-    true_distance = np.sqrt((difference**2).sum(axis=1))
-    true_coordinate = truth.balls[coordinates.ball, coordinates.axis]
-    priors = true_priors(design, model or design.model, truth)
-
-    def drawn(value: Array, uncertainty: Array) -> Array:
-        return np.asarray(value + uncertainty * generator.standard_normal(len(uncertainty)))
-
-    # One error for each certificate, wherever it is read.
-    error = generator.standard_normal(int(lengths.certificate.max(initial=-1)) + 1)[
-        lengths.certificate
-    ]
-    return replace(
-        design,
-        distances=replace(distances, value=drawn(true_distance, distances.uncertainty)),
-        coordinates=replace(coordinates, value=drawn(true_coordinate, coordinates.uncertainty)),
-        lengths=replace(lengths, value=true_lengths(design, truth) + lengths.uncertainty * error),
-        priors=replace(priors, value=drawn(priors.value, priors.uncertainty)),
-    )
+    drawn = []
+    for one in design.observations:
+        true = one.true_values(design, truth, model or design.model)
+        drawn.append(one.given(value=true + one.errors(generator, 1)[0]))
+    return design.observed(*drawn)

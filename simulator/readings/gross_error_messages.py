@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..design.arrays import Design
+from ..design.objects import SLIGHTLY
 from ..estimation.length_ratios import LengthRatio, doubtful_lengths
-from ..experiment.model import SLIGHTLY
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark

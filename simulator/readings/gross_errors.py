@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..design.arrays import Design
+from ..design.observations.lengths import Lengths
+from ..design.observations.priors import Priors
 from ..estimation.consensus import consensus_motion, distances
 from ..estimation.initial import initial_state
 from ..geometry.motions import fit_motion
@@ -88,10 +90,8 @@ def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], li
     """
     compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
     if len(compared) < len(design.readings):
-        of_others = replace(
-            design,
-            readings=design.readings.select(compared),
-            lengths=design.lengths.select(np.zeros(0, np.int64)),
+        of_others = replace(design, readings=design.readings.select(compared)).observed(
+            design.of(Lengths).select(np.zeros(0, np.int64))
         )
         positions, found = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
         back = np.append(compared, -1)
@@ -263,9 +263,9 @@ def _against_readings(
 def _offset_uncertainties(design: Design) -> Array:
     """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
     variance = np.where(design.probes.free, np.inf, 0.0)
-    known = np.flatnonzero(design.priors.probe >= 0)
-    probe, axis = design.priors.probe[known], design.priors.component[known]
-    variance[probe, axis] = design.priors.uncertainty[known] ** 2
+    known = np.flatnonzero(design.of(Priors).probe >= 0)
+    probe, axis = design.of(Priors).probe[known], design.of(Priors).component[known]
+    variance[probe, axis] = design.of(Priors).uncertainty[known] ** 2
     return np.asarray(np.sqrt(variance.sum(axis=1)))
 
 

@@ -13,8 +13,8 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design
-from ..design.observations import Lengths, Readings
+from ..design.arrays import Design, Readings
+from ..design.observations.lengths import Lengths
 from ..estimation.spheres import fit_sphere
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from ..inputs.settings import hint, listing
@@ -314,9 +314,9 @@ def _combine_standards(
     def moved(old: Integers) -> Integers:
         return np.array([place.get(planned[i], -1) for i in old], np.int64)
 
-    ends = moved(design.lengths.first), moved(design.lengths.second)
-    present = ~design.lengths.to_pivot & (ends[0] >= 0) & (ends[1] >= 0)
-    lengths = replace(design.lengths, first=ends[0], second=ends[1]).select(present)
+    ends = moved(design.of(Lengths).first), moved(design.of(Lengths).second)
+    present = ~design.of(Lengths).to_pivot & (ends[0] >= 0) & (ends[1] >= 0)
+    lengths = replace(design.of(Lengths), first=ends[0], second=ends[1]).select(present)
     if len(carried):
         lengths = _with_radii(design, lengths, readings, x, carried, len(plate) + len(first))
     chosen = np.concatenate([plate, first, carried])
@@ -334,7 +334,7 @@ def _combine_standards(
         combined = replace(
             combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]])
         )
-    observed = replace(design, readings=combined, lengths=lengths)
+    observed = replace(design, readings=combined).observed(lengths)
     chosen_marks = tuple(marks[i] for i in chosen) if marks else ()
     return ObservedReadings(
         observed, np.concatenate([x[plate], means, x[carried]]), missing, unplanned, chosen_marks
@@ -353,7 +353,7 @@ def _with_radii(
     """
     from scipy.spatial import cKDTree
 
-    given = design.lengths
+    given = design.of(Lengths)
     planned = np.flatnonzero(given.to_pivot)
     # Of the same gauge all are alike.
     of_gauge = design.balls.artefact[design.readings.ball[given.first[planned]]]

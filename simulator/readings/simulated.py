@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design.arrays import Design, State
-from ..design.layout import lay_out
-from ..design.observations import Readings
+from ..design.arrays import Design, Readings, State
+from ..experiment.layout import lay_out
 from ..experiment.model import Experiment
 from ..inputs.messages import ExperimentError
 from ..machines.protocol import Array, ErrorModel

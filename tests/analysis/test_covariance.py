@@ -14,9 +14,9 @@ import pytest
 from ballplate.results.estimates import EstimatedFunctions, correct, estimated_functions
 from ballplate.results.fit import Fit
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit, moved
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import observe
 from numpy.typing import NDArray

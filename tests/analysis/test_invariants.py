@@ -10,10 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
@@ -115,9 +117,9 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
                 readings, ball=new_ball[readings.ball], position=new_position[readings.position]
             ),
             distances=replace(
-                design.distances,
-                first=new_ball[design.distances.second],
-                second=new_ball[design.distances.first],
+                design.of(CalibratedDistances),
+                first=new_ball[design.of(CalibratedDistances).second],
+                second=new_ball[design.of(CalibratedDistances).first],
             ),
         )
     )
@@ -133,9 +135,13 @@ def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
     scaled = altered(
         design,
         machine={"repeatability": factor * design.machine.repeatability},
-        distances=replace(design.distances, uncertainty=factor * design.distances.uncertainty),
+        distances=replace(
+            design.of(CalibratedDistances),
+            uncertainty=factor * design.of(CalibratedDistances).uncertainty,
+        ),
         coordinates=replace(
-            design.coordinates, uncertainty=factor * design.coordinates.uncertainty
+            design.of(CalibratedCoordinates),
+            uncertainty=factor * design.of(CalibratedCoordinates).uncertainty,
         ),
     )
     by_statement, _, _ = judged(scaled)
@@ -196,7 +202,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         assert solution.status == "converged"
         balls.append(solution.state.balls - truth.balls)
         model.append(solution.state.a - truth.a)
-        freedom = observed.observations - observed.parameter_count
+        freedom = observed.observation_count - observed.parameter_count
         ratio.append(solution.factor.sum_of_squares / freedom)
     # Mean square over all trials, relative to the variance; its spread for normal variables is
     # sqrt(2 / trials).
@@ -209,7 +215,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         assert abs(squared.mean() - 1) < 3 * np.sqrt(2 / trials)
         bias = found.mean(axis=0) / stated * np.sqrt(trials)
         assert np.abs(bias).max() < 5
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     assert abs(np.mean(ratio) - 1) < 4 * np.sqrt(2 / (freedom * trials))
 
 

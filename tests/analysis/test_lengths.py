@@ -22,7 +22,7 @@ from ballplate.error_maps.length_map import (
     length_pairs,
 )
 from ballplate.results.study import predict
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import LengthFunction

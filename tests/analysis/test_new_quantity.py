@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate import quickstart
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 
 from tests.reference import dense
 

@@ -14,9 +14,11 @@ from ballplate.results.fit import Fit
 from ballplate.results.plates import axes_of_plates, plate_coordinates
 from ballplate.results.study import fit
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
 from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
@@ -74,7 +76,7 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
             state.origins + poses[:, :2]
         )[r.position]
         corrected = x @ np.array([[1.0 / (1.0 + gamma), 0.0], [alpha / (1.0 + gamma), 1.0]])
-        d, k = design.distances, design.coordinates
+        d, k = design.of(CalibratedDistances), design.of(CalibratedCoordinates)
         between = balls[d.first] - balls[d.second]
         return np.concatenate(
             [

@@ -13,8 +13,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.uncertainty.scale import (

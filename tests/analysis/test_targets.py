@@ -17,11 +17,11 @@ from ballplate.presentation.formatting import percent
 from ballplate.rank.verdict import Verdict, weak_limit
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
@@ -125,7 +126,8 @@ def test_undetermined_tasks_are_told_as_such() -> None:
     design = altered(
         design,
         distances=replace(
-            design.distances, **{name: v[:0] for name, v in vars(design.distances).items()}
+            design.of(CalibratedDistances),
+            **{name: v[:0] for name, v in vars(design.of(CalibratedDistances)).items()},
         ),
         probes={"offsets": np.zeros_like(design.probes.offsets)},
         tasks={

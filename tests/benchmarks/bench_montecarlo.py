@@ -30,7 +30,8 @@ from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.targets import targets
 from ballplate.montecarlo.trials import TASK, run_trials, sum_of_task
 from ballplate.simulator.design.arrays import State, nominal_state
-from ballplate.simulator.estimation.observations import distance_rows, reading_blocks
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.protocol import Array
 from joblib import Parallel, delayed
@@ -153,10 +154,10 @@ def by_scipy(shared: Reference, k: int) -> State:
             for ball in np.arange(len(design.balls.places))[group.ball].tolist()
         ]
         x[rows] += drawn.moved[k][:, group.rows].T
-    pairs = design.distances
+    pairs = design.of(CalibratedDistances)
     real = shared.truth.state.balls
     apart = np.sqrt(((real[pairs.first] - real[pairs.second]) ** 2).sum(axis=1))
-    observed = replace(design, distances=replace(pairs, value=apart + drawn.distances[k]))
+    observed = design.observed(replace(pairs, value=apart + drawn.errors[0][k]))
     n, d = design.balls.places.shape
     columns = layout.pose_columns
 
@@ -175,7 +176,8 @@ def by_scipy(shared: Reference, k: int) -> State:
     def residuals(v: Array) -> Array:
         state = state_of(v)
         blocks = reading_blocks(observed, state, observed.readings, x)
-        return np.concatenate([blocks.residual.ravel(), distance_rows(observed, state).residual])
+        tied = observed.of(CalibratedDistances).rows(observed, state, x)
+        return np.concatenate([blocks.residual.ravel(), tied.residual])
 
     def jacobian(v: Array) -> Array:
         state, readings = state_of(v), observed.readings
@@ -190,11 +192,11 @@ def by_scipy(shared: Reference, k: int) -> State:
             free = used[:, j] >= 0
             rows[at[free], :, n * d + used[free, j]] = blocks.by_pose[free, :, j]
         rows[:, :, n * d + layout.model.start :] = blocks.by_model
-        tied = distance_rows(observed, state)
+        tied = observed.of(CalibratedDistances).rows(observed, state, x)
         below = np.zeros((len(tied.residual), len(v)))
         for axis in range(d):
-            below[np.arange(len(below)), d * pairs.first + axis] = tied.derivative[:, axis]
-            below[np.arange(len(below)), d * pairs.second + axis] = -tied.derivative[:, axis]
+            below[np.arange(len(below)), d * pairs.first + axis] = tied.by_ball[:, 0, axis]
+            below[np.arange(len(below)), d * pairs.second + axis] = tied.by_ball[:, 1, axis]
         return np.concatenate([rows.reshape(m * d, -1), below])
 
     tight = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}

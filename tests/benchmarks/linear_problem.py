@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.estimation.observations import distance_rows, reading_blocks
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.machines.protocol import Integers
 from numpy.typing import NDArray
 
@@ -64,9 +65,9 @@ def linear_problem(design: Design) -> LinearProblem:
         by_ball=blocks.by_ball,
         by_pose=blocks.by_pose,
         by_model=blocks.by_model,
-        first=design.distances.first,
-        second=design.distances.second,
-        along=distance_rows(design, state).derivative,
+        first=design.of(CalibratedDistances).first,
+        second=design.of(CalibratedDistances).second,
+        along=design.of(CalibratedDistances).rows(design, state, None).by_ball[:, 0],
     )
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.certificate_files import certified_values, read_certificate
@@ -78,7 +78,7 @@ def test_sigma_is_one_with_the_certificate_that_belongs_to_the_readings(tmp_path
     )
     experiment = load(Path(file))[0]
     design = lay_out(experiment)
-    freedom, count = design.observations - design.parameter_count, 14
+    freedom, count = design.observation_count - design.parameter_count, 14
     with_its_own, with_the_files = [], []
     for seed in range(count):
         arguments = [

@@ -11,8 +11,8 @@ from ballplate.results.fit import Fit
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import State
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine

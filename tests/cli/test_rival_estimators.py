@@ -14,8 +14,8 @@ from ballplate.estimators.distances import (
     compare_estimators,
     count_terms,
 )
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.alternative_estimators import AlternativeName
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.simulator.design.arrays import locations, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 

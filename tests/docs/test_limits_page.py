@@ -16,8 +16,9 @@ from ballplate.gross_errors import leftover
 from ballplate.montecarlo import trials
 from ballplate.planning import criteria, information
 from ballplate.planning.requirements import root_search as search
+from ballplate.simulator.design import lookup
+from ballplate.simulator.design.observations import distances
 from ballplate.simulator.experiment import (
-    calibrations,
     checks,
     machine_sections,
     pool_groups,
@@ -45,10 +46,10 @@ LIMITS = {
     "columns of a table": (tables.MOST_COLUMNS,),
     "errors that are listed": (messages.MOST_MESSAGES,),
     "files that a sweep": (bundle.MOST_BYTES // 10**6,),
-    "readings, repeats": (references.MOST_READINGS,),
+    "readings, repeats": (lookup.MOST_READINGS,),
     "balls of an artefact": (artefacts.MOST_BALLS, references.MOST_BALLS_OF_ALL),
     "parameters besides": (checks.MOST_SHARED,),
-    "balls that calibrated": (calibrations.MOST_TIED_BALLS,),
+    "balls that calibrated": (distances.MOST_TIED_BALLS,),
     "lengths of standards": (checks.MOST_LENGTHS,),
     "lengths of one standard": (checks.MOST_JOINT_LENGTHS,),
     "directions of a gauge": (directions.MOST_DIRECTIONS,),

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations import Lengths, Readings
+from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.functions import Displacements, displacements, linear_functions
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.observations import expected_readings
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.uncertainty.pairs import all_pairs
 from ballplate.uncertainty.quantities import QUANTITIES, evaluation_points
@@ -113,12 +114,12 @@ def planar_distances() -> Design:
     """
     balls = grid(4) + np.array([0.0, 0.0, 0.02]) * (np.arange(16) % 3)[:, None]
     design = plate_design(balls, six_positions(), neighbours(grid(4)), coordinates=(0, 3, 12))
-    flat = np.full(len(design.distances), 2)
+    flat = np.full(len(design.of(CalibratedDistances)), 2)
     flat[::3] = 3
-    first, second = design.distances.first, design.distances.second
+    first, second = design.of(CalibratedDistances).first, design.of(CalibratedDistances).second
     between = (balls[first] - balls[second]) * (np.arange(3) < flat[:, None])
     value = np.sqrt((between**2).sum(axis=1))
-    return replace(design, distances=replace(design.distances, dimensions=flat, value=value))
+    return design.observed(replace(design.of(CalibratedDistances), dimensions=flat, value=value))
 
 
 def with_length_standard(design: Design, projected: bool) -> Design:

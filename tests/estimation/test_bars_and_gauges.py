@@ -12,12 +12,12 @@ import pytest
 import yaml
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.length_equations import length_estimate
-from ballplate.simulator.estimation.observations import length_shared_rows
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.estimation.spheres import fit_sphere
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
@@ -111,11 +111,14 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
 
     def residual(step: np.ndarray) -> np.ndarray:
         still = np.zeros_like(design.balls.places)
-        return length_shared_rows(design, layout, moved(state, layout, step, still), x)[0]
+        there = moved(state, layout, step, still)
+        return design.of(Lengths).rows(design, there, x).residual
 
     state = replace(nominal_state(design), a=1e-4 * generator.standard_normal(6))
     expected = central_difference(residual, np.zeros(len(layout)), 1e-6)
-    assert_derivative(length_shared_rows(design, layout, state, x)[1], expected, 1e-6)
+    found = design.of(Lengths).rows(design, state, x).by_shared
+    assert found is not None
+    assert_derivative(found, expected, 1e-6)
 
 
 def test_one_bar_along_one_axis_has_the_uncertainty_of_the_closed_form(tmp_path: Path) -> None:
@@ -279,7 +282,8 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
         write_readings(stream, design, readings, x)
     observed = read_readings(tmp_path / "r.csv", design)
     assert (
-        len(observed.design.lengths) == 120 and len(np.unique(observed.design.lengths.first)) == 120
+        len(observed.design.of(Lengths)) == 120
+        and len(np.unique(observed.design.of(Lengths).first)) == 120
     )
 
 
@@ -325,7 +329,7 @@ def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path
     metric[np.triu_indices(3)] += found.factors
     metric = np.triu(metric) + np.triu(metric, 1).T
     seen = x + design.probes.offsets[design.readings.probe]
-    bar = seen[design.lengths.first[0]] - seen[design.lengths.second[0]]
+    bar = seen[design.of(Lengths).first[0]] - seen[design.of(Lengths).second[0]]
     # Nothing else depends on it, so that its own equation holds.
     assert found.lengths[0] ** 2 == pytest.approx(bar @ metric @ bar, rel=1e-14)
     assert abs(found.lengths[0] - np.linalg.norm(bar)) > 1e-6

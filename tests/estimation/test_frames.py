@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.observations import reading_blocks
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 
 LAYOUTS = {
@@ -67,8 +68,11 @@ def dense(design: Design) -> np.ndarray:
         rows[i, :, 3 * ball : 3 * ball + 3] = blocks.by_ball[i]
         rows[i, :, 3 * n + 6 * position : 3 * n + 6 * position + 6] = blocks.by_pose[i]
     rows[:, :, 3 * n + 6 * k :] = blocks.by_model
-    known = np.zeros((len(design.coordinates), rows.shape[2]))
-    known[np.arange(len(known)), 3 * design.coordinates.ball + design.coordinates.axis] = 1e7
+    known = np.zeros((len(design.of(CalibratedCoordinates)), rows.shape[2]))
+    known[
+        np.arange(len(known)),
+        3 * design.of(CalibratedCoordinates).ball + design.of(CalibratedCoordinates).axis,
+    ] = 1e7
     return np.concatenate([rows.reshape(-1, rows.shape[2]), known])
 
 

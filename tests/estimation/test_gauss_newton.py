@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -48,18 +50,22 @@ def exactly_calibrated(design: Design, truth: State) -> Design:
     """The design with the certificate of the true plate."""
     none = np.random.default_rng(0)
     certified = noisy_certificate(
-        replace(
-            design,
-            distances=replace(design.distances, uncertainty=0 * design.distances.uncertainty),
-            coordinates=replace(design.coordinates, uncertainty=0 * design.coordinates.uncertainty),
+        design.observed(
+            replace(
+                design.of(CalibratedDistances),
+                uncertainty=0 * design.of(CalibratedDistances).uncertainty,
+            ),
+            replace(
+                design.of(CalibratedCoordinates),
+                uncertainty=0 * design.of(CalibratedCoordinates).uncertainty,
+            ),
         ),
         truth,
         none,
     )
-    return replace(
-        design,
-        distances=replace(design.distances, value=certified.distances.value),
-        coordinates=replace(design.coordinates, value=certified.coordinates.value),
+    return design.observed(
+        replace(design.of(CalibratedDistances), value=certified.of(CalibratedDistances).value),
+        replace(design.of(CalibratedCoordinates), value=certified.of(CalibratedCoordinates).value),
     )
 
 

@@ -16,8 +16,9 @@ import pytest
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
@@ -26,8 +27,7 @@ from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
 from ballplate.simulator.estimation.length_equations import length_estimate
-from ballplate.simulator.estimation.observations import expected_readings
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -111,7 +111,7 @@ def test_a_larger_plate_is_that_of_the_full_covariance(pairs: str, tmp_path: Pat
 
 def assert_as_dense(design: Design) -> None:
     assert compare(design, nominal_state(design), dense.planned(design, 3, 2)) == 0
-    assert len(design.length_whitening) == np.linalg.matrix_rank(
+    assert len(design.once(length_whitening)) == np.linalg.matrix_rank(
         dense.length_covariance(design), 1e-21
     )
 
@@ -143,11 +143,11 @@ def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) 
     )
     scatter = random.standard_normal((len(design.readings), 3))
     x = expected_readings(design, nominal, design.readings) + 1e-6 * scatter
-    error = random.standard_normal(len(np.unique(design.lengths.certificate)))[
-        design.lengths.certificate
+    error = random.standard_normal(len(np.unique(design.of(Lengths).certificate)))[
+        design.of(Lengths).certificate
     ]
-    value = design.lengths.value + design.lengths.uncertainty * error
-    design = replace(design, lengths=replace(design.lengths, value=value))
+    value = design.of(Lengths).value + design.of(Lengths).uncertainty * error
+    design = design.observed(replace(design.of(Lengths), value=value))
     problem = dense.planned(design, 3, 2)
     a = in_reference_basis(problem, design, state.a)
     problem = replace(
@@ -210,7 +210,7 @@ CASES_AND_PLANE = CASES | {"plane": in_a_plane}
 def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -> None:
     """W'W is the pseudo-inverse of the covariance, W by itself and its transpose."""
     design = lay_out(CASES_AND_PLANE[name](tmp_path))
-    white, m = design.length_whitening, len(design.lengths)
+    white, m = design.once(length_whitening), len(design.of(Lengths))
     covariance = 1e12 * dense.length_covariance(design)
     twice = 1e-12 * white.pulled(white.whitened(np.eye(m)))
     expected = np.linalg.pinv(covariance, rcond=1e-12, hermitian=True)
@@ -308,11 +308,11 @@ def physical(
     truth = replace(truth, balls=balls)
     _, exact = exact_readings(on_truth, truth)
     x = exact + design.machine.repeatability * generator.standard_normal(exact.shape)
-    given = design.lengths
+    given = design.of(Lengths)
     ends = [balls[design.readings.ball[k]] for k in (given.first, given.second)]
     error = generator.standard_normal(int(given.certificate.max()) + 1)[given.certificate]
     value = np.linalg.norm(ends[0] - ends[1], axis=1) + given.uncertainty * error
-    return replace(design, lengths=replace(given, value=value)), x, on_truth, truth
+    return design.observed(replace(given, value=value)), x, on_truth, truth
 
 
 @pytest.mark.parametrize(
@@ -346,7 +346,7 @@ def test_fits_of_readings_drawn_by_hand(
     total = float(np.einsum("ri,ij,rj->", errors, np.linalg.inv(stated), errors))
     expected = 6 * count
     assert abs(total - expected) < 4 * np.sqrt(2 * expected)
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     assert abs(np.mean(squares) - freedom) < 4 * np.sqrt(2 * freedom / count)
 
 
@@ -387,7 +387,7 @@ def weighted(design: Design, x: Real) -> tuple[Real, Real]:
     uncertainties.
     """
     given, inverse = (
-        design.lengths,
+        design.of(Lengths),
         np.linalg.pinv(1e12 * dense.length_covariance(design), 1e-12, hermitian=True),
     )
 
@@ -416,7 +416,7 @@ def test_length_equations_of_shared_balls(
     found = length_estimate(design, x)
     equations = independent * len(POSES)
     assert (found.equations, found.degrees_of_freedom) == (equations, equations - 6)
-    given = design.lengths
+    given = design.of(Lengths)
     seen = x + design.probes.offsets[design.readings.probe]
     difference = seen[given.first] - seen[given.second]
     rows = np.stack(
@@ -467,7 +467,7 @@ def test_lengths_that_follow_from_others_tell_nothing_of_the_machine(tmp_path: P
 
 def test_true_standards_differ_from_their_certificates_as_stated(tmp_path: Path) -> None:
     design = lay_out(experiment(tmp_path, bar(4), consecutive(4)))
-    given = design.lengths
+    given = design.of(Lengths)
     generator, off = np.random.default_rng(6), []
     for _ in range(400):
         balls = true_artefacts(design, generator)
@@ -487,5 +487,5 @@ def test_lengths_without_shared_balls_are_whitened_one_by_one(tmp_path: Path) ->
             {"pairs": [["b0", "b1"], ["b2", "b3"]], "standard_uncertainty": "1 um"},
         )
     )
-    assert isinstance(design.lengths, Lengths) and not design.length_whitening.joint
-    assert len(design.length_whitening) == len(design.lengths)
+    assert isinstance(design.of(Lengths), Lengths) and not design.once(length_whitening).joint
+    assert len(design.once(length_whitening)) == len(design.of(Lengths))

@@ -10,7 +10,8 @@ import pytest
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.generate import noisy_certificate
@@ -74,7 +75,7 @@ def test_ignoring_the_repeatability_counts_each_position_anew(tmp_path: Path) ->
 
 def test_a_certificate_has_one_error(tmp_path: Path) -> None:
     design = lay_out(with_bar(tmp_path, 4, "20 um"))
-    assert design.lengths.certificate.tolist() == [0, 0, 0, 0]
+    assert design.of(Lengths).certificate.tolist() == [0, 0, 0, 0]
     drawn = noisy_certificate(design, nominal_state(design), np.random.default_rng(1)).lengths.value
     assert len(set(drawn.tolist())) == 1 and drawn[0] != 0.4
 

@@ -6,17 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings, reading_blocks
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
-from ballplate.simulator.estimation.observations import (
-    coordinate_rows,
-    distance_rows,
-    expected_readings,
-    length_rows,
-    reading_blocks,
-)
-from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 
@@ -35,8 +31,8 @@ def design(request: pytest.FixtureRequest) -> Design:
     )
     full = request.param == "full"
     model = kinematic_model(ARRANGEMENTS["FB1"], 4, 3, (0, 0, 0), (1, 1, 1), full)
-    return replace(
-        built, model=model, distances=replace(built.distances, dimensions=np.array([2, 3, 2, 3]))
+    return replace(built, model=model).observed(
+        replace(built.of(CalibratedDistances), dimensions=np.array([2, 3, 2, 3]))
     )
 
 
@@ -77,32 +73,28 @@ def test_readings(design: Design) -> None:
     assert np.abs(by_ball).sum() == pytest.approx(np.abs(own).sum())
 
 
-@pytest.mark.parametrize("rows", [distance_rows, coordinate_rows])
-def test_calibration(design: Design, rows) -> None:  # type: ignore[no-untyped-def]
-    state = perturbed(design)
-    found = rows(design, state)
-    given = design.distances if rows is distance_rows else design.coordinates
-    expected = central_difference(
-        lambda b: rows(design, replace(state, balls=b.reshape(design.balls.places.shape))).residual,
-        state.balls.ravel(),
-        STEP,
-    ).reshape(len(given), *design.balls.places.shape)
-    dense = np.zeros_like(expected)
-    rows_at = np.arange(len(given))
-    if rows is distance_rows:
-        dense[rows_at, given.first] = found.derivative
-        dense[rows_at, given.second] = -found.derivative
-    else:
-        dense[rows_at, given.ball] = found.derivative
-    assert_derivative(dense, expected, RELATIVE)
+@pytest.mark.parametrize("kind", [CalibratedDistances, CalibratedCoordinates])
+def test_calibration(design: Design, kind: type[Observations]) -> None:
+    state, given = perturbed(design), design.of(kind)
+    found = given.rows(design, state, None)
+
+    def residual(balls: np.ndarray) -> np.ndarray:
+        there = replace(state, balls=balls.reshape(design.balls.places.shape))
+        return given.rows(design, there, None).residual
+
+    expected = central_difference(residual, state.balls.ravel(), STEP)
+    dense = np.zeros((len(given), *design.balls.places.shape))
+    for j in range(given.balls.shape[1]):
+        dense[np.arange(len(given)), given.balls[:, j]] += found.by_ball[:, j]
+    assert found.by_shared is None
+    assert_derivative(dense, expected.reshape(dense.shape), RELATIVE)
 
 
 def test_lengths(design: Design) -> None:
     first, second = np.array([0, 0, 4]), np.array([3, 3, 9])
     direction = np.array([[1.0, 0, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
-    design = replace(
-        design,
-        lengths=Lengths(
+    design = design.observed(
+        Lengths(
             first,
             second,
             np.array([0.7, 0.7, 0.4]),
@@ -111,12 +103,14 @@ def test_lengths(design: Design) -> None:
             direction,
             np.array([True, False, True]),
             np.array([0, 1, 0]),
-        ),
+        )
     )
     state = perturbed(design)
     x = expected_readings(design, nominal_state(design), design.readings)
-    _, derivative = length_rows(design, state, x)
+    given = design.of(Lengths)
+    found = given.rows(design, state, x).by_shared
+    assert found is not None
     expected = central_difference(
-        lambda a: length_rows(design, replace(state, a=a), x)[0], state.a, STEP
+        lambda a: given.rows(design, replace(state, a=a), x).residual, state.a, STEP
     )
-    assert_derivative(derivative, expected, RELATIVE)
+    assert_derivative(found[:, shared_layout(design).model], expected, RELATIVE)

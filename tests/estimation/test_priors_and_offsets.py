@@ -12,18 +12,13 @@ import numpy as np
 import pytest
 from ballplate.results.study import check, fit, predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit, moved
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.observations import (
-    coordinate_rows,
-    distance_rows,
-    length_rows,
-    prior_rows,
-    reading_blocks,
-)
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
@@ -93,10 +88,7 @@ def all_residuals(design: Design, state: State, x: np.ndarray) -> np.ndarray:
     return np.concatenate(
         [
             blocks.residual.ravel(),
-            distance_rows(design, state).residual,
-            coordinate_rows(design, state).residual,
-            length_rows(design, state, x)[0],
-            prior_rows(design, shared_layout(design), state)[0],
+            *(one.rows(design, state, x).residual for one in design.observations),
         ]
     )
 
@@ -282,10 +274,8 @@ def test_offsets_come_back(written: Callable[[str], Path], tmp_path: Path) -> No
         probes=design.probes.offsets + shift,
     )
     # The certificate of probe "left" must be right for exact data to fit exactly.
-    priors = design.priors
-    design = replace(
-        design, priors=replace(priors, value=truth.probes[priors.probe, priors.component])
-    )
+    priors = design.of(Priors)
+    design = design.observed(replace(priors, value=truth.probes[priors.probe, priors.component]))
     readings, x = exact_readings(design, truth)
     with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
         write_readings(stream, design, readings, x)
@@ -303,7 +293,7 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
     """S^2 has as many degrees of freedom as stated, priors and offsets included."""
     experiment = load(written(SPHERE + PRIORS.replace("3 mrad, standard", "10 urad, standard")))[0]
     drawn = lay_out(experiment)
-    freedom = drawn.observations - drawn.parameter_count
+    freedom = drawn.observation_count - drawn.parameter_count
     truth = replace(
         nominal_state(drawn),
         a=true_parameters(experiment.true_machine, drawn.model),

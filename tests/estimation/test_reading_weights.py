@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.observations import reading_weights
+from ballplate.simulator.design.observations.readings import reading_weights
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings

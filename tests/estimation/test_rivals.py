@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
@@ -76,10 +77,10 @@ def objective(
     known = {
         tuple(sorted((int(i), int(j)))): (value, u)
         for i, j, value, u in zip(
-            design.distances.first,
-            design.distances.second,
-            design.distances.value,
-            design.distances.uncertainty,
+            design.of(CalibratedDistances).first,
+            design.of(CalibratedDistances).second,
+            design.of(CalibratedDistances).value,
+            design.of(CalibratedDistances).uncertainty,
             strict=True,
         )
     }
@@ -143,8 +144,10 @@ def test_the_objective_is_the_one_stated_and_at_its_minimum(
 @pytest.mark.parametrize("estimator", get_args(AlternativeName))
 def test_without_a_calibrated_distance_the_scale_is_open(estimator: AlternativeName) -> None:
     design = small()
-    design = replace(
-        design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
+    design = design.observed(
+        type(design.of(CalibratedDistances))(
+            *(v[:0] for v in vars(design.of(CalibratedDistances)).values())
+        )
     )
     truth = replace(
         truth_of(design), a=np.zeros(len(design.model.parameters)), balls=design.balls.places

@@ -11,11 +11,9 @@ import mpmath
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import (
-    CalibratedCoordinates,
-    CalibratedDistances,
-    Priors,
-)
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.uncertainty.summaries import point_pairs
 from hypothesis import given, settings
@@ -89,41 +87,38 @@ def with_known(design: Design, known: Known) -> Design:
         return replace(design, readings=replace(readings, uncertainty=uncertainty))
     if known.kind == "distance":
         first, second = draw.choice(9, 2, replace=False).tolist()
-        old = design.distances
+        old = design.of(CalibratedDistances)
         value = np.sqrt(((design.balls.places[first] - design.balls.places[second]) ** 2).sum())
-        return replace(
-            design,
-            distances=CalibratedDistances(
+        return design.observed(
+            CalibratedDistances(
                 np.append(old.first, first),
                 np.append(old.second, second),
                 np.append(old.dimensions, 3),
                 np.append(old.value, value),
                 np.append(old.uncertainty, u),
-            ),
+            )
         )
     ball, axis = int(draw.integers(0, 9)), int(draw.integers(0, 3))
-    given = design.coordinates
-    return replace(
-        design,
-        coordinates=CalibratedCoordinates(
+    given = design.of(CalibratedCoordinates)
+    return design.observed(
+        CalibratedCoordinates(
             np.append(given.ball, ball),
             np.append(given.axis, axis),
             np.append(given.value, design.balls.places[ball, axis]),
             np.append(given.uncertainty, u),
-        ),
+        )
     )
 
 
 def _with_prior(
     design: Design, position: int, component: int, row: Real, uncertainty: float
 ) -> Design:
-    old = design.priors
+    old = design.of(Priors)
     value = (
         design.positions.origins[position, component] if position >= 0 and component < 3 else 0.0
     )
-    return replace(
-        design,
-        priors=Priors(
+    return design.observed(
+        Priors(
             (*old.names, f"prior {len(old)}"),
             np.append(old.position, position),
             np.append(old.probe, -1),
@@ -131,7 +126,7 @@ def _with_prior(
             np.concatenate([old.by_model, row[None]]),
             np.append(old.value, value),
             np.append(old.uncertainty, uncertainty),
-        ),
+        )
     )
 
 
@@ -140,17 +135,22 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     alike = altered(
         design,
         machine={"repeatability": np.ones(3)},
-        distances=replace(design.distances, uncertainty=np.ones(len(design.distances))),
-        coordinates=replace(design.coordinates, uncertainty=np.ones(len(design.coordinates))),
+        distances=replace(
+            design.of(CalibratedDistances), uncertainty=np.ones(len(design.of(CalibratedDistances)))
+        ),
+        coordinates=replace(
+            design.of(CalibratedCoordinates),
+            uncertainty=np.ones(len(design.of(CalibratedCoordinates))),
+        ),
     )
     problem = dense.planned(alike, COEFFICIENTS, COEFFICIENTS)
     rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     uncertainty = design.readings.uncertainty
     if uncertainty is None:
         uncertainty = np.tile(design.machine.repeatability, (len(design.readings), 1))
-    priors = np.zeros((len(design.priors), problem.parameters))
+    priors = np.zeros((len(design.of(Priors)), problem.parameters))
     start = problem.parameters - len(problem.a)
-    known = design.priors
+    known = design.of(Priors)
     # The other program's coefficients are others of the same polynomials.
     ours, theirs, at = design.model.reported().matrix, np.zeros((0, len(problem.a))), 0
     for function in problem.functions:
@@ -165,8 +165,8 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
             priors[k, 3 * len(problem.plate_balls) + problem.free_poses.index(pose)] = 1.0
     stated = [
         uncertainty.ravel(),
-        design.distances.uncertainty,
-        design.coordinates.uncertainty,
+        design.of(CalibratedDistances).uncertainty,
+        design.of(CalibratedCoordinates).uncertainty,
         known.uncertainty,
     ]
     return problem, np.concatenate([rows, priors]), np.concatenate(stated)

@@ -11,12 +11,12 @@ from sys import modules
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import SMALL, eliminate
-from ballplate.simulator.estimation.parameters import shared_layout
-from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.geometry.artefacts import BallLayout, coincident_balls
-from ballplate.simulator.inputs.messages import MOST_MESSAGES
+from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError
 from ballplate.simulator.inputs.yamltree import parse_tree, read_text
 from ballplate.simulator.readings.generate import true_artefacts
 
@@ -356,7 +356,7 @@ def test_many_distances_are_absorbed_some_at_a_time(
     state = nominal_state(design)
     assert SMALL < 3 * 196
     some = eliminate(*arguments, state)
-    monkeypatch.setattr("ballplate.simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.TIED_AT_ONCE", 50)
     few = eliminate(*arguments, state)
     monkeypatch.setattr("ballplate.simulator.estimation.elimination.SMALL", 10_000)
     plain = eliminate(*arguments, state)

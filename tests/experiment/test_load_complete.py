@@ -5,12 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.simulator.experiment import (
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    load,
-)
+from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.inputs.yamltree import Mapping, read_tree, walk

@@ -4,7 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-from ballplate.simulator.experiment import ExperimentError, Message, load
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError, Message
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

@@ -10,11 +10,12 @@ from time import process_time
 import numpy as np
 import pytest
 from ballplate.results.study import check
-from ballplate.simulator.experiment import Experiment, ExperimentError, Position, load
 from ballplate.simulator.experiment.checks import excess
-from ballplate.simulator.experiment.model import AtMost, Candidate, Pool
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import length_text, parse_length
 from hypothesis import given
 from hypothesis import strategies as st

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.results.study import check
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines import custom
 
 # A machine of straight axes in space: three scales and three angles.

@@ -27,12 +27,9 @@ from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, ta
 from ballplate.montecarlo.trials import run_trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.estimation.observations import (
-    distance_rows,
-    expected_readings,
-    reading_blocks,
-)
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.readings import expected_readings, reading_blocks
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 
@@ -63,6 +60,14 @@ def test_intervals_cover_what_they_say() -> None:
             assert abs(share.value - 0.95) < 4 * share.error, symbol
         assert abs(one.spread.value - 1.0) < 4 * one.spread.error, symbol
         assert one.bias.value < 0.1 and one.flags == (), symbol
+
+
+@pytest.mark.parametrize("file", ["certified-coordinates", "ball-bar"])
+def test_certificates_that_differ_from_the_drawing_leave_the_spread(file: str) -> None:
+    found = trials(shipped(f"certified/{file}.yaml"), 1024).outcome
+    assert found is not None and found.misfit.noise_free < 1e-9
+    for symbol, one in found.comparisons.items():
+        assert abs(one.spread.value - 1.0) < 4 * one.spread.error, symbol
 
 
 def test_residuals_are_those_of_a_right_model() -> None:
@@ -270,10 +275,15 @@ def dense_columns(design: Design) -> np.ndarray:
         rows[i, :, d * ball : d * ball + d] = blocks.by_ball[i]
         rows[i][:, design.balls.places.size + place[place >= 0]] = blocks.by_pose[i][:, place >= 0]
         rows[i, :, design.balls.places.size + layout.model.start :] = blocks.by_model[i]
-    tied = distance_rows(design, state)
+    tied = design.of(CalibratedDistances).rows(design, state, None)
     below = np.zeros((len(tied.residual), rows.shape[2]))
     for row, (one, other, along) in enumerate(
-        zip(design.distances.first, design.distances.second, tied.derivative, strict=True)
+        zip(
+            design.of(CalibratedDistances).first,
+            design.of(CalibratedDistances).second,
+            tied.by_ball[:, 0],
+            strict=True,
+        )
     ):
         below[row, d * one : d * one + d] = along
         below[row, d * other : d * other + d] = -along

@@ -9,10 +9,13 @@ import pytest
 from ballplate.montecarlo.expansion import Direct, Expansion
 from ballplate.montecarlo.reference import RankDeficientError, Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
-from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations import CalibratedCoordinates, Lengths, Priors, Readings
+from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.objects import Machine, Volume
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
-from ballplate.simulator.experiment.model import Machine, Volume
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
 
@@ -170,7 +173,7 @@ def plane() -> Design:
             "held": np.zeros((3, 3), bool),
         },
         readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
-        distances=small(pairs=False).distances,
+        distances=small(pairs=False).of(CalibratedDistances),
         coordinates=CalibratedCoordinates(
             certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)
         ),
@@ -200,18 +203,20 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
             )
             row = own[design.readings.ball[own] == ball][turn]
             x[row] += drawn.moved[k, :, group.rows.start + place]
-    given = design.lengths
+    given = design.of(Lengths)
     for side, ends in enumerate((given.first, given.second)):
         x[ends] += drawn.ends[side][k].T
-    pairs, known = design.distances, design.coordinates
+    errors = {
+        one.word: of_one[k] for one, of_one in zip(design.observations, drawn.errors, strict=True)
+    }
+    pairs, known = design.of(CalibratedDistances), design.of(CalibratedCoordinates)
     counts = np.arange(design.dimension) < pairs.dimensions[:, None]
     apart = (real.balls[pairs.first] - real.balls[pairs.second]) * counts
-    observed = replace(
-        design,
-        distances=replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + drawn.distances[k]),
-        coordinates=replace(known, value=real.balls[known.ball, known.axis] + drawn.coordinates[k]),
-        lengths=replace(given, value=given.value + drawn.lengths[k]),
-        priors=replace(design.priors, value=design.priors.value + drawn.priors[k]),
+    observed = design.observed(
+        replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + errors["distance"]),
+        replace(known, value=real.balls[known.ball, known.axis] + errors["coordinate"]),
+        replace(given, value=given.value + errors["length"]),
+        replace(design.of(Priors), value=design.of(Priors).value + errors["prior"]),
     )
     solution = gauss_newton(observed, x, start)
     return solution.state, solution.factor.sum_of_squares
@@ -297,7 +302,7 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
 
 
 def test_a_deficient_design_has_no_replicates() -> None:
-    design = replace(small(), distances=small(pairs=False).distances)
+    design = small().observed(small(pairs=False).of(CalibratedDistances))
     design = altered(design, probes={"offsets": np.zeros_like(design.probes.offsets)})
     with pytest.raises(RankDeficientError, match="deficient"):
         reference(design, truth(design))

@@ -20,7 +20,7 @@ from ballplate.planning.done import SetUp, done_candidates
 from ballplate.planning.offer import offer
 from ballplate.planning.selection import Campaign
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.readings.generate import exact_readings

@@ -19,8 +19,8 @@ from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.planning.selection import Campaign
 from ballplate.results.study import planned_uncertainty, predict
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen

@@ -21,7 +21,7 @@ from ballplate.planning.repair.repair_search import Repair, Repairs, repairs
 from ballplate.planning.repair.repair_tables import repair_lines
 from ballplate.planning.repair.screening import rank_of, seen_by
 from ballplate.results.study import check
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import (
     AtMost,

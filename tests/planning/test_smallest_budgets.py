@@ -17,7 +17,7 @@ from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
 from ballplate.planning.search import LARGE, SMALL_POOL, Losses, SelectionProblem, full_root, value
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen

@@ -24,7 +24,7 @@ import pytest
 from ballplate.estimators.reversal_fits import ReversalFit, fit_reversal
 from ballplate.results.fit import Fit
 from ballplate.results.study import fit
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.readings.reading_files import read_readings
@@ -266,7 +266,7 @@ def test_no_degrees_of_freedom_explain_reeves_sigma_of_the_real_readings() -> No
     it 16.8.
     """
     found = fitted("real", "without scale")
-    freedom = found.design.observations - found.design.parameter_count
+    freedom = found.design.observation_count - found.design.parameter_count
     assert freedom == 22 and {e.name: 1e6 * e.value for e in found.estimates}[
         "alpha"
     ] == pytest.approx(-0.66, abs=0.005)

@@ -15,8 +15,9 @@ from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.directions import directions
@@ -136,7 +137,7 @@ def test_the_joint_length_equations_are_unbiased_over_a_thousand_campaigns(
     )
     # Student's distribution for the few degrees of freedom that the scatter is estimated with;
     # squareness only, as the certificate's error is one of scale.
-    freedom = len(design.lengths) - 6 - 3 * len(design.gauge_positions)
+    freedom = len(design.of(Lengths)) - 6 - 3 * len(design.gauge_positions)
     z = (errors / stated)[:, 3:]
     student = np.sqrt(freedom / (freedom - 2))
     assert np.abs(z.std(axis=0, ddof=1) / student - 1.0).max() < (0.2 if freedom < 10 else 0.1)
@@ -165,7 +166,7 @@ def test_the_bias_of_two_steps_is_what_the_centre_takes_up() -> None:
     design, truth = true_experiment(shipped("bryan-gauge", "radius known"))
     errors, _ = campaigns(design, truth, "sphere-then-metric", COUNT)
     scatter = errors.std(axis=0, ddof=1) / np.sqrt(COUNT)
-    kept = as_parameters(kept_by_two_steps(design.lengths.direction))
+    kept = as_parameters(kept_by_two_steps(design.of(Lengths).direction))
     foretold = kept @ truth.state.a - truth.state.a
     assert np.abs((errors.mean(axis=0) - foretold) / scatter).max() < 4.0
     # Of the squareness of Z less than a third is left with elevations of 5 to 65 deg; C0Y is not

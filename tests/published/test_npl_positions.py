@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from ballplate.reproduction.published import npl
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, kinematic_model

@@ -235,6 +235,11 @@ def corrected(problem: Problem, x: Real, a: Values, p: Real) -> Values:
     return x + machine_error(problem.functions, volume.lower, volume.upper, x, a, p)
 
 
+def known(design: Any, word: str) -> Any:
+    """The arrays of one kind of observations, by the word for it."""
+    return next(one for one in design.observations if one.word == word)
+
+
 def length(difference: Values) -> Values:
     """Euclidean length of the rows, without the conjugation that would spoil complex steps."""
     return np.sqrt((difference**2).sum(axis=-1))
@@ -250,14 +255,14 @@ def residuals(problem: Problem, step: Values) -> Values:
     of_plates = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
     # Repeats stand as rows of their own.
     rows = list(np.repeat(misfit[of_plates], readings.repeats[of_plates], axis=0).ravel())
-    given = design.distances
+    given = known(design, "distance")
     for i in range(len(given.first)):
         between = (balls[given.first[i]] - balls[given.second[i]])[: given.dimensions[i]]
         rows.append((length(between) - given.value[i]) / given.uncertainty[i])
-    given = design.coordinates
+    given = known(design, "coordinate")
     for i in range(len(given.ball)):
         rows.append((balls[given.ball[i], given.axis[i]] - given.value[i]) / given.uncertainty[i])
-    given = design.lengths
+    given = known(design, "length")
     if len(given.first):
         rows.extend(problem.length_root @ length_errors(problem, points))
     return np.array(rows)
@@ -265,7 +270,7 @@ def residuals(problem: Problem, step: Values) -> Values:
 
 def length_errors(problem: Problem, points: Values) -> Values:
     """Lengths of standards between corrected points, less those certified."""
-    given = problem.design.lengths
+    given = known(problem.design, "length")
     errors: list[Any] = []
     for i in range(len(given.first)):
         between = points[given.first[i]] - points[given.second[i]]
@@ -280,7 +285,7 @@ def length_covariance(design: Any) -> Real:
 
     A length whose repeatability is ignored has nothing in common with any other.
     """
-    given = design.lengths
+    given = known(design, "length")
     m, d = len(given.first), len(design.machine.repeatability)
     noise = np.zeros((m, d * len(design.readings)))
     for i in range(m):

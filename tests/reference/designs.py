@@ -9,23 +9,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.arrays import Design, Observations, Readings
 from ballplate.simulator.design.objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
+    Machine,
     Positions,
     Probes,
     Tasks,
     UnknownLengths,
+    Volume,
 )
-from ballplate.simulator.design.observations import (
-    CalibratedCoordinates,
-    CalibratedDistances,
-    Lengths,
-    Readings,
-)
-from ballplate.simulator.experiment.model import Machine, Volume
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import no_priors
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from numpy.typing import NDArray
@@ -180,17 +179,20 @@ def plate_design(
             held,
         ),
         readings=Readings(ball, position, probe, np.ones(len(ball), np.int64)),
-        distances=CalibratedDistances(
-            first,
-            second,
-            np.full(len(first), 3),
-            np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
-            np.full(len(first), SIGMA),
+        observations=(
+            CalibratedDistances(
+                first,
+                second,
+                np.full(len(first), 3),
+                np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
+                np.full(len(first), SIGMA),
+            ),
+            CalibratedCoordinates(
+                certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
+            ),
+            no_lengths(),
+            no_priors(),
         ),
-        coordinates=CalibratedCoordinates(
-            certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
-        ),
-        lengths=no_lengths(),
         unknown_lengths=UnknownLengths((), np.zeros(0, np.int64), np.zeros(0)),
         evaluation=EvaluationPoints(np.zeros((0, 3)), 0),
         tasks=Tasks((), np.zeros((0, 2, 3)), np.zeros((0, 2), np.int64), ()),
@@ -199,15 +201,15 @@ def plate_design(
 
 def altered(design: Design, **changes: Any) -> Design:
     """The design with other fields, or parts of it with the other fields that a dictionary
-    states.
+    states; observations take the place of those of their kind.
     """
-    return replace(
-        design,
-        **{
-            name: replace(getattr(design, name), **other) if isinstance(other, dict) else other
-            for name, other in changes.items()
-        },
-    )
+    observed = [one for one in changes.values() if isinstance(one, Observations)]
+    fields = {
+        name: replace(getattr(design, name), **other) if isinstance(other, dict) else other
+        for name, other in changes.items()
+        if not isinstance(other, Observations)
+    }
+    return replace(design, **fields).observed(*observed)
 
 
 def no_lengths() -> Lengths:

@@ -19,10 +19,10 @@ from ballplate.gross_errors.cause_search import FAMILY, Search, diagnosis
 from ballplate.gross_errors.events import Cause, cause
 from ballplate.gross_errors.power import noncentrality
 from ballplate.gross_errors.suspects import Diagnosis
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
@@ -58,7 +58,7 @@ class World:
         generator = np.random.default_rng(0)
         plain = self.drawn(self.machine(1), generator)
         solution = estimate(plain.design, plain.x)
-        self.freedom = self.design.observations - self.design.parameter_count
+        self.freedom = self.design.observation_count - self.design.parameter_count
         self.search = Search(linearised_fit(plain.design, solution), plain.x, self.freedom, True)
         self.least = noncentrality(0.5 * FAMILY / self.search.tests, 0.8, self.freedom - 1)
 
@@ -87,8 +87,8 @@ class World:
 
     def of_certificate(self, distance: int) -> float:
         rows = np.zeros(len(self.search.left.residual))
-        rows[-len(self.design.distances) + distance] = (
-            1.0 / self.design.distances.uncertainty[distance]
+        rows[-len(self.design.of(CalibratedDistances)) + distance] = (
+            1.0 / self.design.of(CalibratedDistances).uncertainty[distance]
         )
         return self._detectable(rows)
 
@@ -167,10 +167,10 @@ def probe_offset(world: World, data: DataSet, generator: Generator) -> DataSet:
 
 
 def certificate(world: World, data: DataSet, generator: Generator) -> DataSet:
-    k = int(generator.integers(len(world.design.distances)))
-    value = data.design.distances.value.copy()
+    k = int(generator.integers(len(world.design.of(CalibratedDistances))))
+    value = data.design.of(CalibratedDistances).value.copy()
     value[k] += world.of_certificate(k) * generator.choice([-1.0, 1.0])
-    design = replace(data.design, distances=replace(data.design.distances, value=value))
+    design = data.design.observed(replace(data.design.of(CalibratedDistances), value=value))
     return replace(data, design=design, cause=Cause("distance", (k,)))
 
 

@@ -14,11 +14,14 @@ from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
 from ballplate.simulator.estimation.hat import row_places, whitened_residuals
-from ballplate.simulator.estimation.observations import expected_readings
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from numpy.typing import NDArray
@@ -57,7 +60,7 @@ def _loaded(text: str) -> list:  # type: ignore[type-arg]
 def shared_certificate() -> Design:
     """A bar is read in three positions, of which two have the same certificate."""
     design = with_length_standard(repeats(), projected=False)
-    return replace(design, lengths=replace(design.lengths, certificate=np.array([0, 1, 0])))
+    return design.observed(replace(design.of(Lengths), certificate=np.array([0, 1, 0])))
 
 
 def numeric(function: Callable[[Real], Real], count: int, scale: Real, step: float = 1e-5) -> Real:
@@ -82,7 +85,7 @@ def dense_jacobian(design: Design) -> Real:
         shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
         there = moved(state, layout, step[:s], shift)
-        return whitened_residuals(design, layout, there, x)
+        return whitened_residuals(design, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
     return numeric(residuals, len(scale), scale, 1e-4) * scale
@@ -143,9 +146,13 @@ def test_plates_against_complex_steps(make: Callable[[], Design]) -> None:
     jacobian = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     places = row_places(design)
     # Distances stand before co-ordinates there.
-    readings = np.arange(places.readings.stop)
-    distances = places.readings.stop + np.arange(len(design.distances))
-    coordinates = places.readings.stop + len(design.distances) + np.arange(len(design.coordinates))
+    readings = np.arange(places["reading"].stop)
+    distances = places["reading"].stop + np.arange(len(design.of(CalibratedDistances)))
+    coordinates = (
+        places["reading"].stop
+        + len(design.of(CalibratedDistances))
+        + np.arange(len(design.of(CalibratedCoordinates)))
+    )
     rows = np.concatenate([readings, coordinates, distances])
     assert result.deficiency == (2 if make is two_open_directions else 0)
     check(result, orthonormal(jacobian, result.deficiency), rows, 1e-9)
@@ -168,11 +175,11 @@ def test_repeats_and_lengths_that_share_a_certificate() -> None:
     np.add.at(of_means, reading, hat[: d * len(reading)].reshape(-1, d))
     places = row_places(design)
     np.testing.assert_allclose(
-        result.redundancy[places.readings], 1.0 - of_means.ravel(), atol=1e-9
+        result.redundancy[places["reading"]], 1.0 - of_means.ravel(), atol=1e-9
     )
-    np.testing.assert_allclose(result.redundancy[places.distances], 1.0 - hat[-7:-3], atol=1e-9)
+    np.testing.assert_allclose(result.redundancy[places["distance"]], 1.0 - hat[-7:-3], atol=1e-9)
     # A bias of one length, and of the certificate that two of them share.
-    given = design.lengths
+    given = design.of(Lengths)
     noise = (design.machine.repeatability**2 * given.direction**2).sum(axis=1)
     ends = 1.0 / design.readings.repeats[given.first] + 1.0 / design.readings.repeats[given.second]
     same = given.certificate[:, None] == given.certificate
@@ -248,29 +255,25 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         probes[subject] += step
         return altered(design, probes={"offsets": probes}), x
     elif kind in ("distance", "coordinate", "prior"):
-        field = {"distance": "distances", "coordinate": "coordinates", "prior": "priors"}[kind]
-        items = getattr(design, field)
+        (items,) = (one for one in design.observations if one.word == kind)
         value = items.value.copy()
         value[subject] += size
-        return replace(design, **{field: replace(items, value=value)}), x
+        return design.observed(items.given(value=value)), x
     elif kind == "length value":
-        same = design.lengths.certificate == design.lengths.certificate[subject]
+        same = design.of(Lengths).certificate == design.of(Lengths).certificate[subject]
         return (
-            replace(
-                design, lengths=replace(design.lengths, value=design.lengths.value + size * same)
+            design.observed(
+                replace(design.of(Lengths), value=design.of(Lengths).value + size * same)
             ),
             x,
         )
     elif kind == "scale":
         of_plate = design.artefacts.names[subject] == "plate"
         assert of_plate
-        larger = {
-            field: replace(
-                getattr(design, field), value=getattr(design, field).value * (1.0 + size)
-            )
-            for field in ("distances", "coordinates")
-        }
-        return replace(design, **larger), x
+        larger = [
+            one.given(value=one.value * (1.0 + size)) for one in design.observations if one.scales
+        ]
+        return design.observed(*larger), x
     else:
         raise AssertionError(kind)
     return design, x
@@ -279,7 +282,7 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
 @pytest.mark.parametrize("text", [PLATE, MIXED, PLANE], ids=["plate", "mixed", "plane"])
 def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: Path) -> None:
     design = lay_out(experiment(tmp_path, text))
-    state, layout = nominal_state(design), shared_layout(design)
+    state = nominal_state(design)
     given = patterns(design, state, None)
     matrix, seen = given.matrix.toarray(), set()
     # Some of each kind; those of single lengths are compared with the dense reference.
@@ -292,7 +295,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
         sides = []
         for sign in (1.0, -1.0):
             biased, x = changed(design, given, k, 1e-6 * sign)
-            sides.append(whitened_residuals(biased, layout, nominal_state(biased), x))
+            sides.append(whitened_residuals(biased, nominal_state(biased), x))
         expected = (sides[0] - sides[1]) / 2e-6
         np.testing.assert_allclose(
             matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k]

@@ -13,10 +13,10 @@ from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.suspects import Diagnosis, Suspect
 from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.hat import whitened_residuals
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
@@ -42,7 +42,7 @@ def certified(name: str) -> tuple[ObservedReadings, bool]:
 
 def diagnosed(design: Design, x: Real, estimated: bool) -> tuple[Solution, Diagnosis]:
     solution = estimate(design, x)
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     return solution, diagnosis(linearised_fit(design, solution), x, freedom, estimated)
 
 
@@ -81,9 +81,7 @@ def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(
     solution, found = diagnosed(observed.design, x, estimated)
     assert found.suspects
     taken = jacobian(observed.design, solution.state, x)
-    residual = whitened_residuals(
-        observed.design, shared_layout(observed.design), solution.state, x
-    )
+    residual = whitened_residuals(observed.design, solution.state, x)
     columns = np.concatenate([one.columns for one in found.suspects])
     for one in found.suspects:
         matrix = one.patterns.matrix[:, columns].toarray()
@@ -130,10 +128,10 @@ def certified_wrongly(design: Design, ball: int, share: float) -> tuple[Design, 
     """The design with all certified distances of a ball too long by a share, and which these
     are.
     """
-    given = design.distances
+    given = design.of(CalibratedDistances)
     mine = (given.first == ball) | (given.second == ball)
     value = given.value * np.where(mine, 1.0 + share, 1.0)
-    return replace(design, distances=replace(given, value=value)), np.flatnonzero(mine).tolist()
+    return design.observed(replace(given, value=value)), np.flatnonzero(mine).tolist()
 
 
 @pytest.mark.parametrize("ball", [0, 2, 6, 8])
@@ -143,7 +141,11 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
     (one,) = diagnosed(design, x, True)[1].suspects
     assert (one.patterns.kind[one.columns] == "distance").all()
     assert sorted(one.patterns.subject[one.columns].tolist()) == mine and len(mine) == 2
-    true = 5e-6 / (1.0 + 5e-6) * design.distances.value[one.patterns.subject[one.columns]]
+    true = (
+        5e-6
+        / (1.0 + 5e-6)
+        * design.of(CalibratedDistances).value[one.patterns.subject[one.columns]]
+    )
     assert (abs(one.values - true) < 4.0 * one.standard_uncertainties).all()
     words = f"certified distances of ball {design.ball_label(ball)}: to "
     assert words in diagnosis_lines(Diagnosis((one,)))[0]
@@ -153,9 +155,9 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
 def test_one_wrong_distance_is_not_laid_to_all_of_a_ball(wrong: int, tmp_path: Path) -> None:
     for seed in range(4):
         right, x = drawn(tmp_path, 1.0, seed=seed)
-        value = right.distances.value.copy()
+        value = right.of(CalibratedDistances).value.copy()
         value[wrong] += 10e-6
-        design = replace(right, distances=replace(right.distances, value=value))
+        design = right.observed(replace(right.of(CalibratedDistances), value=value))
         (one,) = diagnosed(design, x, True)[1].suspects
         assert one.patterns.kind[one.pattern] == "distance" and len(one.columns) == 1
         assert one.patterns.subject[one.pattern] == wrong
@@ -174,7 +176,7 @@ def test_wrong_distances_of_the_opposite_ball_are_named_where_only_these_tell_th
 
 def is_explained(design: Design, solution: Solution) -> bool:
     """Whether the stated uncertainties explain the sum of squares."""
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     return bool(chi2.sf(solution.factor.sum_of_squares, freedom) > 0.01)
 
 
@@ -190,7 +192,7 @@ def test_scatter_is_told_beside_the_model_in_the_size_of_all_residuals(
         and found.unexplained
         and not found.suspects
     )
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     size = float(np.sqrt(solution.factor.sum_of_squares / freedom))
     assert size > 5.0 and found.unexplained.times == pytest.approx(size, rel=1e-6)
     assert unexplained_words(found.unexplained).endswith("or larger uncertainties")

@@ -8,8 +8,8 @@ import pytest
 from ballplate.gross_errors.leftover import entries, leftover
 from ballplate.gross_errors.redundancy import reliability
 from ballplate.results.study import fit
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings

@@ -16,11 +16,14 @@ from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentra
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_places
+from ballplate.simulator.estimation.hat import hat_rows, row_count
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.observations import rotation_sensitivity
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
@@ -78,7 +81,7 @@ def basis_of(design: Design) -> Real:
     """The columns Q (rows, rank) of the hat matrix's root, dense."""
     linear = linearise(design)
     width, d = linear.balls.common.shape[2], design.dimension
-    basis = np.zeros((len(row_places(design)), width + d * len(design.balls.places)))
+    basis = np.zeros((row_count(design), width + d * len(design.balls.places)))
     for some in hat_rows(linear, None):
         basis[some.rows, :width] = some.common
         at = np.flatnonzero(some.ball >= 0)
@@ -165,31 +168,32 @@ def biased(
     elif kind == "expansion":
         x[here] += size * (places - places[here].mean(axis=0))[here]
     elif kind == "length":
-        x[number == design.lengths.first[subject]] += size * design.lengths.direction[subject]
+        x[number == design.of(Lengths).first[subject]] += (
+            size * design.of(Lengths).direction[subject]
+        )
     elif kind == "length value":
-        same = design.lengths.certificate == design.lengths.certificate[subject]
+        same = design.of(Lengths).certificate == design.of(Lengths).certificate[subject]
         return (
-            replace(
-                design, lengths=replace(design.lengths, value=design.lengths.value + size * same)
+            design.observed(
+                replace(design.of(Lengths), value=design.of(Lengths).value + size * same)
             ),
             x,
         )
     elif kind == "scale":
-        value = design.distances.value * (1.0 + size)
-        known = design.coordinates
+        value = design.of(CalibratedDistances).value * (1.0 + size)
+        known = design.of(CalibratedCoordinates)
         return (
-            replace(
-                design,
-                distances=replace(design.distances, value=value),
-                coordinates=replace(known, value=known.value * (1.0 + size)),
+            design.observed(
+                replace(design.of(CalibratedDistances), value=value),
+                replace(known, value=known.value * (1.0 + size)),
             ),
             x,
         )
     else:
-        field = {"distance": "distances", "prior": "priors"}[kind]
-        value = getattr(design, field).value.copy()
+        (items,) = (one for one in design.observations if one.word == kind)
+        value = items.value.copy()
         value[subject] += size
-        return replace(design, **{field: replace(getattr(design, field), value=value)}), x
+        return design.observed(items.given(value=value)), x
     return design, x
 
 
@@ -219,7 +223,7 @@ class Fits:
 
 
 def freedom_of(design: Design) -> int:
-    return design.observations - design.parameter_count
+    return design.observation_count - design.parameter_count
 
 
 def studentised(statistic: Real, sum_of_squares: Real | float, freedom: int) -> Real:

@@ -13,11 +13,11 @@ from ballplate.gross_errors.cause_search import Search
 from ballplate.gross_errors.leftover import leftover
 from ballplate.gross_errors.scatter import log_chances, ratio, scatters, with_scatter
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
 from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import observe
@@ -54,7 +54,7 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
         shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
         there = moved(state, layout, step[:s], shift)
-        return whitened_residuals(design, layout, there, x)
+        return whitened_residuals(design, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
     found = numeric(residuals, len(scale), scale, 1e-4) * scale
@@ -82,11 +82,11 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
 ) -> None:
     design, state, x = fitted(text, tmp_path)
     search = Search(
-        linearise(design, state, x), x, design.observations - design.parameter_count, True
+        linearise(design, state, x), x, design.observation_count - design.parameter_count, True
     )
     matrix = search.patterns.matrix.toarray()
     residual, taken = (
-        whitened_residuals(design, shared_layout(design), state, x),
+        whitened_residuals(design, state, x),
         jacobian(design, state, x),
     )
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
@@ -117,10 +117,10 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
 def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path) -> None:
     design, state, x = fitted(PLANE, tmp_path)
     search = Search(
-        linearise(design, state, x), x, design.observations - design.parameter_count, True
+        linearise(design, state, x), x, design.observation_count - design.parameter_count, True
     )
     residual, taken = (
-        whitened_residuals(design, shared_layout(design), state, x),
+        whitened_residuals(design, state, x),
         jacobian(design, state, x),
     )
     before, seen = left_by(taken, residual), set()
@@ -143,7 +143,9 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
 
 def test_scatter_is_hardly_ever_suspected_of_noise(tmp_path: Path) -> None:
     design, state, x = fitted(MIXED, tmp_path)
-    left = leftover(linearise(design, state, x), x, design.observations - design.parameter_count)
+    left = leftover(
+        linearise(design, state, x), x, design.observation_count - design.parameter_count
+    )
     every, generator, draws, level = scatters(design), np.random.default_rng(2), 2000, 0.01
     alarms = np.zeros(len(every))
     for _ in range(draws):
@@ -155,7 +157,7 @@ def test_scatter_is_hardly_ever_suspected_of_noise(tmp_path: Path) -> None:
 
 def test_weights_that_are_right_leave_no_scatter_over(tmp_path: Path) -> None:
     design, state, x = fitted(MIXED, tmp_path)
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     one = next(one for one in scatters(design) if one.position == 2)
     generator, found = np.random.default_rng(3), []
     for stated in (1.0, 3.0):

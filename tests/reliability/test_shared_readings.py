@@ -16,9 +16,10 @@ from ballplate.gross_errors.names import name
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import write_observations
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
-from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
 from tests.reference import dense
@@ -40,7 +41,7 @@ COARSE: dict[str, Any] = {
 
 def bias_of_lengths(design: Design, kind: str, subject: int, axis: int) -> Real:
     """What a bias of a metre changes lengths less certified ones by (m,), by a loop over them."""
-    given = design.lengths
+    given = design.of(Lengths)
     change = np.zeros(len(given))
     for i in range(len(given)):
         if kind == "length value":
@@ -74,7 +75,7 @@ def test_detectable_biases_are_those_of_the_full_covariance(
         tried.add(kind)
     assert tried == {"end", "length value"} and not len(given.of_kind("length"))
     # Every certificate and every reading of a ball, along the axes that differ.
-    assert len(given.of_kind("length value")) == len(np.unique(design.lengths.certificate))
+    assert len(given.of_kind("length value")) == len(np.unique(design.of(Lengths).certificate))
     of_standard = np.setdiff1d(np.arange(len(design.readings)), design.plate_readings)
     np.testing.assert_array_equal(np.unique(given.subject[given.of_kind("end")]), of_standard)
     total = result.redundancy.sum() + result.among_repeats
@@ -120,7 +121,7 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     wrong = int(np.setdiff1d(np.arange(len(x)), design.plate_readings)[1])
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     (first,) = diagnosis(
         linearised_fit(design, solution), x, freedom, sigma_is_estimated=False
     ).suspects

@@ -8,13 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Indices,
-    RadiusCalibration,
-)
+from ballplate.simulator.design.lookup import Indices
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.radius import RadiusCalibration
+from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import (
     BallLayout,
     BryanGaugeSettings,
@@ -30,6 +27,9 @@ from .changes import (
     pair_set,
     with_calibration,
 )
+
+# Kinds of calibration that are spelled otherwise in a file.
+KINDS = {"coordinates": "co-ordinates"}
 
 # Distances between two balls of a line.
 MOST_DISTANCES = 200
@@ -71,11 +71,12 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
     """Calibration with smaller uncertainties."""
     for k, item in enumerate(experiment.calibration):
         for factor in (0.5, 0.1):
-            better, words = _better(item, factor)
-            layout = experiment.layouts[item.artefact]
-            what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
-            if isinstance(item, DistanceCalibration):
-                what = f"distances ({pair_set(layout, item.pairs) or len(item.pairs)})"
+            better, layout = item.times_as_uncertain(factor), experiment.layouts[item.artefact]
+            least = min(one.standard_uncertainty for one in better.certified_values(layout))
+            what, words = KINDS.get(item.kind, item.kind), format_length(least)
+            if isinstance(better, DistanceCalibration):
+                what = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
+                words = length_words(better.standard_uncertainty)
             told = (
                 f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard"
                 " uncertainty)"
@@ -175,25 +176,6 @@ def length_words(value: LengthFunction) -> str:
     """An uncertainty that may grow with length, in words."""
     constant = format_length(value.constant)
     return f"{constant} + L/{1.0 / value.slope:.6g}" if value.slope else constant
-
-
-def _better(item: Any, factor: float) -> tuple[Any, str]:
-    if isinstance(item, DistanceCalibration):
-        old = item.standard_uncertainty
-        new = LengthFunction(factor * old.constant, factor * old.slope)
-        return (
-            replace(
-                item,
-                standard_uncertainty=new,
-                standard_uncertainties=factor * item.standard_uncertainties,
-            ),
-            length_words(new),
-        )
-    if isinstance(item, CoordinateCalibration):
-        u = factor * item.standard_uncertainties
-        return replace(item, standard_uncertainties=u), format_length(float(u.min()))
-    u = factor * item.standard_uncertainty
-    return replace(item, standard_uncertainty=u), format_length(u)
 
 
 def _with_better(experiment: Experiment, k: int, item: Any) -> Experiment:

@@ -9,16 +9,12 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Indices,
-    Position,
-    ReadingGroup,
-    Volume,
-)
+from ballplate.simulator.design.lookup import Indices
+from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
 from ballplate.simulator.geometry.positions import Pose, ball_coordinates
 from ballplate.simulator.machines.protocol import Array

@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.simulator.computing.rounding import above, comparable
-from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -95,7 +95,7 @@ def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | No
 
 def work(base: Examined) -> float:
     """Size of one judgement: observations times shared parameters."""
-    return float(base.at.design.observations * len(base.at.layout))
+    return float(base.at.design.observation_count * len(base.at.layout))
 
 
 def removed(before: Array, after: Array) -> tuple[int, ...]:

@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.observations import reading_blocks
-from ballplate.simulator.experiment.model import DistanceCalibration, Position
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.machines.protocol import Array
 
@@ -54,7 +55,9 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
 
 def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
     design = base.at.design
-    own = design.balls.of(design.artefacts.names.index(item.artefact))[item.pairs]
+    own = np.flatnonzero(design.balls.artefact == design.artefacts.names.index(item.artefact))[
+        item.pairs
+    ]
     along = design.balls.places[own[:, 0]] - design.balls.places[own[:, 1]]
     along[:, item.dimensions :] = 0.0
     along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]

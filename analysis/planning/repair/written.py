@@ -6,14 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Position,
-    ReadingGroup,
-)
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
@@ -190,7 +186,10 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
         by_axis = zip(item.axes, item.standard_uncertainties, strict=True)
         said["standard_uncertainty"] = {AXES[axis]: written_length(u) for axis, u in by_axis}
     else:
-        said["standard_uncertainty"] = written_length(item.standard_uncertainty)
+        stated = item.certified_values(layout)
+        said["standard_uncertainty"] = written_length(
+            min(one.standard_uncertainty for one in stated)
+        )
     return said
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import Design
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names, pose_size
 from ..machines.protocol import Array, Integers, Parameter
+from .arrays import Design
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,14 @@ from itertools import count
 
 import numpy as np
 
-from ..experiment.model import DistanceCalibration, Experiment, RadiusCalibration
+from ..design.arrays import Readings
+from ..design.objects import UnknownLengths
+from ..design.observations.distances import DistanceCalibration
+from ..design.observations.lengths import Lengths
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..machines.protocol import Array, Integers
-from .objects import UnknownLengths
-from .observations import Lengths, Readings
+from .model import Experiment
 
 
 @dataclass(frozen=True)

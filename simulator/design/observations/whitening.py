@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machines.protocol import Array, Integers
+from ...machines.protocol import Array, Integers
 
 
 @dataclass(frozen=True)

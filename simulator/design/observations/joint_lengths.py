@@ -12,16 +12,12 @@ contradict one another, once for all positions that read the same lengths.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..machines.protocol import Array, Integers
+from ...machines.protocol import Array, Integers
 from .whitening import Whitening, whitening
-
-if TYPE_CHECKING:
-    from .observations import Lengths
 
 # Displacements that change lengths by less than this, compared with what changes them most, count
 # as changing none: how straight or flat a standard is, is not known so well, and their effect is of
@@ -39,6 +35,40 @@ SMALLEST = 1e-6
 # Singular values of equations about certificates below this fraction of the largest are those of
 # equations told twice.
 TOLD_TWICE = 1e-9
+
+
+@dataclass(frozen=True)
+class LengthArrays:
+    """Lengths of length standards read in the volume; arrays (m,), metres.
+
+    `first` and `second` index the readings that a length takes part in; `second` is -1 where the
+    other end is the pivot of a Bryan gauge, which is not read: the origin of the first reading's
+    position. `projected` says whether the difference of the corrected points is projected on the
+    standard's nominal direction (m, d) instead of its norm being taken; `with_repeatability`
+    whether the readings' own scatter along that direction adds to `uncertainty`. Lengths of the
+    same `certificate`, counted from 0, share that error wherever they are read. `free` is the
+    number of the design's unknown length that a length is, -1 where its `value` is known.
+    """
+
+    first: Integers
+    second: Integers
+    value: Array
+    uncertainty: Array
+    projected: NDArray[np.bool_]
+    direction: Array
+    with_repeatability: NDArray[np.bool_]
+    certificate: Integers
+    free: Integers | None = None
+
+    @property
+    def to_pivot(self) -> NDArray[np.bool_]:
+        """Which lengths (m,) are from a reading to a pivot."""
+        return self.second < 0
+
+    @property
+    def is_known(self) -> NDArray[np.bool_]:
+        """Which lengths (m,) have a certificate."""
+        return np.full(len(self.value), True) if self.free is None else self.free < 0
 
 
 @dataclass(frozen=True)
@@ -173,7 +203,7 @@ class LengthWhitening:
             start += len(one)
         return result.reshape(-1, *rows.shape[1:])
 
-    def by_position(self, given: Lengths, rows: Array) -> ByPosition:
+    def by_position(self, given: LengthArrays, rows: Array) -> ByPosition:
         """Rows (r, k) of each position by itself, of lengths' `rows` (m, k).
 
         No position makes use of what others tell of certificates that contradict one another; where
@@ -197,8 +227,8 @@ class LengthWhitening:
         return ByPosition(np.concatenate(length), np.concatenate(found), np.concatenate(by_error))
 
 
-def length_whitening(
-    given: Lengths, noise: Array, standard: Integers, place: Integers
+def length_whitening_of(
+    given: LengthArrays, noise: Array, standard: Integers, place: Integers
 ) -> LengthWhitening:
     """Whitening of lengths (m,) whose readings have the standard uncertainties `noise` (readings,
     d), in metres.
@@ -221,7 +251,7 @@ def length_whitening(
     return LengthWhitening(scatter, alone, single, tuple(joint))
 
 
-def _shares_readings(given: Lengths, standard: Integers) -> NDArray[np.bool_]:
+def _shares_readings(given: LengthArrays, standard: Integers) -> NDArray[np.bool_]:
     """Which lengths (m,) are of standards of which some reading is an end of several lengths."""
     chosen = np.flatnonzero(given.with_repeatability & ~given.to_pivot)
     ends = np.concatenate([given.first[chosen], given.second[chosen]])
@@ -231,7 +261,7 @@ def _shares_readings(given: Lengths, standard: Integers) -> NDArray[np.bool_]:
 
 
 def joint_whitening(
-    given: Lengths, noise: Array, place: Integers, chosen: Integers
+    given: LengthArrays, noise: Array, place: Integers, chosen: Integers
 ) -> JointWhitening:
     """Whitening of the lengths `chosen` (m,), all of one standard."""
     numbers, inverse = np.unique(given.certificate[chosen], return_inverse=True)
@@ -275,7 +305,7 @@ def joint_whitening(
     return JointWhitening(tuple(together), tuple(consistencies), known, by_known, left, gain)
 
 
-def equation_root(given: Lengths, rows: Integers) -> Array:
+def equation_root(given: LengthArrays, rows: Integers) -> Array:
     """Root (m, r) that makes uncorrelated equations of those of the squares of lengths `rows` (m,)
     read together.
 
@@ -289,7 +319,7 @@ def equation_root(given: Lengths, rows: Integers) -> Array:
 
 
 def _range_and_noise(
-    given: Lengths, noise: Array, rows: Integers, size: Array | float = 1.0
+    given: LengthArrays, noise: Array, rows: Integers, size: Array | float = 1.0
 ) -> tuple[Array, Array]:
     """Basis (m, r) of what readings change of lengths `rows` (m,), each times its `size`, with a
     triangle (r, r).
@@ -302,7 +332,7 @@ def _range_and_noise(
     return within, np.asarray(np.linalg.qr(of_noise.T @ within, mode="r"))
 
 
-def _directions(given: Lengths, noise: Array, rows: Integers) -> tuple[Array, Array]:
+def _directions(given: LengthArrays, noise: Array, rows: Integers) -> tuple[Array, Array]:
     """What displacements of the readings change lengths `rows` (m,) by, (m, readings d): by a
     metre, and by noise.
     """

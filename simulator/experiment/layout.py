@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..computing.rounding import comparable
-from ..experiment.model import (
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Prior,
-    RadiusCalibration,
+from ..design.arrays import Design, Readings
+from ..design.objects import (
+    Artefacts,
+    Balls,
+    EvaluationPoints,
+    Flags,
+    Positions,
+    Probes,
+    Tasks,
     Volume,
 )
+from ..design.observations.balls import BallObservations
+from ..design.observations.coordinates import CalibratedCoordinates, no_coordinates
+from ..design.observations.distances import CalibratedDistances, no_distances
+from ..design.observations.priors import Priors
+from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
-from .arrays import Design
 from .length_standards import standard_lengths
-from .objects import Artefacts, Balls, EvaluationPoints, Flags, Positions, Probes, Tasks
-from .observations import CalibratedCoordinates, CalibratedDistances, Priors, Readings
+from .model import Experiment, Prior
 
 # EvaluationPoints points of an experiment that names none.
 DEFAULT_POINTS = 200
@@ -66,11 +74,11 @@ def lay_out(experiment: Experiment) -> Design:
     position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
-    distances = _distances(experiment, first_ball)
+    of_balls = _of_balls(experiment, first_ball)
+    distances, coordinates, *others = of_balls
     lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
-    coordinates = _coordinates(experiment, first_ball)
     points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
         points = random_points(machine.volume, DEFAULT_POINTS, DEFAULT_SEED)
@@ -79,9 +87,10 @@ def lay_out(experiment: Experiment) -> Design:
         np.repeat(np.arange(len(artefacts)), sizes),
         balls,
     )
-    held = _held(laid, position_artefact, rotations, coordinates)
+    held = _held(laid, position_artefact, rotations, of_balls)
     # A pivot has a place; how the bar turns about it is what the readings say.
     held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
+    priors = _priors(experiment, held, len(model.parameters))
     return Design(
         model,
         machine,
@@ -94,9 +103,7 @@ def lay_out(experiment: Experiment) -> Design:
             tuple(place.name for place in places), position_artefact, rotations, origins, held
         ),
         readings,
-        distances,
-        coordinates,
-        lengths,
+        (distances, coordinates, lengths, priors, *others),
         unknown,
         EvaluationPoints(points, probe_index[experiment.evaluation.probe]),
         Tasks(
@@ -107,7 +114,6 @@ def lay_out(experiment: Experiment) -> Design:
             ).reshape(-1, 2),
             tuple(task.target for task in tasks),
         ),
-        _priors(experiment, held, len(model.parameters)),
     )
 
 
@@ -193,42 +199,24 @@ def _readings(
     return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
-def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> CalibratedCoordinates:
-    ball, axis, value, uncertainty = [], [], [], []
+def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallObservations]:
+    """Observations of the balls of plates, by kind: what all items of a kind state."""
+    parts: dict[type[BallObservations], list[BallObservations]] = {
+        CalibratedDistances: [no_distances()],
+        CalibratedCoordinates: [no_coordinates()],
+    }
     for item in experiment.calibration:
-        if isinstance(item, CoordinateCalibration):
-            count = len(item.axes)
-            ball.append(np.repeat(first_ball[item.artefact] + item.balls, count))
-            axis.append(np.tile(np.array(item.axes, np.int64), len(item.balls)))
-            value.append(item.values.ravel())
-            uncertainty.append(np.tile(item.standard_uncertainties, len(item.balls)))
-    return CalibratedCoordinates(
-        _integers(ball), _integers(axis), _floats(value), _floats(uncertainty)
-    )
-
-
-def _distances(experiment: Experiment, first_ball: dict[str, int]) -> CalibratedDistances:
-    """Calibrated distances between balls of plates."""
-    plates = [
-        (item, np.asarray(item.pairs + first_ball[item.artefact], np.int64))
-        for item in experiment.calibration
-        if isinstance(item, DistanceCalibration)
-        and experiment.artefacts[item.artefact].role == "plate"
-    ]
-    return CalibratedDistances(
-        _integers([pairs[:, 0] for _, pairs in plates]),
-        _integers([pairs[:, 1] for _, pairs in plates]),
-        _integers([np.full(len(pairs), item.dimensions) for item, pairs in plates]),
-        _floats([item.values for item, _ in plates]),
-        _floats([item.standard_uncertainties for item, _ in plates]),
-    )
+        if experiment.artefacts[item.artefact].role == "plate":
+            one = item.observed(int(first_ball[item.artefact]))
+            parts.setdefault(type(one), []).append(one)
+    return [kind.joined(own) for kind, own in parts.items()]
 
 
 def _held(
     balls: Balls,
     position_artefact: NDArray[np.int64],
     rotations: Array,
-    coordinates: CalibratedCoordinates,
+    observations: Collection[BallObservations],
 ) -> Flags:
     """Which pose parameters are held (k, pose size).
 
@@ -239,6 +227,9 @@ def _held(
     """
     d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
+    ball, axis = (
+        np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
+    )
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
         own = balls.of(artefact)
@@ -246,11 +237,9 @@ def _held(
         idle = _idle_turns(places)
         for k in positions:
             held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
-        chosen = np.isin(coordinates.ball, own)
+        chosen = np.isin(ball, own)
         fixed = _motion_of_coordinates(
-            balls.places[coordinates.ball[chosen]] - places.mean(axis=0),
-            coordinates.axis[chosen],
-            d,
+            balls.places[ball[chosen]] - places.mean(axis=0), axis[chosen], d
         )
         # Turns that no reading shows are dealt with already, in every position.
         free = _null_space(np.concatenate([fixed, idle.T]))
@@ -323,11 +312,3 @@ def _pivots(motions: Array, already: Flags | None = None) -> Flags:
         direction = left[row] / np.sqrt(left[row] @ left[row])
         left = left - np.outer(left @ direction, direction)
     return chosen
-
-
-def _integers(parts: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    return np.concatenate(parts).astype(np.int64) if parts else np.zeros(0, np.int64)
-
-
-def _floats(parts: list[Array]) -> Array:
-    return np.concatenate(parts).astype(float) if parts else np.zeros(0)

@@ -1,0 +1,189 @@
+"""What positions and calibrations can refer to: probes, artefacts and their balls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.artefacts import ArtefactSettings, BallLayout, corners, frozen
+from ..inputs.messages import Step, Steps
+from ..inputs.problems import Problems, written_text
+from ..inputs.settings import hint, listing, shorten
+from ..inputs.yamltree import Sequence as SequenceNode
+from ..inputs.yamltree import written
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+# Of all positions with their repeats: half a million readings take half a gigabyte.
+MOST_READINGS = 2_000_000
+
+
+@dataclass
+class ReadingCount:
+    """What has been counted so far."""
+
+    readings: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class References:
+    """What can be referred to.
+
+    ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in
+    themselves; ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the
+    file does not tell it.
+    """
+
+    problems: Problems
+    folder: Path
+    dimension: int | None
+    probes: tuple[str, ...]
+    artefact_names: tuple[str, ...]
+    artefacts: dict[str, ArtefactSettings]
+    layouts: dict[str, BallLayout]
+    tally: ReadingCount = field(default_factory=ReadingCount)
+
+    def count_readings(self, count: int, steps: Steps) -> bool:
+        """Count further readings; tell whether there is room for them, after saying once that there
+        is not.
+        """
+        before = self.tally.readings
+        self.tally.readings += count
+        if before <= MOST_READINGS < self.tally.readings:
+            text = (
+                f"there are {self.tally.readings} readings up to here, repeats counted; at most"
+                f" {MOST_READINGS} are possible: read fewer balls, or less often"
+            )
+            self.problems.add(steps, text)
+        return self.tally.readings <= MOST_READINGS
+
+    def artefact(self, name: str | None, steps: Steps) -> str | None:
+        """Return the artefact that a position or calibration is about, or None after saying what is
+        wrong.
+        """
+        if name is None:
+            if len(self.artefact_names) > 1:
+                choice = listing(self.artefact_names)
+                self.problems.add(
+                    (*steps, "artefact"), f'missing; add "artefact", one of: {choice}'
+                )
+            return self.artefact_names[0] if len(self.artefact_names) == 1 else None
+        if name not in self.artefact_names:
+            self.problems.add(
+                (*steps, "artefact"),
+                f'unknown artefact "{name}"; {hint(name, self.artefact_names)}',
+            )
+            return None
+        return name
+
+    def check_written(self, steps: Steps) -> None:
+        """Report unknown names in a position or calibration that is wrong in itself."""
+        name = written_text(self.problems.root, *steps, "artefact")
+        if name is not None:
+            self.artefact(name, steps)
+        probes = written(self.problems.root, *steps, "probes")
+        for i in range(len(probes.items)) if isinstance(probes, SequenceNode) else ():
+            probe = written_text(self.problems.root, *steps, "probes", i)
+            if probe is not None and probe not in self.probes:
+                self.problems.add(
+                    (*steps, "probes", i), f'unknown probe "{probe}"; {hint(probe, self.probes)}'
+                )
+
+    def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
+        """Return the probes of a reading, or None after saying what is wrong."""
+        if names is None:
+            if len(self.probes) > 1:
+                choice = listing(self.probes)
+                self.problems.add((*steps, "probes"), f'missing; add "probes", some of: {choice}')
+            return self.probes if len(self.probes) == 1 else None
+        return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
+
+    def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
+        """Tell whether names listed at a path are of probes, each once, after saying what is
+        wrong.
+        """
+        return self._known_once("probe", self.probes, names, steps)
+
+    def balls(self, chosen: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
+        """Return the indices of balls, all, the corners or listed ones, or None after saying what
+        is wrong.
+        """
+        index = {name: i for i, name in enumerate(layout.names)}
+        if chosen == "all":
+            found = np.arange(len(index))
+        elif chosen == "corners":
+            try:
+                found = corners(layout)
+            except ValueError as error:
+                self.problems.add(steps, str(error))
+                return None
+        elif self._known_once("ball", index, chosen, steps):
+            found = np.array([index[name] for name in chosen], dtype=np.intp)
+        else:
+            return None
+        found.setflags(write=False)
+        return found
+
+    def has_dimension(self, point: Sequence[float], steps: Steps) -> bool:
+        """Tell whether a point has as many co-ordinates as the experiment, after saying where
+        not.
+        """
+        return self.require(
+            self.dimension in (None, len(point)),
+            steps,
+            f"has {len(point)} co-ordinates, but the experiment has {self.dimension} dimensions;"
+            f" give {self.dimension}",
+        )
+
+    def refuse_in_plane(self, *steps: Step) -> None:
+        """Say that a key is one of three dimensions."""
+        self.problems.add(steps, "has no meaning in two dimensions; remove it", of_key=True)
+
+    def _known_once(
+        self, what: str, known: Collection[str], names: Sequence[str], steps: Steps
+    ) -> bool:
+        seen: set[str] = set()
+        before = len(self.problems.messages)
+        for i, name in enumerate(names):
+            if name not in known:
+                self.problems.add(
+                    (*steps, i), f'unknown {what} "{shorten(name)}"; {hint(name, known)}'
+                )
+            elif name in seen:
+                self.problems.add(
+                    (*steps, i), f'{what} "{shorten(name)}" is listed twice; remove one of the two'
+                )
+            seen.add(name)
+        return len(self.problems.messages) == before
+
+    def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
+        """Say what is wrong unless it is right; return whether it is."""
+        if not is_right:
+            self.problems.add(steps, text if isinstance(text, str) else text())
+        return is_right
+
+
+def lengths_per_axis(
+    stated: Any, steps: Steps, references: References
+) -> tuple[Floats | None, bool]:
+    """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is
+    right.
+    """
+    dimension = references.dimension
+    if stated is None or dimension is None:
+        return None, True
+    if isinstance(stated, float):
+        return frozen([stated] * dimension), True
+    listed = stated if isinstance(stated, tuple) else (stated.x, stated.y, stated.z)
+    given = tuple(length for length in listed if length is not None)
+    text = (
+        f"has {len(given)} axes, but the experiment has {dimension}; give one length for all, or"
+        f" {dimension}"
+    )
+    return frozen(given), references.require(len(given) == dimension, steps, text)

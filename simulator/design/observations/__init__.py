@@ -1,0 +1,1 @@
+"""Kinds of observations: one file each, entered in `kinds`."""

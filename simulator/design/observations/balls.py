@@ -1,0 +1,47 @@
+"""Observations of balls on their artefact alone: all that a kind needs is its values and slopes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+
+from ...machines.protocol import Array, ErrorModel
+from ..arrays import Design, Observations, Replicates, Rows, State
+
+
+class BallObservations(Observations):
+    """Observations that are functions of the `balls` (m, k) of each, whatever the poses and the
+    machine.
+    """
+
+    @abstractmethod
+    def values(self, balls: Array) -> tuple[Array, Array]:
+        """Values (..., m) where the balls of a design are at `balls` (..., n, d), and their
+        derivatives (..., m, k, d) by the balls of each.
+        """
+
+    @classmethod
+    def joined(cls, parts: Sequence[BallObservations]) -> Self:
+        """The observations of all parts together."""
+        columns = zip(*(vars(one).values() for one in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
+    def rows(self, design: Design, state: State, x: Array | None) -> Rows:
+        value, slope = self.values(state.balls)
+        return Rows(
+            (value - self.value) / self.uncertainty, None, slope / self.uncertainty[:, None, None]
+        )
+
+    def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
+        return self.values(truth.balls)[0]
+
+    def add_misfit(self, rows: Rows, errors: Array, at: Replicates) -> None:
+        if not len(self):
+            return
+        value, slope = self.values(at.start.balls + at.balls.swapaxes(1, 2))
+        residual = (value - self.values(at.truth.balls)[0] - errors) / self.uncertainty
+        at.squares[:] += (residual**2).sum(axis=1)
+        at.pull(self.balls, (residual / self.uncertainty)[:, :, None, None] * slope)

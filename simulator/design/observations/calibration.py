@@ -1,0 +1,113 @@
+"""What items of calibration have in common: their values in files, and their observations."""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self, cast
+
+from ...geometry.artefacts import BallLayout
+from ...machines.protocol import Array, Unit
+from .balls import BallObservations
+
+# A certified distance that differs from the drawing by more than this fraction is a slip of the
+# pen.
+FAR_FROM_DRAWING = 0.1
+
+
+@dataclass(frozen=True)
+class CertifiedValue:
+    """A value that a certificate states: its item's path, what it is of, and value and standard
+    uncertainty in `unit`.
+
+    `is_pair`: the two names are balls, in either order. `drawn` is what the drawing has for a
+    length, otherwise None.
+    """
+
+    item: str
+    first: str
+    second: str
+    value: float
+    standard_uncertainty: float
+    unit: Unit = "m"
+    is_pair: bool = False
+    drawn: float | None = None
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What tells this value from all others."""
+        names = sorted((self.first, self.second)) if self.is_pair else (self.first, self.second)
+        return self.item, names[0], names[1]
+
+
+class Calibration(ABC):
+    """An item of calibration of one `kind`; a frozen dataclass with the `values` (m, ...) that it
+    states, nominal unless `certified`.
+
+    `are_lengths`: values are distances between two balls, named in either order.
+    """
+
+    artefact: str
+    kind: str
+    are_lengths: ClassVar[bool] = False
+
+    @property
+    def _values(self) -> Array:
+        values: Array = vars(self)["values"]
+        return values
+
+    @property
+    def size(self) -> int:
+        """How much it states."""
+        return len(self._values)
+
+    def observed(self, first: int) -> BallObservations:
+        """Its observations where the artefact's balls begin at `first`."""
+        raise NotImplementedError
+
+    def names(self, layout: BallLayout) -> list[tuple[str, str]]:
+        """Two names for each value, by which a file of certificate values finds it."""
+        raise NotImplementedError
+
+    def doubt(self, layout: BallLayout) -> str:
+        """What is wrong with values that are each possible; empty if nothing is."""
+        return ""
+
+    def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
+        """What it states, beside what the drawing has for lengths."""
+        given = self.observed(0)
+        drawn = given.values(layout.coordinates)[0].tolist()
+        for (first, second), value, u, length in zip(
+            self.names(layout), given.value.tolist(), given.uncertainty.tolist(), drawn, strict=True
+        ):
+            of_drawing = length if self.are_lengths else None
+            yield CertifiedValue(
+                "", first, second, value, u, is_pair=self.are_lengths, drawn=of_drawing
+            )
+
+    def true_values(self, balls: Array, first: int) -> Array:
+        """Its values (m,) where all balls are at `balls` (n, d)."""
+        return self.observed(first).values(balls)[0]
+
+    def with_values(self, values: Array) -> Self:
+        """The same with other values (m,), from a certificate."""
+        values = values.reshape(self._values.shape)
+        values.setflags(write=False)
+        return cast(Self, replace(cast(Any, self), values=values, certified=True))
+
+    def times_as_uncertain(self, factor: float) -> Self:
+        """The same with so many times the standard uncertainties."""
+        changed = {
+            name: factor * value
+            for name, value in vars(self).items()
+            if name.startswith("standard_uncertaint")
+        }
+        return cast(Self, replace(cast(Any, self), **changed))
+
+
+def far_from_drawing(certified: float, drawn: float) -> str:
+    """Say that a certified length is not that of the drawing."""
+    return (
+        f"{1e3 * certified:.6g} mm is far from the {1e3 * drawn:.6g} mm of the artefact's drawing"
+    )

@@ -1,0 +1,329 @@
+"""Calibrated distances between balls of a plate, or of a length standard."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from ...geometry.artefacts import COINCIDENT, BallLayout, Name, PairSet, frozen, pairs
+from ...inputs.messages import ExperimentError, Steps
+from ...inputs.quantities import LengthFunction, PositiveLength
+from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
+from ...inputs.tables import read_table
+from ...inputs.yamltree import Mark, mark_of
+from ...machines.protocol import Array, Integers
+from ..arrays import Design, Words
+from ..lookup import References
+from .balls import BallObservations
+from .calibration import FAR_FROM_DRAWING, Calibration, far_from_drawing
+
+# Balls tied to one another by distances are estimated together, with memory that grows as the
+# square of their number.
+MOST_TIED_BALLS = 3000
+
+
+@dataclass(frozen=True)
+class CalibratedDistances(BallObservations):
+    """Calibrated distances between two balls of an artefact; arrays (m,), lengths in metres.
+
+    `dimensions` is 2 where only the first two co-ordinates of the artefact's frame count.
+    """
+
+    word: ClassVar[str] = "distance"
+    scales: ClassVar[bool] = True
+    words: ClassVar[Words] = Words("certified", "long", "short")
+
+    first: Integers
+    second: Integers
+    dimensions: Integers
+    value: Array
+    uncertainty: Array
+
+    @property
+    def balls(self) -> Integers:
+        return np.stack([self.first, self.second], axis=1)
+
+    def values(self, balls: Array) -> tuple[Array, Array]:
+        difference = balls[..., self.first, :] - balls[..., self.second, :]
+        difference = difference * (np.arange(balls.shape[-1]) < self.dimensions[:, None])
+        length = np.sqrt((difference**2).sum(axis=-1))
+        along = difference / length[..., None]
+        return length, np.stack([along, -along], axis=-2)
+
+    def name(self, design: Design, k: int) -> str:
+        first, second = int(self.first[k]), int(self.second[k])
+        return f"distance {design.ball_label(first)} to {design.balls.names[second]}"
+
+
+def no_distances() -> CalibratedDistances:
+    """No calibrated distances."""
+    none, empty = np.zeros(0, np.int64), np.zeros(0)
+    return CalibratedDistances(none, none, none, empty, empty)
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceCalibration(Calibration):
+    """Calibrated distances of an artefact.
+
+    ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
+    ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
+    the function ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability``
+    matter for length standards only.
+    """
+
+    artefact: str
+    pairs: NDArray[np.intp]
+    dimensions: Literal[2, 3]
+    values: Array
+    certified: bool
+    standard_uncertainty: LengthFunction
+    standard_uncertainties: Array
+    form: Literal["distance", "projection"]
+    repeatability: Literal["included", "ignored"]
+    kind: Literal["distances"] = "distances"
+
+    are_lengths: ClassVar[bool] = True
+
+    def observed(self, first: int) -> CalibratedDistances:
+        ends = np.asarray(self.pairs + first, np.int64)
+        dimensions = np.full(len(ends), self.dimensions)
+        return CalibratedDistances(
+            ends[:, 0], ends[:, 1], dimensions, self.values, self.standard_uncertainties
+        )
+
+    def names(self, layout: BallLayout) -> list[tuple[str, str]]:
+        return [(layout.names[i], layout.names[j]) for i, j in self.pairs]
+
+    def times_as_uncertain(self, factor: float) -> DistanceCalibration:
+        old = self.standard_uncertainty
+        return replace(
+            self,
+            standard_uncertainty=LengthFunction(factor * old.constant, factor * old.slope),
+            standard_uncertainties=factor * self.standard_uncertainties,
+        )
+
+
+ListedPairs = NonEmpty[tuple[Name, Name]]
+PairSelection = Forms[PairSet, ListedPairs, ListedPairs]
+
+
+class CertifiedDistance(Settings):
+    """A distance from a certificate."""
+
+    balls: tuple[Name, Name] = Field(description="the two balls")
+    distance: PositiveLength = Field(description="distance of their centres")
+
+
+CertifiedDistances = NonEmpty[CertifiedDistance]
+
+
+class DistancesSettings(Settings):
+    """Calibrated distances between balls of an artefact."""
+
+    kind: Literal["distances"] = Field(description="calibrated distances between balls")
+    artefact: Name | None = Field(
+        None, description="name of the artefact; optional if there is exactly one"
+    )
+    pairs: PairSelection = Field(
+        description=(
+            "corner sides, corner diagonals, corners (both), neighbours, all, or a list of pairs of"
+            " balls"
+        )
+    )
+    dimensions: Literal[2, 3] | None = Field(
+        None, description="3 (default): distances in space; 2: in the artefact's plane"
+    )
+    standard_uncertainty: LengthFunction = Field(description="of each distance; may grow with it")
+    values: Forms[Text, CertifiedDistances, CertifiedDistances] | None = Field(
+        None,
+        description=(
+            "CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
+            "{balls: [a, b], distance: …}; default: nominal distances"
+        ),
+    )
+    form: Literal["distance", "projection"] = Field(
+        "distance",
+        description="only for a length standard: distance, or projection on its nominal axis",
+    )
+    repeatability: Literal["included", "ignored"] = Field(
+        "included",
+        description=(
+            "only for a length standard: whether reading it has the machine's repeatability"
+        ),
+    )
+
+
+def read_distances(
+    settings: DistancesSettings, artefact: str, steps: Steps, references: References
+) -> DistanceCalibration | None:
+    layout, is_right = references.layouts[artefact], True
+    if references.artefacts[artefact].role != "length_standard":
+        for key in ("form", "repeatability"):
+            if key in settings.model_fields_set:
+                text = (
+                    "is only for artefacts with role: length_standard; remove it, or give"
+                    f' "{artefact}" that role'
+                )
+                references.problems.add((*steps, key), text, of_key=True)
+                is_right = False
+    if references.dimension == 2 and settings.dimensions == 3:
+        text = "a two-dimensional experiment has distances in 2 dimensions; remove it"
+        references.problems.add((*steps, "dimensions"), text)
+        is_right = False
+    dimensions = settings.dimensions or 3
+    if references.dimension == 2:
+        dimensions = 2
+    indices = _pairs(settings.pairs, layout, (*steps, "pairs"), references)
+    if indices is None or references.dimension is None:
+        return None
+    if not _can_be_tied(len(np.unique(indices)), (*steps, "pairs"), references):
+        return None
+    difference = (layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]])[
+        :, :dimensions
+    ]
+    nominal = np.linalg.norm(difference, axis=1)
+    if np.any(nominal < COINCIDENT):
+        i, j = indices[int(np.argmin(nominal))]
+        text = (
+            f'balls "{layout.names[i]}" and "{layout.names[j]}" have no distance in the plane; use'
+            " dimensions: 3"
+        )
+        references.problems.add((*steps, "pairs"), text)
+        return None
+    values = _certified_distances(
+        settings, indices, layout, nominal, (*steps, "values"), references
+    )
+    if values is None or not is_right:
+        return None
+    indices.setflags(write=False)
+    return DistanceCalibration(
+        artefact,
+        indices,
+        dimensions,
+        frozen(values),
+        settings.values is not None,
+        settings.standard_uncertainty,
+        frozen(settings.standard_uncertainty.at(nominal)),
+        settings.form,
+        settings.repeatability,
+    )
+
+
+def _can_be_tied(balls: int, steps: Steps, references: References) -> bool:
+    text = (
+        f"distances tie {balls} balls together, at most {MOST_TIED_BALLS} are possible; "
+        "calibrate fewer distances, such as corner sides, or co-ordinates"
+    )
+    return references.require(balls <= MOST_TIED_BALLS, steps, text)
+
+
+def _pairs(
+    selection: str | tuple[tuple[str, str], ...],
+    layout: BallLayout,
+    steps: Steps,
+    references: References,
+) -> NDArray[np.intp] | None:
+    if isinstance(selection, str):
+        # Pairs of all these balls would fill the memory before they can be refused.
+        if selection == "all" and not _can_be_tied(len(layout.names), steps, references):
+            return None
+        try:
+            found = pairs(layout, selection)
+        except ValueError as error:
+            references.problems.add(steps, str(error))
+            return None
+        if not references.require(
+            len(found) > 0, steps, "the artefact has a single ball and no pairs; remove it"
+        ):
+            return None
+        return found
+    index = {name: i for i, name in enumerate(layout.names)}
+    seen: dict[frozenset[str], int] = {}
+    is_right = True
+    for i, names in enumerate(selection):
+        for j, name in enumerate(names):
+            text = f'unknown ball "{name}"; {hint(name, layout.names) if name not in index else ""}'
+            is_right &= references.require(name in index, (*steps, i, j), text)
+        text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
+        is_right &= references.require(names[0] != names[1], (*steps, i), text)
+        pair = frozenset(names)
+        text = f"stands already in entry [{seen.get(pair)}]; remove one of the two"
+        is_right &= references.require(pair not in seen, (*steps, i), text)
+        seen.setdefault(pair, i)
+    return (
+        np.array([[index[a], index[b]] for a, b in selection], dtype=np.intp) if is_right else None
+    )
+
+
+def _certified_distances(
+    settings: DistancesSettings,
+    indices: NDArray[np.intp],
+    layout: BallLayout,
+    nominal: Array,
+    steps: Steps,
+    references: References,
+) -> Array | None:
+    if settings.values is None:
+        return nominal
+    problems = references.problems
+    # Two names, the distance, and where it is written.
+    entries: list[tuple[tuple[str, str], float, Mark, Steps]]
+    if isinstance(settings.values, str):
+        try:
+            rows = read_table(
+                references.folder / settings.values, ["ball_1", "ball_2"], ["distance"]
+            )
+        except ExperimentError as error:
+            problems.take(error, steps)
+            return None
+        entries = [
+            (cast(tuple[str, str], row.texts), row.lengths[0], row.mark, steps) for row in rows
+        ]
+    else:
+        entries = [
+            (entry.balls, entry.distance, mark_of(problems.root, (*steps, i)), (*steps, i))
+            for i, entry in enumerate(settings.values)
+        ]
+    before, known = len(problems.messages), set(layout.names)
+    by_pair: dict[frozenset[str], float] = {}
+    for names, distance, mark, place in entries:
+        for name in names:
+            if name not in known:
+                problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
+        pair = frozenset(names)
+        if len(pair) == 1:
+            problems.add_at(
+                mark,
+                place,
+                f'a ball has no distance from itself; name two balls, not "{names[0]}" twice',
+            )
+        if pair in by_pair:
+            text = (
+                f'the distance of "{names[0]}" and "{names[1]}" is given twice; remove one of'
+                " the two"
+            )
+            problems.add_at(mark, place, text)
+        if distance <= 0:
+            problems.add_at(mark, place, "a distance must be above zero; correct it")
+        by_pair[pair] = distance
+    wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
+    missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
+    drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
+    for names, distance, mark, place in entries:
+        expected = drawn.get(frozenset(names))
+        if (
+            expected is not None
+            and distance > 0
+            and not abs(distance - expected) <= FAR_FROM_DRAWING * expected
+        ):
+            text = f"{far_from_drawing(distance, expected)}; correct the one or the other"
+            problems.add_at(mark, place, text)
+    if missing and len(problems.messages) == before:
+        problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
+    if len(problems.messages) > before:
+        return None
+    return np.array([by_pair[frozenset(pair)] for pair in wanted])

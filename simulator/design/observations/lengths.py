@@ -1,0 +1,274 @@
+"""Lengths of length standards that are read in the volume.
+
+They are formed of readings and share the noise of these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...machines.protocol import Array, ErrorModel, Integers
+from ..arrays import Design, Observations, Rows, State, locations, reading_uncertainties
+from ..parameters import SharedLayout, shared_layout
+from .joint_lengths import LengthArrays, LengthWhitening, length_whitening_of
+from .readings import expected_readings, offset_sensitivity
+
+
+@dataclass(frozen=True)
+class Lengths(LengthArrays, Observations):
+    """Lengths of length standards read in the volume."""
+
+    word: ClassVar[str] = "length"
+
+    def select(self, chosen: NDArray[np.bool_] | Integers) -> Lengths:
+        """The lengths at the given indices."""
+        values: dict[str, Any] = {
+            name: None if v is None else v[chosen] for name, v in vars(self).items()
+        }
+        return Lengths(**values)
+
+    def count(self, design: Design) -> int:
+        return len(design.once(length_whitening)) if len(self) else 0
+
+    def rows(self, design: Design, state: State, x: Array | None) -> Rows:
+        """As many rows as lengths that do not follow from others.
+
+        The length between corrected points, or its projection, is compared with the known one (NPL
+        Report CISE 15/98, section 3.2.2).
+        """
+        if not len(self):
+            none = np.zeros((0, len(design.once(shared_layout))))
+            return Rows(np.zeros(0), none, np.zeros((0, 0, design.dimension)))
+        residual, found = _length_residuals(design, state, x)
+        by_shared = design.once(length_whitening).whitened(
+            _length_derivative(design, design.once(shared_layout), state, found)
+        )
+        return Rows(residual, by_shared, np.zeros((len(residual), 0, design.dimension)))
+
+    def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
+        return true_lengths(design, truth)
+
+    def errors(self, generator: np.random.Generator, count: int) -> Array:
+        """One error for each certificate, wherever it is read."""
+        drawn = generator.standard_normal((count, int(self.certificate.max(initial=-1)) + 1))
+        return np.asarray(self.uncertainty * drawn[:, self.certificate])
+
+    def weights(self, design: Design, state: State) -> Array:
+        own = 1.0 / self.uncertainty[self.uncertainty > 0.0]
+        return (
+            np.append(own, 1.0 / design.machine.repeatability)
+            if self.with_repeatability.any()
+            else own
+        )
+
+    def alike(self, design: Design, state: State) -> Lengths:
+        return replace(
+            self,
+            uncertainty=np.ones(len(self)),
+            with_repeatability=np.zeros(len(self), bool),
+            certificate=np.arange(len(self)),
+        )
+
+    def reread(self, design: Design, place: Integers) -> Lengths:
+        second = np.where(self.to_pivot, -1, place[self.second])
+        return replace(self, first=place[self.first], second=second)
+
+    def started(self, design: Design, x: Array, state: State) -> State:
+        return replace(state, lengths=_measured_lengths(design, state.origins, x))
+
+    def name(self, design: Design, k: int) -> str:
+        position = design.readings.position[self.first[k]]
+        return f"{length_name(design, k)} in position {design.positions.names[position]}"
+
+
+def length_whitening(design: Design) -> LengthWhitening:
+    """What makes uncorrelated observations of unit variance of the lengths of standards."""
+    given, readings = design.of(Lengths), design.readings
+    noise = reading_uncertainties(design, readings) / np.sqrt(readings.repeats)[:, None]
+    standard = design.balls.artefact[readings.ball[given.first]]
+    place = readings.position[given.first] * len(design.probes.names) + readings.probe[given.first]
+    return length_whitening_of(given, noise, standard, place)
+
+
+def length_name(design: Design, length: int, of_reading: bool = True) -> str:
+    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is
+    certified.
+    """
+    given, readings = design.of(Lengths), design.readings
+    ball = int(readings.ball[given.first[length]])
+    artefact = design.artefacts.names[design.balls.artefact[ball]]
+    if given.second[length] < 0:
+        return f"radius of {artefact}" + (
+            f" to ball {design.balls.names[ball]}" if of_reading else ""
+        )
+    other = readings.ball[given.second[length]]
+    return f"length {design.balls.names[ball]}-{design.balls.names[other]} of {artefact}"
+
+
+def length_derivative(design: Design, state: State, x: Array | None) -> Array:
+    """Derivative (m, s) of lengths less those expected by all shared parameters, in metres."""
+    layout = design.once(shared_layout)
+    return _length_derivative(design, layout, state, _measured(design, state, x))
+
+
+def _length_derivative(
+    design: Design, layout: SharedLayout, state: State, measured: _Measured
+) -> Array:
+    given = design.of(Lengths)
+    # What is held goes to the extra column.
+    rows = np.zeros((len(given), len(layout) + 1))
+    for end in measured.ends:
+        along = measured.unit[end.rows]
+        by_model = design.model.jacobian(end.points, state.a, end.offsets)
+        rows[end.rows, layout.model] += end.sign * np.einsum("md,mdn->mn", along, by_model)
+        if design.probes.free.any():
+            by_offset = offset_sensitivity(design.model, end.points, state.a, end.offsets)
+            columns = layout.offset_columns[end.probe]
+            np.add.at(
+                rows,
+                (end.rows[:, None], columns),
+                end.sign * np.einsum("md,mdj->mj", along, by_offset),
+            )
+    pivoted = np.flatnonzero(given.to_pivot)
+    columns = layout.pose_columns[
+        design.readings.position[given.first[pivoted]], : design.dimension
+    ]
+    np.add.at(rows, (pivoted[:, None], columns), -measured.unit[pivoted])
+    if given.free is not None:
+        free = np.flatnonzero(given.free >= 0)
+        rows[free, layout.lengths.start + given.free[free]] -= 1.0
+    return rows[:, :-1]
+
+
+@dataclass(frozen=True)
+class _End:
+    """Ends of lengths `rows` (k,) that are read: scale readings and probe offsets (k, d), probes
+    (k,).
+    """
+
+    sign: float
+    rows: Integers
+    points: Array
+    offsets: Array
+    probe: Integers
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Lengths between corrected points (m,), their directions (m, d), and the ends that are
+    read.
+    """
+
+    length: Array
+    unit: Array
+    ends: tuple[_End, _End]
+
+
+def _measured(design: Design, state: State, x: Array | None) -> _Measured:
+    given = design.of(Lengths)
+    difference = np.zeros((len(given), design.dimension))
+    pivoted = np.flatnonzero(given.to_pivot)
+    pivot = state.origins[design.readings.position[given.first[pivoted]]]
+    ends = []
+    for sign, chosen, rows in (
+        (1.0, given.first, np.arange(len(given))),
+        (-1.0, given.second, np.flatnonzero(~given.to_pivot)),
+    ):
+        readings = design.readings.select(chosen[rows])
+        p = state.probes[readings.probe]
+        if x is not None:
+            points = x[chosen[rows]]
+        else:
+            points = expected_readings(design, state, readings)
+            if sign > 0:
+                # Where the ball of a gauge was, which need not be where it was to be.
+                reach = length_values(design, state)[pivoted, None] * given.direction[pivoted]
+                points[pivoted] = pivot + reach - p[pivoted]
+        difference[rows] += sign * (
+            points + (p if x is None else design.model.error(points, state.a, p))
+        )
+        ends.append(_End(sign, rows, points, p, readings.probe))
+    difference[pivoted] -= pivot
+    unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
+    unit = np.where(given.projected[:, None], given.direction, unit)
+    length = np.einsum("md,md->m", unit, difference)
+    return _Measured(length, unit, (ends[0], ends[1]))
+
+
+def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Array, _Measured]:
+    """Whitened residuals (r,) of lengths, and what these are formed of."""
+    found = _measured(design, state, x)
+    off = found.length - length_values(design, state)
+    return design.once(length_whitening).whitened(off), found
+
+
+def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
+    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself,
+    in metres.
+
+    Without scale readings x the machine is taken to read without error.
+    """
+    if not len(design.of(Lengths)):
+        return np.zeros(0), np.ones(0)
+    found = _measured(design, state, x)
+    scatter = design.once(length_whitening).scatter
+    return found.length - length_values(design, state), np.hypot(
+        scatter, design.of(Lengths).uncertainty
+    )
+
+
+def length_directions(design: Design, state: State, x: Array | None) -> Array:
+    """Directions (m, d) from the second end of lengths to the first."""
+    if not len(design.of(Lengths)):
+        return np.zeros((0, design.dimension))
+    return _measured(design, state, x).unit
+
+
+def length_values(design: Design, state: State) -> Array:
+    """Values (m,) at `state` that lengths of standards are compared with: those certified, or the
+    unknown ones.
+    """
+    given = design.of(Lengths)
+    if given.free is None or not len(design.unknown_lengths.names):
+        return given.value
+    return np.where(given.free >= 0, state.lengths[given.free], given.value)
+
+
+def true_lengths(design: Design, truth: State) -> Array:
+    """Lengths (m,) of the design's standards as they truly are; the same wherever one certificate's
+    is read.
+    """
+    given = design.of(Lengths)
+    if not len(given):
+        return given.value
+    there = locations(design, truth, design.readings)
+    pivot = truth.origins[design.readings.position[given.first]]
+    between = there[given.first] - np.where(
+        given.to_pivot[:, None], pivot, there[np.maximum(given.second, 0)]
+    )
+    along = np.abs(np.einsum("md,md->m", given.direction, between))
+    length = np.where(given.projected, along, np.sqrt((between**2).sum(axis=1)))
+    _, first = np.unique(given.certificate, return_index=True)
+    return np.asarray(length[first][given.certificate])
+
+
+def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
+    """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
+    given = design.of(Lengths)
+    if given.free is None or not len(design.unknown_lengths.names):
+        return design.unknown_lengths.drawn
+    seen = x + design.probes.offsets[design.readings.probe]
+    other = np.where(
+        given.to_pivot[:, None],
+        origins[design.readings.position[given.first]],
+        seen[np.maximum(given.second, 0)],
+    )
+    length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
+    found = design.unknown_lengths.drawn.copy()
+    for number in np.unique(given.free[given.free >= 0]):
+        found[number] = length[given.free == number].mean()
+    return found

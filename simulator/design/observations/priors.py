@@ -1,0 +1,117 @@
+"""What is known beforehand of shared parameters: poses, probe offsets, machine errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ...geometry.motions import vector_from_rotation, vector_rate
+from ...machines.protocol import Array, ErrorModel, Integers, Unit
+from ..arrays import Design, Observations, Rows, State, Words
+from ..parameters import shared_layout
+
+
+@dataclass(frozen=True)
+class Priors(Observations):
+    """What is known beforehand of shared parameters; arrays (m,), metres, radians or ratios.
+
+    Each row is about a pose parameter (`position` and `component`, by place among origin and
+    rotation), about a probe offset (`probe` and `component`), or about a linear function of the
+    model's parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
+    told as co-ordinates, pose angles as deviations from the nominal pose.
+    """
+
+    word: ClassVar[str] = "prior"
+    words: ClassVar[Words] = Words("stated", cure="check it in the experiment file")
+
+    names: tuple[str, ...]
+    position: Integers
+    probe: Integers
+    component: Integers
+    by_model: Array
+    value: Array
+    uncertainty: Array
+
+    def rows(self, design: Design, state: State, x: Array | None) -> Rows:
+        weight = 1.0 / self.uncertainty
+        return Rows(
+            weight * (self._values(design, state) - self.value),
+            weight[:, None] * self._derivative(design, state),
+            np.zeros((len(self), 0, design.dimension)),
+        )
+
+    def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
+        """Priors about an error model that is not the true machine's stay what they are."""
+        if model == design.model:
+            return self._values(design, truth)
+        of_model = (self.position < 0) & (self.probe < 0)
+        elsewhere = replace(truth, a=np.zeros(self.by_model.shape[1]))
+        return np.where(of_model, self.value, self._values(design, elsewhere))
+
+    def weights(self, design: Design, state: State) -> Array:
+        """Largest derivatives (m,) by a parameter, in its effect."""
+        derivative = self.rows(design, state, None).by_shared
+        assert derivative is not None
+        sizes = np.abs(derivative * design.once(shared_layout).scale).max(axis=1, initial=0.0)
+        return np.asarray(sizes)
+
+    def alike(self, design: Design, state: State) -> Priors:
+        weights = self.weights(design, state)
+        return replace(self, uncertainty=self.uncertainty * np.where(weights > 0.0, weights, 1.0))
+
+    def name(self, design: Design, k: int) -> str:
+        return f"prior of {self.names[k]}"
+
+    def unit(self, design: Design, k: int) -> Unit:
+        if self.position[k] >= 0:
+            return "rad" if self.component[k] >= design.dimension else "m"
+        if self.probe[k] >= 0:
+            return "m"
+        used = np.flatnonzero(self.by_model[k])
+        return design.model.parameters[int(used[0])].unit if len(used) else "1"
+
+    def _values(self, design: Design, state: State) -> Array:
+        """Values (m,) at `state` of what these are about."""
+        of_poses = _pose_values(design, state)[self.position, self.component]
+        axis = np.minimum(self.component, design.dimension - 1)
+        of_probes = state.probes[self.probe, axis]
+        of_model = self.by_model @ state.a if len(self) else np.zeros(0)
+        return np.where(
+            self.position >= 0, of_poses, np.where(self.probe >= 0, of_probes, of_model)
+        )
+
+    def _derivative(self, design: Design, state: State) -> Array:
+        """Derivative (m, s) of the values by the shared parameters."""
+        layout, d = design.once(shared_layout), design.dimension
+        derivative = np.zeros((len(self), len(layout)))
+        if not len(self):
+            return derivative
+        derivative[:, layout.model] = self.by_model
+        rows = np.flatnonzero(self.probe >= 0)
+        derivative[rows, layout.offset_columns[self.probe[rows], self.component[rows]]] = 1.0
+        rows = np.flatnonzero((self.position >= 0) & (self.component < d))
+        derivative[rows, layout.pose_columns[self.position[rows], self.component[rows]]] = 1.0
+        rows = np.flatnonzero((self.position >= 0) & (self.component >= d))
+        place = self.position[rows]
+        rate = vector_rate(_pose_values(design, state)[place, d:])[
+            np.arange(len(rows)), self.component[rows] - d
+        ]
+        columns = layout.pose_columns[place, d:]
+        # What is held does not move.
+        row, turn = np.nonzero(columns >= 0)
+        derivative[rows[row], columns[row, turn]] = rate[row, turn]
+        return derivative
+
+
+def _pose_values(design: Design, state: State) -> Array:
+    """Origins and rotations against the nominal pose (k, pose size)."""
+    turned = vector_from_rotation(state.rotations @ design.positions.rotations.transpose(0, 2, 1))
+    return np.concatenate([state.origins, turned], axis=1)
+
+
+def no_priors() -> Priors:
+    """Nothing known beforehand."""
+    none, empty = np.zeros(0, np.int64), np.zeros(0)
+    return Priors((), none, none, none, np.zeros((0, 0)), empty, empty)

@@ -1,0 +1,76 @@
+"""The calibrated radius of a Bryan gauge, which is among the lengths that are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...geometry.artefacts import BallLayout, BryanGaugeSettings, Name
+from ...inputs.messages import Steps
+from ...inputs.quantities import PositiveLength
+from ...inputs.settings import Settings
+from ...machines.protocol import Array
+from ..lookup import References
+from .calibration import FAR_FROM_DRAWING, Calibration, CertifiedValue, far_from_drawing
+
+
+@dataclass(frozen=True, eq=False)
+class RadiusCalibration(Calibration):
+    """The calibrated radius of a Bryan gauge: ``value`` and ``standard_uncertainty`` in metres."""
+
+    artefact: str
+    value: float
+    standard_uncertainty: float
+    kind: Literal["radius"] = "radius"
+
+    @property
+    def size(self) -> int:
+        return 0
+
+    def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
+        drawn = float(np.sqrt((layout.coordinates[0] ** 2).sum()))
+        yield CertifiedValue(
+            "", self.artefact, "radius", self.value, self.standard_uncertainty, drawn=drawn
+        )
+
+    def true_values(self, balls: Array, first: int) -> Array:
+        return np.sqrt((balls[first : first + 1] ** 2).sum(axis=1))
+
+    def with_values(self, values: Array) -> RadiusCalibration:
+        return replace(self, value=float(values[0]))
+
+
+class RadiusSettings(Settings):
+    """The calibrated radius of a Bryan gauge."""
+
+    kind: Literal["radius"] = Field(description="calibrated radius of a Bryan gauge")
+    artefact: Name | None = Field(
+        None, description="name of the gauge; optional if there is exactly one artefact"
+    )
+    value: PositiveLength | None = Field(
+        None, description="the radius certified; default: as drawn"
+    )
+    standard_uncertainty: PositiveLength = Field(
+        description="of the radius, the same wherever the gauge stands"
+    )
+
+
+def read_radius(
+    settings: RadiusSettings, artefact: str, steps: Steps, references: References
+) -> RadiusCalibration | None:
+    gauge = references.artefacts[artefact]
+    if not isinstance(gauge, BryanGaugeSettings):
+        text = f'only a Bryan gauge has a radius, and "{artefact}" is none; use kind: distances'
+        references.problems.add((*steps, "kind"), text)
+        return None
+    value = gauge.radius if settings.value is None else settings.value
+    text = f"{far_from_drawing(value, gauge.radius)}; correct the one or the other"
+    if not references.require(
+        abs(value - gauge.radius) <= FAR_FROM_DRAWING * gauge.radius, (*steps, "value"), text
+    ):
+        return None
+    return RadiusCalibration(artefact, value, settings.standard_uncertainty)

@@ -1,0 +1,106 @@
+"""Readings of balls: whitened residuals and derivatives.
+
+The model is that of NPL Report CISE 15/98, section 3: reading i of ball j in position k with probe
+l obeys x + e(x, a, p) = R y + o + noise. No caller divides by an uncertainty: rows leave here in
+units of their own standard uncertainty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.motions import pose_size
+from ...machines.protocol import Array, ErrorModel
+from ..arrays import Design, Readings, State, locations, reading_uncertainties
+
+# Metres: of the size of probe offsets.
+OFFSET_STEP = 0.1
+
+
+@dataclass(frozen=True)
+class ReadingBlocks:
+    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m,
+    d, n).
+
+    `by_offset` (m, d, d) is the derivative by the probe's offset, None where no offset is a
+    parameter.
+    """
+
+    residual: Array
+    by_ball: Array
+    by_pose: Array
+    by_model: Array
+    by_offset: Array | None = None
+
+
+def expected_readings(design: Design, state: State, readings: Readings) -> Array:
+    """Scale readings (m, d) of a machine without errors, true location less probe offset."""
+    return locations(design, state, readings) - state.probes[readings.probe]
+
+
+def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
+    """Derivative (m, d, d) of the error by the probe offset: identity plus what the machine's
+    rotations add.
+
+    A rotation acts on the offset linearly, so that a central difference over a whole machine arm is
+    exact to rounding for every model of rigid axes.
+    """
+    columns = []
+    for axis in range(x.shape[1]):
+        step = np.zeros(x.shape[1])
+        step[axis] = OFFSET_STEP
+        columns.append(
+            (model.error(x, a, p + step) - model.error(x, a, p - step)) / (2.0 * OFFSET_STEP)
+        )
+    return np.stack(columns, axis=2)
+
+
+def rotation_sensitivity(arm: Array) -> Array:
+    """Derivative of omega x arm by omega: (m, 3, 3) in space, (m, 2, 1) in the plane.
+
+    >>> rotation_sensitivity(np.array([[2.0, 1.0]])).tolist()
+    [[[-1.0], [2.0]]]
+    """
+    m, d = arm.shape
+    if d == 2:
+        return np.stack([-arm[:, 1], arm[:, 0]], axis=1)[:, :, None]
+    result = np.zeros((m, 3, 3), arm.dtype)
+    result[:, 0, 1], result[:, 0, 2] = arm[:, 2], -arm[:, 1]
+    result[:, 1, 0], result[:, 1, 2] = -arm[:, 2], arm[:, 0]
+    result[:, 2, 0], result[:, 2, 1] = arm[:, 1], -arm[:, 0]
+    return result
+
+
+def reading_weights(design: Design, readings: Readings) -> Array:
+    """Reciprocal standard uncertainties (m, d) of the mean of each reading's repeats."""
+    return np.asarray(np.sqrt(readings.repeats)[:, None] / reading_uncertainties(design, readings))
+
+
+def reading_blocks(
+    design: Design, state: State, readings: Readings, x: Array | None
+) -> ReadingBlocks:
+    """Rows of readings of plates, with scale readings x (m, d), or error-free ones where x is
+    None.
+    """
+    d = design.dimension
+    p = state.probes[readings.probe]
+    rotation = state.rotations[readings.position]
+    arm = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
+    true = arm + state.origins[readings.position]
+    weight = reading_weights(design, readings)
+    if x is None:
+        x = true - p
+        residual = np.zeros_like(x)
+    else:
+        residual = weight * (x + design.model.error(x, state.a, p) - true)
+    by_model = design.model.jacobian(x, state.a, p)
+    by_model *= weight[:, :, None]
+    by_pose = np.zeros((len(x), d, pose_size(d)), np.result_type(arm, float))
+    by_pose[:, range(d), range(d)] = -weight
+    by_pose[:, :, d:] = -weight[:, :, None] * rotation_sensitivity(arm)
+    by_offset = None
+    if design.probes.free.any():
+        by_offset = weight[:, :, None] * offset_sensitivity(design.model, x, state.a, p)
+    return ReadingBlocks(residual, -weight[:, :, None] * rotation, by_pose, by_model, by_offset)
