@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
@@ -229,7 +230,9 @@ def two_artefacts() -> Design:
             np.concatenate([first.probe, second.probe]),
             np.concatenate([first.repeats, second.repeats]),
         ),
-        coordinates=replace(extra.coordinates, ball=extra.coordinates.ball + balls),
+        coordinates=replace(
+            extra.of(CalibratedCoordinates), ball=extra.of(CalibratedCoordinates).ball + balls
+        ),
     )
 
 

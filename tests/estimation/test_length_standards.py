@@ -76,7 +76,8 @@ def test_ignoring_the_repeatability_counts_each_position_anew(tmp_path: Path) ->
 def test_a_certificate_has_one_error(tmp_path: Path) -> None:
     design = lay_out(with_bar(tmp_path, 4, "20 um"))
     assert design.of(Lengths).certificate.tolist() == [0, 0, 0, 0]
-    drawn = noisy_certificate(design, nominal_state(design), np.random.default_rng(1)).lengths.value
+    certified = noisy_certificate(design, nominal_state(design), np.random.default_rng(1))
+    drawn = certified.of(Lengths).value
     assert len(set(drawn.tolist())) == 1 and drawn[0] != 0.4
 
 
