@@ -113,7 +113,7 @@ def patterns(design: Design, state: State, x: Array | None, every_start: bool = 
     """
     from scipy.sparse import coo_array
 
-    at = Place(design, state, x, every_start)
+    at = LinearisedDesign(design, state, x, every_start)
     blocks = [block for build in BUILDERS for block in build(at)]
     start = np.cumsum([0, *(block.count for block in blocks)])
     column = np.concatenate(
@@ -138,7 +138,7 @@ def single_kinds(design: Design) -> list[str]:
     return ["reading", "end", *(one.word for one in design.observations)]
 
 
-class Place:
+class LinearisedDesign:
     """A design where it is linearised, with what several kinds of patterns need."""
 
     def __init__(
@@ -204,7 +204,7 @@ def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integer
     return row, column, value
 
 
-def _single_readings(at: Place) -> Iterator[BiasPatterns]:
+def _single_readings(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     m, d = at.weight.shape
     rows = np.arange(m * d)
     yield _block(
@@ -215,7 +215,7 @@ def _single_readings(at: Place) -> Iterator[BiasPatterns]:
     )
 
 
-def _single_lengths(at: Place) -> Iterator[BiasPatterns]:
+def _single_lengths(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Lengths that share no reading with others."""
     alone, white = at.white.alone, at.white.single
     row, column = _pairs_within(white, white.group)
@@ -224,7 +224,7 @@ def _single_lengths(at: Place) -> Iterator[BiasPatterns]:
     yield _block("length", (at.places["length"].start + row, column, value), alone)
 
 
-def _ends(at: Place) -> Iterator[BiasPatterns]:
+def _ends(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Readings of standards whose lengths are read together, each along the axes that change
     lengths differently.
     """
@@ -266,7 +266,7 @@ def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers
     return row, column
 
 
-def _single_items(at: Place) -> Iterator[BiasPatterns]:
+def _single_items(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Certified values and priors: what is stated too large makes residuals smaller."""
     # What is known of the machine first, then of artefacts.
     for one in reversed(at.design.observations):
@@ -276,7 +276,7 @@ def _single_items(at: Place) -> Iterator[BiasPatterns]:
             yield _block(one.word, entries, every, one.along)
 
 
-def _dirty_balls(at: Place) -> Iterator[BiasPatterns]:
+def _dirty_balls(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """A ball that is read several times in a position, displaced there; read once, it is the same
     as its reading.
     """
@@ -294,7 +294,7 @@ def _dirty_balls(at: Place) -> Iterator[BiasPatterns]:
     yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
 
 
-def _moved_balls(at: Place) -> Iterator[BiasPatterns]:
+def _moved_balls(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Balls that have been displaced on their plate, along its axes, from one position on."""
     d, readings = at.design.dimension, at.readings
     place = position_order(at.design)[readings.position]
@@ -332,7 +332,7 @@ def position_order(design: Design) -> Integers:
     return order
 
 
-def _slip_starts(at: Place, rows: Integers) -> Integers:
+def _slip_starts(at: LinearisedDesign, rows: Integers) -> Integers:
     """Places among a position's `rows` that a slip may come before."""
     if at.every_start:
         count = len(rows) - 2 * LEAST_PART + 1
@@ -350,7 +350,7 @@ def _slip_starts(at: Place, rows: Integers) -> Integers:
     return np.unique(np.append(between, len(rows) // 2))
 
 
-def _slips(at: Place) -> Iterator[BiasPatterns]:
+def _slips(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Plates that slipped within a position."""
     d = at.design.dimension
     for k in at.has_plate:
@@ -372,7 +372,7 @@ def _slips(at: Place) -> Iterator[BiasPatterns]:
         yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
 
 
-def _probes(at: Place) -> Iterator[BiasPatterns]:
+def _probes(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Probes whose offsets are stated too large; of one that is estimated only its prior can be
     wrong.
     """
@@ -392,7 +392,7 @@ def _probes(at: Place) -> Iterator[BiasPatterns]:
         yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
 
 
-def _length_values(at: Place) -> Iterator[BiasPatterns]:
+def _length_values(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Certified lengths that are stated too long and are read several times, or together with
     others.
     """
@@ -407,7 +407,7 @@ def _length_values(at: Place) -> Iterator[BiasPatterns]:
         yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
 
 
-def _scales(at: Place) -> Iterator[BiasPatterns]:
+def _scales(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Certificates of an artefact of which all values are too long by one ratio."""
     design = at.design
     lengths = design.of(Lengths)
@@ -432,7 +432,7 @@ def _scales(at: Place) -> Iterator[BiasPatterns]:
         yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
 
 
-def _expansions(at: Place) -> Iterator[BiasPatterns]:
+def _expansions(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Artefacts that are larger in one position."""
     design = at.design
     values = length_values(design, at.state)
@@ -448,7 +448,7 @@ def _expansions(at: Place) -> Iterator[BiasPatterns]:
         )
 
 
-BUILDERS: tuple[Callable[[Place], Iterator[BiasPatterns]], ...] = (
+BUILDERS: tuple[Callable[[LinearisedDesign], Iterator[BiasPatterns]], ...] = (
     _single_readings,
     _single_lengths,
     _single_items,

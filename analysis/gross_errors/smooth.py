@@ -16,7 +16,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
 
-from .patterns import Place
+from .patterns import LinearisedDesign
 
 # Scale readings closer than this (m) count as the same place on a scale.
 SAME_PLACE = 1e-3
@@ -48,7 +48,7 @@ def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
     """All smooth errors that are looked for, at scale readings x (readings, d) in the order they
     were taken in.
     """
-    at = Place(design, state, x)
+    at = LinearisedDesign(design, state, x)
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, x):
             yield Smooth(words, _rows(at, displacement))
@@ -153,7 +153,7 @@ def _in_all_directions(values: Array, d: int) -> Array:
     return found.reshape(len(values), d, -1)
 
 
-def _rows(at: Place, displacement: Array) -> Array:
+def _rows(at: LinearisedDesign, displacement: Array) -> Array:
     """Biases (rows, k) of all observations by displacements (readings, d, k) of all readings."""
     k = displacement.shape[2]
     found = np.zeros((row_count(at.design), k))

@@ -11,6 +11,7 @@ import numpy as np
 from ballplate.montecarlo.expansion import Expansion
 from ballplate.montecarlo.reference import Reference
 from ballplate.montecarlo.replicates import BATCH
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from scipy.linalg import solve_triangular
 
 from .linear_problem import Real
@@ -25,7 +26,7 @@ def bare_batch(shared: Reference, seed: int, batch: int) -> tuple[Real, Real]:
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     noise = generator.standard_normal((BATCH, *shared.noise.shape), np.float32)
     noise *= shared.noise.astype(np.float32)
-    given = design.distances
+    given = design.of(CalibratedDistances)
     errors = given.uncertainty * generator.standard_normal((BATCH, len(given)))
     real = shared.truth.state.balls
     true_length = np.sqrt(((real[given.first] - real[given.second]) ** 2).sum(axis=1))

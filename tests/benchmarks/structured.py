@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.distances import CalibratedDistances
 from numpy.polynomial import chebyshev, polynomial
 
 from .linear_problem import Figures, Real, pair_uncertainties, summary
@@ -48,7 +49,8 @@ def structured(design: Design) -> tuple[Figures, int]:
 
     # Balls with calibrated distances are taken out together: their rows, and those of the
     # distances.
-    first, second = design.distances.first, design.distances.second
+    given = design.of(CalibratedDistances)
+    first, second = given.first, given.second
     kept = np.unique(np.concatenate([first, second]))
     k, place = len(kept), np.searchsorted(kept, np.arange(n))
     tied = np.zeros((3 * k + len(first), 3 * k + s))
@@ -56,7 +58,7 @@ def structured(design: Design) -> tuple[Figures, int]:
         tied[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = root[ball]
         tied[3 * i : 3 * i + 3, 3 * k :] = top[ball]
     between = design.balls.places[first] - design.balls.places[second]
-    between /= np.sqrt((between**2).sum(axis=1))[:, None] * design.distances.uncertainty[:, None]
+    between /= np.sqrt((between**2).sum(axis=1))[:, None] * given.uncertainty[:, None]
     for i in range(len(first)):
         tied[3 * k + i, 3 * place[first[i]] : 3 * place[first[i]] + 3] = between[i]
         tied[3 * k + i, 3 * place[second[i]] : 3 * place[second[i]] + 3] = -between[i]

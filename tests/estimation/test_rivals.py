@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.distances import CalibratedDistances, no_distances
 from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
@@ -162,9 +162,7 @@ def test_without_a_calibrated_distance_the_scale_is_open(estimator: AlternativeN
 def test_a_machine_that_shrinks_everything_to_a_point_is_no_estimate() -> None:
     """Without any known length the sum of squares of all distances is least where all are zero."""
     design, x = observed(small())
-    design = replace(
-        design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
-    )
+    design = design.observed(no_distances())
     count = len(design.model.parameters)
     parameters = [one.name for one in design.model.parameters]
     point = np.zeros(count)
