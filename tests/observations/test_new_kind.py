@@ -80,7 +80,7 @@ print(json.dumps({
     "reliability": biases.to_dict(),
     "reliability table": biases.lines(),
     "read": [given.ball.tolist(), given.position.tolist(), given.probe.tolist()],
-    "x": fitted.x.tolist(),
+    "x": fitted.observed.x.tolist(),
     "balls": fitted.solution.state.balls.tolist(),
     "S^2": fitted.solution.factor.sum_of_squares,
     "status": fitted.solution.status,
