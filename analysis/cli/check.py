@@ -3,53 +3,42 @@
 from __future__ import annotations
 
 import os
-import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, percentage
+from .common import add_file, add_formats, percentage
+from .outputs import UsageError
+from .telling import warn
 
 if TYPE_CHECKING:
     from ..checking.check_files import CheckedDesign
 
-FORMATS = ("text", "github", "junit", "json")
-AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
+AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "check",
-        help="judge whether designs determine all their parameters",
-        description=(
-            "Judge the rank of each design, and tell which share of lengths is within its target"
-            " and what carries its scale. The exit status is 0 if every deficiency is the one that"
-            " the file expects (none, where it says nothing), every --goal is met and, with"
-            " --fail-weak, nothing is weakly determined, otherwise 1; it is 3 if a file cannot be"
-            " used, and the others are then checked nevertheless."
-        ),
-    )
+HELP = "judge whether designs determine all their parameters"
+DESCRIPTION = (
+    "Judge the rank of each design, and tell which share of lengths is within its target"
+    " and what carries its scale. The exit status is 0 if every deficiency is the one that"
+    " the file expects (none, where it says nothing), every --goal is met and, with"
+    " --fail-weak, nothing is weakly determined, otherwise 1; it is 3 if a file cannot be"
+    " used, and the others are then checked nevertheless."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     parser.epilog = (
         "FILE may be a pattern such as designs/**/*.yaml, in which ** stands for any folders; files"
         " in folders named sweeps or machines are then left out."
     )
-    parser.add_argument(
-        "--format",
-        choices=FORMATS,
-        default="text",
-        help=(
-            "text (default); github: workflow commands of GitHub Actions, which mark lines of a"
-            " pull request; junit: an XML report for build servers; json: an object, or an array of"
-            " them for several experiments, in metres and radians"
-        ),
-    )
-    parser.add_argument(
-        "--json",
-        action="store_const",
-        dest="format",
-        const="json",
-        help="the same as --format json",
+    add_formats(
+        parser,
+        ("text", "github", "junit", "json"),
+        "text (default); github: workflow commands of GitHub Actions, which mark lines of a"
+        " pull request; junit: an XML report for build servers; json: an object, or an array of"
+        " them for several experiments, in metres and radians",
     )
     parser.add_argument(
         "--suggest",
@@ -84,7 +73,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="store_true",
         help="refuse files with an error model in Python, which is code that loading them runs",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
@@ -102,17 +90,14 @@ def run(options: Namespace) -> int:
         with_share = {"lengths": options.share}
         goals = tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
     except GoalError as error:
-        print(f"ballplate check: {error}", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError(error) from None
     if options.share is not None and "lengths" not in options.goal:
-        print("ballplate check: --share goes with --goal lengths; add it", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError("--share goes with --goal lengths; add it")
     files = []
     wanted = Wanted(goals, options.fail_weak, options.suggest, not options.no_modules)
     for checked in check_files(matching_files(options.files), options.variant, wanted):
         files.append(checked)
-        for doubt in checked.doubts:
-            print(f"warning: {doubt}", file=sys.stderr)
+        warn(checked.doubts)
         if options.format == "github":
             for line in annotation_lines(checked, workspace):
                 print(line, flush=True)

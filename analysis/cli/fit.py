@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .estimators import ESTIMATORS
-from .outputs import add_force, write_outputs
+from .outputs import UsageError, add_force, write
+from .telling import complain, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "fit",
-        help="estimate machine errors, balls and poses from readings",
-        description=(
-            "Estimate all parameters of an experiment from a CSV file of readings with the columns"
-            " position, ball, probe, x_mm, y_mm, z_mm (or another unit). The exit status is 0 if"
-            " the estimate converged and the rank is as expected, otherwise 1."
-        ),
-    )
+HELP = "estimate machine errors, balls and poses from readings"
+DESCRIPTION = (
+    "Estimate all parameters of an experiment from a CSV file of readings with the columns"
+    " position, ball, probe, x_mm, y_mm, z_mm (or another unit). The exit status is 0 if"
+    " the estimate converged and the rank is as expected, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument("readings", metavar="READINGS", type=Path, help="readings (CSV)")
     parser.add_argument(
@@ -86,7 +85,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_force(parser)
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 OF_DISTANCES = ("distances", "cresto", "kruth")
@@ -95,7 +93,6 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
     from ballplate.simulator.design.layout import lay_out
-    from ballplate.simulator.inputs.messages import in_one_line
     from ballplate.simulator.inputs.settings import listing
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.gross_error_messages import (
@@ -105,7 +102,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.readings.reading_files import read_readings
 
     from ..results.study import fit
-    from .common import print_json, print_lines, single
+    from .common import show, single
 
     for option, given, estimators in (
         ("--scale", options.scale, ("reversal",)),
@@ -116,69 +113,46 @@ def run(options: Namespace) -> int:
     ):
         if given and options.estimator not in estimators:
             wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
-            print(
-                f"ballplate fit: {option} goes with --estimator {wanted} only; leave it out",
-                file=sys.stderr,
-            )
-            return 2
+            raise UsageError(f"{option} goes with --estimator {wanted} only; leave it out")
     if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (
         ".yaml",
         ".yml",
     ):
-        told = (
+        raise UsageError(
             f"the experiment file comes first, then the readings: fit {options.readings}"
             f" {options.files[0]}"
         )
-        print(f"ballplate fit: {told}", file=sys.stderr)
-        return 2
     experiment = single(options)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
     if options.plot and (
         experiment.dimension != 2 or options.estimator not in ("full", "reversal")
     ):
-        text = (
+        raise UsageError(
             "--plot draws residuals of readings in two dimensions, by the full estimator or"
             " reversal; leave it out"
         )
-        print(f"ballplate fit: {text}", file=sys.stderr)
-        return 2
     observed = read_readings(options.readings, lay_out(experiment))
     for what, names in (
         ("planned but not read", observed.missing),
         ("read but not planned", observed.unplanned),
     ):
         if names:
-            told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
-            print(in_one_line(told), file=sys.stderr)
-    doubts = doubts_about_lengths(observed.design, observed.x)
-    for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
-        print(f"warning: {doubt}", file=sys.stderr)
+            complain(f"{options.readings}: {what} ({len(names)}): {listing(names)}")
+    warn(doubts_about_lengths(observed.design, observed.x))
+    warn(doubts_about_volume(observed.design, observed.x, observed.marks))
     if options.estimator != "full":
         return _run_other(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
-    has_converged = result.solution.status == "converged"
-    is_drawn = (
-        not options.plot
-        or not has_converged
-        or write_outputs({options.plot: result.plot}, options.force)
-    )
-    if options.json:
-        print_json([result.to_dict()])
-    else:
-        print_lines(result.lines())
-    if not has_converged:
-        text = (
-            "see the record of iterations, and look for wrong units, balls or probes among the"
-            " readings"
-        )
-        print(
-            f"the estimate has {result.solution.status} and nothing is made of it: {text}",
-            file=sys.stderr,
+    if options.plot and result.converged:
+        write(options, {options.plot: result.plot})
+    show(options, result)
+    if not result.converged:
+        complain(
+            f"the estimate has {result.solution.status} and nothing is made of it: see the record"
+            " of iterations, and look for wrong units, balls or probes among the readings"
         )
         return 1
-    if not is_drawn:
-        return 3
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
         cure = (
@@ -187,14 +161,10 @@ def run(options: Namespace) -> int:
         )
         if result.diagnosis.suspects or result.diagnosis.scatter:
             cure = "look at what is suspected"
-        print(
-            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {cure}",
-            file=sys.stderr,
-        )
-    for doubt in result.doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
+        warn([f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}"])
+    warn(result.doubts)
     if not result.verdict.as_expected:
-        print(result.verdict.complaint, file=sys.stderr)
+        complain(result.verdict.complaint)
         return 1
     return 0
 
@@ -204,20 +174,13 @@ def _run_other(options: Namespace, experiment: Experiment, observed: ObservedRea
     from .common import print_json, print_lines
 
     found = ESTIMATORS[options.estimator](options, experiment, observed)
-    is_drawn = (
-        not options.plot
-        or not found.draw
-        or write_outputs({options.plot: found.draw}, options.force)
-    )
+    if options.plot and found.draw:
+        write(options, {options.plot: found.draw})
     if options.json:
         print_json([found.data])
     else:
         print_lines(found.lines)
-    if not is_drawn:
-        return 3
-    for warning in found.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+    warn(found.warnings)
     if found.complaint:
-        print(found.complaint, file=sys.stderr)
-        return 1
-    return 0
+        complain(found.complaint)
+    return 1 if found.complaint else 0

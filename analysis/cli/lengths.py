@@ -3,40 +3,38 @@
 from __future__ import annotations
 
 import math
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, add_json, add_picture, print_json, print_lines, single
-from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from . import common
+from .common import add_file, add_json, add_picture, number, print_json, print_lines, single
+from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
     from ..length_map.length_map import Settings
 
-NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 1, 2, 3
 # Lines of a table of all lengths.
 MOST_PAIRS = 500_000
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "lengths",
-        help="map the uncertainty of lengths over the volume against a target",
-        description=(
-            "Compute the standard uncertainty u of the length between every two points of a grid"
-            " over the volume, measured on the corrected machine, and compare it and the expanded"
-            " uncertainty k u with the target by length, direction and place. A target is meant for"
-            " u, or for U = k u where the file states a coverage_factor. The scatter of the"
-            " readings that will measure a length is no part of u unless asked for. The exit status"
-            " is 0 if the rank is as expected and, with --fail, all lengths are within the target,"
-            " otherwise 1."
-        ),
-    )
+HELP = "map the uncertainty of lengths over the volume against a target"
+DESCRIPTION = (
+    "Compute the standard uncertainty u of the length between every two points of a grid"
+    " over the volume, measured on the corrected machine, and compare it and the expanded"
+    " uncertainty k u with the target by length, direction and place. A target is meant for"
+    " u, or for U = k u where the file states a coverage_factor. The scatter of the"
+    " readings that will measure a length is no part of u unless asked for. The exit status"
+    " is 0 if the rank is as expected and, with --fail, all lengths are within the target,"
+    " otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--target",
@@ -74,27 +72,19 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
     add_force(parser)
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def _grid(text: str) -> tuple[int, ...]:
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) <= 3 and all(
-        part.isascii() and part.isdigit() and len(part) < 6 for part in parts
-    ):
-        counts = tuple(map(int, parts))
-        if min(counts) >= 2:
-            return counts
-    raise ArgumentTypeError(
-        f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
-    )
+    counts = common.grid(text)
+    if counts is None or len(counts) > 3:
+        raise ArgumentTypeError(
+            f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
+        )
+    return counts
 
 
 def _factor(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
+    value = number(text)
     if not 0.0 < value <= 100.0:
         raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
     return value
@@ -108,17 +98,12 @@ def run(options: Namespace) -> int:
 
     experiment = single(options)
     settings = _settings(experiment, options)
-    if isinstance(settings, str):
-        print(f"ballplate lengths: {settings}", file=sys.stderr)
-        return WRONG_USAGE
     count = math.comb(math.prod(settings.grid), 2)
     if options.pairs is not None and count > MOST_PAIRS:
-        told = (
+        raise UsageError(
             f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
             " --grid coarser"
         )
-        print(f"ballplate lengths: {told}", file=sys.stderr)
-        return WRONG_USAGE
     with progress(options) as shown:
         found = length_map(experiment, settings, shown.show)
     writers: dict[Path, Writer] = {}
@@ -130,20 +115,21 @@ def run(options: Namespace) -> int:
         from ..report.lengths import draw_lengths
 
         writers[options.plot] = partial(draw_lengths, found)
-    is_written = write_outputs(writers, options.force)
+    write(options, writers)
     if options.json:
         print_json([length_data(experiment.label, experiment.title, found)])
     else:
         print_lines(length_lines(f"{experiment.label}: {experiment.title}", found))
-    if not is_written:
-        return BAD_FILE
     is_missed = options.fail and not found.is_met
     is_expected = found.deficiency == (experiment.expected_rank_deficiency or 0)
-    return 0 if is_expected and not is_missed else NOT_AS_EXPECTED
+    return 0 if is_expected and not is_missed else 1
 
 
-def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
-    """What was asked for, or why it cannot be."""
+def _settings(experiment: Experiment, options: Namespace) -> Settings:
+    """What was asked for.
+
+    :raises UsageError: it cannot be had of this experiment.
+    """
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
     from ballplate.simulator.inputs.settings import hint
 
@@ -154,24 +140,26 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
         stated = None if experiment.target_accuracy is None else experiment.target_accuracy.stated
         target = stated if options.target is None else parse_length_function(options.target)
     except QuantityError as error:
-        return f"--target: {error}"
+        raise UsageError(f"--target: {error}") from None
     if target is None:
-        return (
+        raise UsageError(
             'the file states no target_accuracy; add it, or give --target, such as "0.5 um +'
             ' L/1000000"'
         )
     d = experiment.dimension
     grid = options.grid * d if len(options.grid) == 1 else options.grid
     if len(grid) != d:
-        return (
+        raise UsageError(
             f"--grid has {len(grid)} numbers, but the experiment has {d} dimensions; give one,"
             f" or {d}"
         )
     if math.prod(grid) > MOST_POINTS:
-        return f"a grid of {math.prod(grid)} points is too fine; at most {MOST_POINTS} are possible"
+        raise UsageError(
+            f"a grid of {math.prod(grid)} points is too fine; at most {MOST_POINTS} are possible"
+        )
     probe = options.probe or experiment.evaluation.probe
     if probe not in experiment.probes:
-        return f'unknown probe "{probe}"; {hint(probe, experiment.probes)}'
+        raise UsageError(f'unknown probe "{probe}"; {hint(probe, experiment.probes)}')
     factor = experiment.coverage_factor
     expanded = options.coverage_factor or expansion(factor)
     return Settings(grid, probe, target, expanded, options.with_repeatability, factor)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import sys
+import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from .common import add_picture, count, print_json, print_lines
-from .outputs import Writer, add_force, write_outputs
+from . import common
+from .common import add_formats, add_picture, at_most, count, print_json, print_lines
+from .outputs import UsageError, Writer, add_force, write
+from .telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.machines.description import Three
@@ -17,23 +20,20 @@ if TYPE_CHECKING:
 
     from ..volumetric.volumetric_errors import AlongAxis, Volumetric
 
-WRONG_USAGE, BAD_FILE = 2, 3
-
 # Points along a line unless told.
 POINTS = 21
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "map",
-        help="volumetric errors of a machine, from its parametric errors",
-        description=(
-            "Combine the parametric errors of a machine file to volumetric errors, systematic and"
-            " random: on a grid with the length errors of the four body diagonals, along a line"
-            " parallel to an axis, or one parametric error along its axis. Errors are where the tip"
-            " is, less where the scales say; the error of indication has the opposite sign."
-        ),
-    )
+HELP = "volumetric errors of a machine, from its parametric errors"
+DESCRIPTION = (
+    "Combine the parametric errors of a machine file to volumetric errors, systematic and"
+    " random: on a grid with the length errors of the four body diagonals, along a line"
+    " parallel to an axis, or one parametric error along its axis. Errors are where the tip"
+    " is, less where the scales say; the error of indication has the opposite sign."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="machine file (YAML)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
@@ -68,39 +68,19 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=count,
         help="of errors in the drawing of the grid; default: as fits",
     )
-    parser.add_argument(
-        "--format",
-        choices=("text", "csv", "json"),
-        default="text",
-        help="csv: the points alone; json: metres, radians",
-    )
-    parser.add_argument(
-        "--json",
-        action="store_const",
-        dest="format",
-        const="json",
-        help="the same as --format json",
-    )
-    parser.set_defaults(run=run)
+    add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")
 
 
-def _grid(text: str) -> tuple[int, int, int]:
+def _grid(text: str) -> tuple[int, ...]:
     from ..volumetric.volumetric_errors import MOST_POINTS
 
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) == 3 and all(
-        part.isascii() and part.isdigit() and len(part) < 8 for part in parts
-    ):
-        x, y, z = (int(part) for part in parts)
-        if min(x, y, z) >= 2:
-            if x * y * z > MOST_POINTS:
-                raise ArgumentTypeError(
-                    f"{x * y * z} points are too many; at most {MOST_POINTS} are possible"
-                )
-            return x, y, z
-    raise ArgumentTypeError(
-        f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"'
-    )
+    counts = common.grid(text)
+    if counts is None or len(counts) != 3:
+        raise ArgumentTypeError(
+            f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"'
+        )
+    at_most(math.prod(counts), MOST_POINTS, "points")
+    return counts
 
 
 def _points(text: str) -> int:
@@ -142,26 +122,18 @@ def run(options: Namespace) -> int:
 
     doubts: list[Message] = []
     machine = load_machine(options.file, doubts)
-    for doubt in doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
+    warn(doubts)
     drawn = options.plot is not None and options.line is None and options.error is None
     if options.magnification is not None and not drawn:
-        print(
-            "ballplate map: --magnification is for the drawing of the grid; leave it out",
-            file=sys.stderr,
-        )
-        return WRONG_USAGE
+        raise UsageError("--magnification is for the drawing of the grid; leave it out")
     if options.points is not None and options.line is None:
-        print("ballplate map: --points is for --line; leave it out", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError("--points is for --line; leave it out")
     if options.error is not None:
         from ..volumetric.volumetric_tables import why_not_along
 
         every = {one.error.name: one for one in along_axes(machine)}
         if options.error not in every:
-            told = why_not_along(options.error, Volumetric(machine), str(options.file))
-            print(f"ballplate map: {told}", file=sys.stderr)
-            return WRONG_USAGE
+            raise UsageError(why_not_along(options.error, Volumetric(machine), str(options.file)))
         return _of_one(every[options.error], options)
     built = Volumetric(machine)
     if options.line is None:
@@ -173,8 +145,7 @@ def run(options: Namespace) -> int:
     outside = np.flatnonzero(((ends < machine.lower) | (ends > machine.upper)).any(axis=0))
     if len(outside):
         named = " and ".join("xyz"[k] for k in outside)
-        print(f"ballplate map: the line is outside the volume in {named}", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError(f"the line is outside the volume in {named}")
     return _on_a_line(built, start, end, options)
 
 
@@ -182,77 +153,49 @@ def _of_one(found: AlongAxis, options: Namespace) -> int:
     from ..report.volumetric import draw_along
     from ..volumetric.volumetric_tables import along_csv, along_data, along_lines
 
-    status = _drawn(options, partial(draw_along, found))
-    if options.format == "json":
-        print_json([along_data(found)])
-    else:
-        print_lines(along_lines(found) if options.format == "text" else list(along_csv(found)))
-    return status
+    _draw(options, partial(draw_along, found))
+    return _tell(options, along_lines(found), along_csv(found), along_data(found))
 
 
 def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace) -> int:
     from ..report.volumetric import draw_line
+    from ..volumetric import volumetric_tables as tables
     from ..volumetric.volumetric_errors import between
-    from ..volumetric.volumetric_tables import (
-        error_csv,
-        error_data,
-        error_lines,
-        length_data,
-        length_line,
-        machine_data,
-    )
 
     found = machine.errors(between(start, end, options.points or POINTS))
     length = machine.lengths(start[None], end[None])
-    status = _drawn(options, partial(draw_line, found))
-    if options.format == "json":
-        print_json(
-            [{**machine_data(machine), "length": length_data(length)[0], "line": error_data(found)}]
-        )
-    elif options.format == "csv":
-        print_lines(list(error_csv(found)))
-    else:
-        print_lines([*error_lines(found), length_line(length)])
-    return status
+    _draw(options, partial(draw_line, found))
+    lines = [*tables.error_lines(found), tables.length_line(length)]
+    told = {"length": tables.length_data(length)[0], "line": tables.error_data(found)}
+    return _tell(options, lines, tables.error_csv(found), tables.machine_data(machine) | told)
 
 
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
     from ..report.volumetric import draw_grid
-    from ..volumetric.volumetric_tables import (
-        diagonal_data,
-        diagonal_lines,
-        error_csv,
-        error_data,
-        error_lines,
-        machine_data,
-        machine_lines,
+    from ..volumetric import volumetric_tables as tables
+
+    found, diagonals = machine.errors(machine.grid(options.grid)), machine.diagonals()
+    _draw(options, partial(draw_grid, found, diagonals, options.grid, options.magnification))
+    lines = [*tables.machine_lines(machine), "", *tables.diagonal_lines(diagonals), ""]
+    told = {"diagonals": tables.diagonal_data(diagonals), "grid": tables.error_data(found)}
+    return _tell(
+        options,
+        lines + tables.error_lines(found),
+        tables.error_csv(found),
+        tables.machine_data(machine) | told,
     )
 
-    found = machine.errors(machine.grid(options.grid))
-    diagonals = machine.diagonals()
-    status = _drawn(
-        options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path)
-    )
-    if options.format == "json":
-        data = {
-            **machine_data(machine),
-            "diagonals": diagonal_data(diagonals),
-            "grid": error_data(found),
-        }
-        print_json([data])
-    elif options.format == "csv":
-        print_lines(list(error_csv(found)))
-    else:
-        print_lines(
-            [*machine_lines(machine), "", *diagonal_lines(diagonals), "", *error_lines(found)]
-        )
-    return status
 
-
-def _drawn(options: Namespace, writer: Writer) -> int:
+def _draw(options: Namespace, writer: Writer) -> None:
     """Draw what was asked for, before anything is printed that nobody may read to its end."""
-    return (
-        0
-        if options.plot is None or write_outputs({options.plot: writer}, options.force)
-        else BAD_FILE
-    )
+    if options.plot is not None:
+        write(options, {options.plot: writer})
+
+
+def _tell(options: Namespace, lines: list[str], rows: Iterable[str], data: dict[str, Any]) -> int:
+    """Print what was found in the form that was asked for."""
+    if options.format == "json":
+        print_json([data])
+    else:
+        print_lines(list(rows) if options.format == "csv" else lines)
+    return 0

@@ -93,7 +93,7 @@ class Output:
 
 
 class UsageError(ValueError):
-    """Options that do not go together."""
+    """Options that do not go together, or one whose value cannot be used here."""
 
 
 class OutputAction(Action):
@@ -298,12 +298,20 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     return True
 
 
-def text_writer(write: Callable[[TextIO], object]) -> Writer:
+def write(options: Namespace, writers: Mapping[Path, Writer]) -> bool:
+    """Write the files of a command, which ends with the status of a file that cannot be used if
+    one of them cannot be written; whether they are.
+    """
+    options.is_written = write_outputs(writers, options.force) and options.is_written
+    return bool(options.is_written)
+
+
+def text_writer(print_to: Callable[[TextIO], object]) -> Writer:
     """A writer of text, in UTF-8 and with line ends as they are."""
 
     def write_file(path: Path) -> None:
         with path.open("w", encoding="utf-8", newline="") as stream:
-            write(stream)
+            print_to(stream)
 
     return write_file
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, add_picture, count, print_json, print_lines, seed, single
-from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from .common import add_file, add_json, add_picture, add_workers, count, number, show, single, whole
+from .outputs import Writer, add_force, add_output, text_writer, write
 from .telling import note
 
 if TYPE_CHECKING:
@@ -18,24 +18,22 @@ if TYPE_CHECKING:
     from ..planning.schedule import RunSheet
     from ..planning.selection import Campaign
 
-AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 SHEETS = (".html", ".md", ".csv", ".txt")
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "plan",
-        help=(
-            "choose positions and certificates from a pool, and tell how far from the best possible"
-            " they are"
-        ),
-        description=(
-            "Choose from the pool of an experiment file what makes a criterion smallest within a"
-            " budget, and bound what any choice could reach. Without a budget the choice may cost"
-            " what the positions of the file itself do. The exit status is 0 if the choice"
-            " determines everything, otherwise 1."
-        ),
-    )
+HELP = (
+    "choose positions and certificates from a pool, and tell how far from the best possible"
+    " they are"
+)
+DESCRIPTION = (
+    "Choose from the pool of an experiment file what makes a criterion smallest within a"
+    " budget, and bound what any choice could reach. Without a budget the choice may cost"
+    " what the positions of the file itself do. The exit status is 0 if the choice"
+    " determines everything, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--criterion",
@@ -96,15 +94,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_force(output)
     add_json(parser)
     parser.add_argument(
-        "--seed", type=seed, default=1, help="of the random starts of the search; default 1"
+        "--seed", type=whole, default=1, help="of the random starts of the search; default 1"
     )
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=count,
-        help="processes that share the work; default: one for each processor",
-    )
-    parser.set_defaults(run=run)
+    add_workers(parser)
 
 
 class _Criterion(Action):
@@ -135,10 +127,7 @@ def _criterion(text: str) -> str:
 
 
 def _hours(text: str) -> float:
-    try:
-        value = float(text.removesuffix("h").strip())
-    except ValueError:
-        value = float("nan")
+    value = number(text, "h")
     if not 0.0 < value < 1e5:
         raise ArgumentTypeError(f'expected hours above zero, such as 7.5, not "{text}"')
     return value
@@ -153,7 +142,7 @@ def _sheet(text: str) -> Path:
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
     from ballplate.simulator.experiment.load import load
-    from ballplate.simulator.inputs.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
@@ -179,7 +168,7 @@ def run(options: Namespace) -> int:
             before = load(options.earlier)
             if len(before) > 1:
                 text = "the file has several variants; name a design that was chosen"
-                raise ExperimentError([Message(str(options.earlier), 0, 0, "variants", text)])
+                raise refused(options.earlier, text, "variants")
             earlier = earlier_choice(before[0], offered)
     except ExperimentError as error:
         messages += error.messages
@@ -197,23 +186,18 @@ def run(options: Namespace) -> int:
         )
     sheet = found.sheet
     try:
-        is_written = _written(found, sheet, options)
+        _write(found, sheet, options)
     except ExperimentError as error:
         # What took so long to find is told nevertheless.
         print_errors(error.messages, options)
-        is_written = False
-    if options.json:
-        print_json([found.to_dict()])
-    else:
-        print_lines(found.lines())
-    if not is_written:
-        return BAD_FILE
+        options.is_written = False
+    show(options, found)
     is_full = found.plan.verdict.deficiency == found.left_open
-    return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
+    return 0 if found.is_determined and is_full else 1
 
 
-def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
-    """Write what was asked for; False if something cannot be written."""
+def _write(found: Campaign, sheet: RunSheet, options: Namespace) -> None:
+    """Write what was asked for."""
     writers: dict[Path, Writer] = {}
     if options.output is not None:
         from ..planning.experiment_file import experiment_text
@@ -233,11 +217,9 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
     if options.plot is not None:
         # Numbered as on the run sheet.
         writers[options.plot] = replace(found, chosen=sheet.chosen).plot
-    is_written = write_outputs(writers, options.force)
-    for path in (options.output, options.sheet):
-        if is_written and path is not None:
+    if write(options, writers):
+        for path in filter(None, (options.output, options.sheet)):
             note(options, f"{path} written")
-    return is_written
 
 
 def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 
-from .common import add_file, add_json, percentage, print_json, print_lines, single, whole
+from .common import add_file, add_json, percentage, show, single, whole
+from .outputs import UsageError
 
-WRONG_USAGE = 2
 UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "reach",
-        help="tell which repeatability, certificate, repeats, balls or size meets a target",
-        description=(
-            "Solve for one unknown of a design at a time, the others as drawn: the largest"
-            " repeatability or certificate uncertainty, and the fewest repeats, fewest balls or"
-            " smallest plate that meet a goal. What is told is a value of three digits, or a whole"
-            " number, with which the file was planned; the next one fails. The exit status is 0 if"
-            " every unknown asked for has such a value (without --by: one of them), otherwise 1;"
-            " with --fail it is 0 if the design as drawn meets the goal, otherwise 1."
-        ),
-    )
+HELP = "tell which repeatability, certificate, repeats, balls or size meets a target"
+DESCRIPTION = (
+    "Solve for one unknown of a design at a time, the others as drawn: the largest"
+    " repeatability or certificate uncertainty, and the fewest repeats, fewest balls or"
+    " smallest plate that meet a goal. What is told is a value of three digits, or a whole"
+    " number, with which the file was planned; the next one fails. The exit status is 0 if"
+    " every unknown asked for has such a value (without --by: one of them), otherwise 1;"
+    " with --fail it is 0 if the design as drawn meets the goal, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated"
@@ -65,7 +63,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="end with exit status 1 unless the design as drawn meets the goal",
     )
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
@@ -94,12 +91,8 @@ def run(options: Namespace) -> int:
                 shown.show,
             )
     except (GoalError, NotVariableError, QuantityError) as error:
-        print(f"ballplate reach: {error}", file=sys.stderr)
-        return WRONG_USAGE
-    if options.json:
-        print_json([found.to_dict()])
-    else:
-        print_lines(found.lines())
+        raise UsageError(error) from None
+    show(options, found)
     if options.fail:
         return 0 if found.present.is_met else 1
     met = [one.is_met for one in found.answers]

@@ -4,31 +4,28 @@ printed of them.
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from .common import trial_count
+from .outputs import UsageError
 
-WRONG_USAGE = 2
+HELP = (
+    "compute a document's published experiments, or certified problems, and set their"
+    " figures beside ours"
+)
+DESCRIPTION = (
+    "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
+    " shipped designs. Every legible figure stands beside ours with the ratio and what the"
+    " comparison rests on; statements on rank, errata and open differences likewise. The"
+    " exit status is 0 if all of it agrees within what is stated, otherwise 1. certified:"
+    " solve the problems with certified answers, and tell how many digits agree; with"
+    " --results those of another program. The exit status is 0 if every rank and every"
+    " count is right and every quantity has an answer, otherwise 1."
+)
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "reproduce",
-        help=(
-            "compute a document's published experiments, or certified problems, and set their"
-            " figures beside ours"
-        ),
-        description=(
-            "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
-            " shipped designs. Every legible figure stands beside ours with the ratio and what the"
-            " comparison rests on; statements on rank, errata and open differences likewise. The"
-            " exit status is 0 if all of it agrees within what is stated, otherwise 1. certified:"
-            " solve the problems with certified answers, and tell how many digits agree; with"
-            " --results those of another program. The exit status is 0 if every rank and every"
-            " count is right and every quantity has an answer, otherwise 1."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "document",
         metavar="DOCUMENT",
@@ -73,20 +70,14 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--json", action="store_true", help="print a JSON object in metres and radians"
     )
     form.add_argument("--markdown", action="store_true", help="print Markdown")
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
     """Reproduce a document; 1 if a published figure does not come out within the limits stated."""
-    import sys
-
     if options.document == "certified":
         return _certified(options)
     if options.results:
-        print(
-            "ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr
-        )
-        return WRONG_USAGE
+        raise UsageError("--results goes with certified only; leave it out")
 
     from ballplate.designs import shipped
     from ballplate.simulator.inputs.settings import hint
@@ -106,10 +97,7 @@ def run(options: Namespace) -> int:
     known = document.statements.sections
     for name in options.experiment:
         if name not in known:
-            print(
-                f'ballplate reproduce: no experiment "{name}"; {hint(name, known)}', file=sys.stderr
-            )
-            return WRONG_USAGE
+            raise UsageError(f'no experiment "{name}"; {hint(name, known)}')
     trials = None if options.quick else options.trials
     with progress(options) as shown:
         found = reproduce(
@@ -132,8 +120,6 @@ def _certified(options: Namespace) -> int:
     """Score answers to certified problems; 1 if a rank or count is wrong, or an answer is
     missing.
     """
-    import sys
-
     from ballplate.designs import shipped
 
     from ..certified.answers import answers
@@ -144,11 +130,7 @@ def _certified(options: Namespace) -> int:
     from .progress import progress
 
     if options.quick or options.markdown:
-        print(
-            "ballplate reproduce: --quick and --markdown go with npl only; leave them out",
-            file=sys.stderr,
-        )
-        return WRONG_USAGE
+        raise UsageError("--quick and --markdown go with npl only; leave them out")
     problems = certified_problems(options.designs or shipped("certified"), options.experiment)
     if options.results:
         results = read_results(options.results, problems)

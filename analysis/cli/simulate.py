@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from .common import add_file, seed
-from .outputs import add_force, add_output, text_writer, write_outputs
+from .common import add_file, whole
+from .outputs import add_force, add_output, text_writer, write
 from .telling import note
 
-BAD_FILE = 3
+HELP = "write synthetic readings of a design"
+DESCRIPTION = (
+    "Write readings that the file's true machine would give of artefacts that differ from"
+    " their certificates by the stated uncertainties, with noise of the stated"
+    " repeatability. The same seed gives the same readings, with and without --certificate."
+)
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "simulate",
-        help="write synthetic readings of a design",
-        description=(
-            "Write readings that the file's true machine would give of artefacts that differ from"
-            " their certificates by the stated uncertainties, with noise of the stated"
-            " repeatability. The same seed gives the same readings, with and without --certificate."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     add_output(
         parser,
@@ -45,17 +41,16 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
             " for fit --certificate"
         ),
     )
-    parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
+    parser.add_argument("--seed", type=whole, help="seed of the noise, instead of the file's")
     parser.add_argument(
         "--exact", action="store_true", help="leave all noise out; artefacts are as drawn"
     )
     add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
     """Write one set of readings."""
-    from ballplate.simulator.inputs.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.messages import refused
     from ballplate.simulator.readings.certificate_files import (
         certified_values,
         drawn_values,
@@ -73,7 +68,7 @@ def run(options: Namespace) -> int:
             "there is no certificate, prior or probe offset with an uncertainty; leave"
             " --certificate out"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)])
+        raise refused(experiment.source, text)
     found = simulated_readings(experiment, options.seed, options.exact)
     texts: dict[Path, Callable[[TextIO], None]] = {
         options.output: lambda stream: write_readings(stream, found.design, found.readings, found.x)
@@ -87,10 +82,9 @@ def run(options: Namespace) -> int:
             stream, with_values(experiment, values), comment
         )
         told.append(f"{len(values)} certificate values written to {options.certificate}")
-    writers = {path: text_writer(write) for path, write in texts.items() if str(path) != "-"}
-    if not write_outputs(writers, options.force):
-        return BAD_FILE
-    for line, path in zip(told, texts, strict=True):
+    writers = {path: text_writer(print_to) for path, print_to in texts.items() if str(path) != "-"}
+    is_written = write(options, writers)
+    for line, path in zip(told, texts, strict=True) if is_written else ():
         if path in writers:
             note(options, line)
         else:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .common import add_picture, count, print_json, print_lines
-from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 
 if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import ExperimentError
@@ -21,27 +21,20 @@ if TYPE_CHECKING:
 
     from ..error_curve.error_curve import CurveSettings, Place
 
-WRONG_USAGE, BAD_FILE = 2, 3
+
+HELP = "fit a spline with prescribed values and slopes to measured errors"
+DESCRIPTION = (
+    "Fit a spline to errors along an axis or along the profile of a turned part, by least"
+    " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
+    " polynomials for a controller. The file has columns such as position_mm and error_um,"
+    " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
+    " abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa"
+    ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
+    ' mm, -37.084 mm".'
+)
 
 
-class OptionError(ValueError):
-    """An option's value cannot be used."""
-
-
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "spline",
-        help="fit a spline with prescribed values and slopes to measured errors",
-        description=(
-            "Fit a spline to errors along an axis or along the profile of a turned part, by least"
-            " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
-            " polynomials for a controller. The file has columns such as position_mm and error_um,"
-            " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
-            " abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa"
-            ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
-            ' mm, -37.084 mm".'
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="measured points (CSV)")
     data = parser.add_argument_group("points")
     data.add_argument(
@@ -145,7 +138,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--magnification", metavar="N", type=float, help="of the bars; default: one that suits"
     )
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
-    parser.set_defaults(run=run)
 
 
 # A polynomial through so many points keeps seven digits; with each further order it loses nearly
@@ -160,7 +152,6 @@ POWERS = (
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
     import numpy as np
-    from ballplate.simulator.inputs.messages import in_one_line
     from ballplate.simulator.splines.problems import SplineError
     from ballplate.simulator.splines.read import choose_points, read_points
 
@@ -172,16 +163,12 @@ def run(options: Namespace) -> int:
     points = everything
     if options.points is not None:
         points = everything.chosen(choose_points(everything, options.points, str(options.file)))
-    try:
-        settings = _settings(options, points)
-        uncertainty = (
-            None if options.uncertainty is None else _positive(options.uncertainty, points.y_column)
-        )
-        at = _list("--evaluate", options.evaluate, points.x_column) if options.evaluate else []
-        _check(options, points)
-    except OptionError as error:
-        print(in_one_line(f"ballplate spline: {error}"), file=sys.stderr)
-        return WRONG_USAGE
+    settings = _settings(options, points)
+    uncertainty = (
+        None if options.uncertainty is None else _positive(options.uncertainty, points.y_column)
+    )
+    at = _list("--evaluate", options.evaluate, points.x_column) if options.evaluate else []
+    _check(options, points)
     try:
         curve = fit_curve(points, settings, uncertainty, options.sigma)
         where = np.array(at, dtype=float)
@@ -199,7 +186,7 @@ def run(options: Namespace) -> int:
         )
         if polynomials is not None and str(options.coefficients) != "-":
             writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
-        is_written = write_outputs(writers, options.force)
+        write(options, writers)
     except SplineError as error:
         raise _told(error, points.x_column, options.file) from None
     if options.json:
@@ -208,7 +195,7 @@ def run(options: Namespace) -> int:
         sys.stdout.write(polynomials)
     else:
         print_lines(lines)
-    return 0 if is_written else BAD_FILE
+    return 0
 
 
 def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
@@ -224,28 +211,28 @@ def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
 def _check(options: Namespace, points: Points) -> None:
     """Refuse options that do not go together.
 
-    :raises OptionError: there are such.
+    :raises UsageError: there are such.
     """
     if options.whiskers is not None and points.places is None:
-        raise OptionError(
+        raise UsageError(
             "--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file"
         )
     if options.whiskers is not None and points.y_column.kind != "length":
-        raise OptionError(
+        raise UsageError(
             f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle"
         )
     if options.magnification is not None and not 0 < options.magnification < float("inf"):
-        raise OptionError("--magnification should be above 0, such as 200")
+        raise UsageError("--magnification should be above 0, such as 200")
     if options.magnification is not None and options.whiskers is None:
-        raise OptionError("--magnification is that of --whiskers; add that, or leave it out")
+        raise UsageError("--magnification is that of --whiskers; add that, or leave it out")
     if options.json and str(options.coefficients) == "-":
-        raise OptionError("--json and --coefficients - both go to the screen; name a file for one")
+        raise UsageError("--json and --coefficients - both go to the screen; name a file for one")
 
 
 def _settings(options: Namespace, points: Points) -> CurveSettings:
     """What the options ask for.
 
-    :raises OptionError: a value that is no length, angle or slope.
+    :raises UsageError: a value that is no length, angle or slope.
     """
     from ..error_curve.error_curve import EVERY, CurveSettings, Hold
 
@@ -260,9 +247,7 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
                 )
     for place, what, text in options.at:
         if what not in ("value", "slope"):
-            raise OptionError(
-                f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0'
-            )
+            raise UsageError(f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0')
         derivative = ("value", "slope").index(what)
         holds.append(
             Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y))
@@ -275,18 +260,18 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
             else tuple(sorted(_list("--knots", options.knots, x)))
         )
     if not 2 <= options.order <= MOST_ORDER:
-        raise OptionError(f"--order should be 2 to {MOST_ORDER}; 4 is a cubic spline")
+        raise UsageError(f"--order should be 2 to {MOST_ORDER}; 4 is a cubic spline")
     period = None
     if options.period is not None:
         period = _positive(options.period, x, "--period")
     elif options.periodic:
         if x.kind == "length":
-            raise OptionError(
+            raise UsageError(
                 '--periodic: the abscissa is a length; state the period, as in --period "10 mm"'
             )
         period = _positive("360 deg", x)
     if options.start.strip() == "end" or options.end.strip() == "start":
-        raise OptionError(
+        raise UsageError(
             "the curve starts at its start and ends at its end; give --start and --end other places"
         )
     return CurveSettings(
@@ -316,13 +301,13 @@ def _quantity(option: str, text: str, kind: str) -> float:
     try:
         return _parser(kind)(text)
     except QuantityError as error:
-        raise OptionError(f"{option}: {error}") from None
+        raise UsageError(f"{option}: {error}") from None
 
 
 def _positive(text: str, column: Column, option: str = "--uncertainty") -> float:
     found = _quantity(option, text, column.kind)
     if found <= 0:
-        raise OptionError(f'{option}: "{text}" must be above zero')
+        raise UsageError(f'{option}: "{text}" must be above zero')
     return found
 
 
@@ -336,7 +321,7 @@ def _place(option: str, text: str, column: Column) -> Place:
         return "start" if plain == "start" else "end"
     parts = plain.split(",")
     if len(parts) > 2 or len(parts) == 2 and column.kind != "length":
-        raise OptionError(
+        raise UsageError(
             f'{option}: "{text}" should be one abscissa, or two nominal co-ordinates on a profile'
         )
     if len(parts) == 2:
@@ -359,7 +344,7 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
     if plain in ("0", "-0", "0.0"):
         return 0.0
     if re.match("[+-]?[0-9]+,[0-9]", plain):
-        raise OptionError(
+        raise UsageError(
             f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
         )
     found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
@@ -369,6 +354,6 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
             return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
         if x.kind == y.kind == "length":
             return parse_ratio(plain)
-    raise OptionError(
+    raise UsageError(
         f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0'
     )

@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.length_equations import (
 from ballplate.simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import (
@@ -99,9 +99,7 @@ def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
             try:
                 found.append(pairs(layout, chosen) + first)
             except ValueError as error:
-                raise ExperimentError(
-                    [Message(str(experiment.source), 0, 0, f"artefacts.{artefact}", str(error))]
-                ) from None
+                raise refused(experiment.source, str(error), f"artefacts.{artefact}") from None
         first += len(layout.names)
     return np.concatenate(found)
 
@@ -156,7 +154,7 @@ def _refuse_many_terms(
             f"{len(design.model.parameters)} parameters: take fewer --pairs, such as corners, or"
             " fewer balls"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+        raise refused(experiment.source, text, "artefacts")
 
 
 def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
@@ -172,7 +170,7 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
         text = (
             f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+        raise refused(experiment.source, text, "artefacts")
 
 
 def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
@@ -195,7 +193,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
             " ballplate check"
         )
     if text:
-        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+        raise refused(experiment.source, text, what)
 
 
 def fit_rival(

@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.length_equations import (
 from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
@@ -86,7 +86,7 @@ def fit_lengths(
             )
             mark = experiment.place(("artefacts", bars[0]))
             raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
-        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+        raise refused(experiment.source, text, what)
     try:
         solution = length_estimate(design, observed.x, estimator)
     except NotAMetricError as error:
@@ -94,7 +94,7 @@ def fit_lengths(
             f"{error}; look for wrong units, balls or positions among the readings, or read more"
             " directions"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
+        raise refused(experiment.source, text) from None
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")

@@ -17,6 +17,7 @@ from typing import Any
 
 import ballplate.simulator
 
+from ..running.unusable import UnusableError
 from .bundle import Bundle, unpack
 from .execute import Runner
 from .load import load_sweep
@@ -41,8 +42,8 @@ RESTART = (
 )
 
 
-class ClusterError(Exception):
-    """No cluster can be used; the text says why, and what would help."""
+class ClusterError(UnusableError):
+    """No cluster can be used."""
 
 
 class OtherVersionError(Exception):

@@ -12,6 +12,7 @@ from ballplate.simulator.inputs.messages import in_one_line
 from filelock import FileLock, Timeout
 
 from ..results.result import Result
+from ..running.unusable import UnusableError
 from .bundle import Bundle, changes, definition
 from .execute import Runner, Summary, run_sweep
 from .frame import frame
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 MOST_CHANGES = 20
 
 
-class OtherSweepError(Exception):
+class OtherSweepError(UnusableError):
     """The store holds another sweep; the text says what is different, a line for each."""
 
 

@@ -17,6 +17,8 @@ from urllib.parse import quote
 
 from ballplate.simulator.inputs.messages import in_one_line
 
+from ..running.unusable import UnusableError
+
 # The second format has digests of what it keeps; rows that came from the first have none.
 NEWEST = 2
 
@@ -82,7 +84,7 @@ WORDS = {
 }
 
 
-class StoreError(Exception):
+class StoreError(UnusableError):
     """A store cannot be used; the text says why, and what would help."""
 
     def __init__(self, text: str) -> None:

@@ -54,6 +54,11 @@ class ExperimentError(Exception):
         return type(self), (self.messages,)
 
 
+def refused(file: object, text: str, path: str = "") -> ExperimentError:
+    """The one error of a whole file, or of a place in it, without a line."""
+    return ExperimentError([Message(str(file), 0, 0, path, text)])
+
+
 def _by_number(found: re.Match[str]) -> str:
     number = ord(found[0])
     return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
