@@ -31,7 +31,7 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
 from ..results.estimates import ParameterEstimate
-from ..results.formatting import SHOWN, aligned, number
+from ..results.formatting import SHOWN, aligned, number, picked, plain
 from ..running.steps import Report, unreported
 from .length_fits import has_all_errors
 
@@ -385,23 +385,17 @@ def _used(pairs: int, lengths: int) -> str:
 
 def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
     """A rival's fit as plain data in metres and radians; what is undetermined is None."""
-    return {
-        "experiment": fit.label,
-        "title": fit.title,
-        "estimator": fit.solution.estimator,
-        "pairs": fit.pairs,
-        "lengths": fit.lengths,
-        "observations": fit.solution.observations,
-        "rank_deficiency": fit.solution.deficiency,
-        "status": fit.solution.status,
-        "iterations": [
-            {"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations
-        ],
-        "estimates": {
-            e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit}
-            for e in fit.estimates
-        },
-    }
+    data: dict[str, Any] = plain(
+        {
+            "experiment": fit.label,
+            **picked(fit, "title", "pairs", "lengths"),
+            **picked(fit.solution, "estimator", "observations", "status"),
+            "rank_deficiency": fit.solution.deficiency,
+            "iterations": [picked(it, "step", "sum_of_squares") for it in fit.solution.iterations],
+            "estimates": {e.name: picked(e, "value", "unit") for e in fit.estimates},
+        }
+    )
+    return data
 
 
 def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
@@ -455,24 +449,17 @@ def comparison_data(found: Comparison, published: dict[str, float | None]) -> di
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
         "experiment": found.label,
-        "title": found.title,
-        "estimator": found.estimator,
-        "trials": found.trials,
-        "pairs": found.pairs,
-        "lengths": found.lengths,
-        "across_probes": found.across_probes,
-        "points": found.points,
-        "not_converged": list(found.failed),
+        **picked(found, "title", "estimator", "trials", "pairs", "lengths"),
+        **picked(found, "across_probes", "points"),
+        "not_converged": found.failed,
     }
     for key, values in (("rms", found.rms), ("maximum", found.maximum)):
-        quantiles = list(np.quantile(values, QUANTILES)) if len(values) else []
+        quantiles = np.quantile(values, QUANTILES) if len(values) else ()
         data[key] = {
-            "quantiles": {
-                str(q): float(value) for q, value in zip(QUANTILES, quantiles, strict=False)
-            },
-            "values": [float(value) for value in values],
+            "quantiles": {str(q): value for q, value in zip(QUANTILES, quantiles, strict=False)},
+            "values": values,
         }
         value = published.get(key)
         if value is not None:
             data[key] |= {"published": value, "share_below_published": share_below(values, value)}
-    return data
+    return dict(plain(data))

@@ -25,7 +25,7 @@ from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.formatting import aligned, finite, number
+from ..results.formatting import aligned, number, picked, plain
 from ..results.parts import adjustment_data, adjustment_lines
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
@@ -66,12 +66,9 @@ def fit_lengths(
     """
     design = observed.design
     if design.dimension != 3 or not len(design.lengths):
-        what = "machine.volume" if design.dimension != 3 else "artefacts"
-        has = (
-            "has two dimensions"
-            if design.dimension != 3
-            else "has no ball bar or Bryan gauge whose lengths are read"
-        )
+        what, has = "artefacts", "has no ball bar or Bryan gauge whose lengths are read"
+        if design.dimension != 3:
+            what, has = "machine.volume", "has two dimensions"
         text = (
             f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
         )
@@ -161,14 +158,13 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     """Solved length equations as lines of text."""
     found = fit.solution
     rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
-    status = "converged" if found.converged else "not converged"
     lines = [
         f"{fit.label}: {fit.title}",
         (
             f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
             f" {rank}; {freedom_words(found.degrees_of_freedom)}"
         ),
-        f"{status} after {found.iterations} iterations",
+        f"{_status(fit)} after {found.iterations} iterations",
         "",
     ]
     rows = [
@@ -190,6 +186,10 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
 
 
+def _status(fit: LengthFit) -> str:
+    return "converged" if fit.solution.converged else "not converged"
+
+
 def _millimetres(value: float, decimals: int) -> str:
     return "-" if np.isnan(value) else f"{1e3 * value:.{decimals}f}"
 
@@ -197,18 +197,18 @@ def _millimetres(value: float, decimals: int) -> str:
 def length_fit_data(fit: LengthFit) -> dict[str, Any]:
     """Solved length equations as plain data in metres and radians; what is open is None."""
     found = fit.solution
-    return {
-        "experiment": fit.label,
-        "title": fit.title,
-        "estimator": found.estimator,
-        "status": "converged" if found.converged else "not converged",
-        "equations": found.equations,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "rank_deficiency": found.deficiency,
-        "factors": {name: finite(value) for name, value in zip(FACTORS, fit.factors, strict=True)},
-        "adjustments": adjustment_data(fit.adjustments),
-        "pivots": {name: [finite(value) for value in centre] for name, centre in fit.pivots},
-        "spheres": dict(fit.spheres),
-        "lengths": {name: finite(value) for name, value in fit.lengths},
-        "remarks": list(fit.remarks),
-    }
+    data: dict[str, Any] = plain(
+        {
+            "experiment": fit.label,
+            **picked(fit, "title", "remarks"),
+            **picked(found, "estimator", "equations", "degrees_of_freedom"),
+            "status": _status(fit),
+            "rank_deficiency": found.deficiency,
+            "factors": dict(zip(FACTORS, fit.factors, strict=True)),
+            "adjustments": adjustment_data(fit.adjustments),
+            "pivots": dict(fit.pivots),
+            "spheres": dict(fit.spheres),
+            "lengths": dict(fit.lengths),
+        }
+    )
+    return data

@@ -181,7 +181,7 @@ def fit_reversal(
     except UndeterminedError as error:
         text = f"{error}; read balls that are not"
         raise ExperimentError(
-            [_message(experiment, ("artefacts", design.artefact_names[0]), text)]
+            [experiment.message(("artefacts", design.artefact_names[0]), text)]
         ) from None
     axes = axes_of_plates(experiment)[design.artefact_names[0]]
     full = fit(experiment, observed, sigma)
@@ -221,16 +221,12 @@ def _length(value: float) -> str:
     return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} um"
 
 
-def _message(experiment: Experiment, steps: Steps, text: str) -> Message:
-    return experiment.message(steps, text)
-
-
 def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Scale | None) -> None:
     """Refuse what is no reversal."""
     found: list[Message] = []
 
     def say(steps: Steps, text: str) -> None:
-        found.append(_message(experiment, steps, f"{text}, {INSTEAD}"))
+        found.append(experiment.message(steps, f"{text}, {INSTEAD}"))
 
     if not isinstance(experiment.error_model, MetricSettings):
         kind = experiment.error_model.kind

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.geometry.axes import axes_words
 
-from ..results.formatting import SHOWN, aligned, number, to_uncertainty
+from ..results.formatting import SHOWN, aligned, number, picked, plain, to_uncertainty
 from ..results.parts import MOST_BALLS
 from .reversal_fits import ReversalFit
 
@@ -95,17 +95,15 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
     found = fit.found
     return {
         "experiment": fit.label,
-        "title": fit.title,
         "estimator": "reversal",
-        "scale": fit.scale,
-        "offsets": fit.offsets,
-        "positions": {"first": fit.first, "second": fit.second},
+        **picked(fit, "title", "scale", "offsets"),
+        "positions": picked(fit, "first", "second"),
         "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
         "degrees_of_freedom": found.degrees_of_freedom,
         "neglected_standard_uncertainties": found.bias,
         "neglected_coordinates": fit.distortion,
         "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
-        "estimates": {e.name: {"value": e.value, "unit": e.unit} for e in fit.estimates},
+        "estimates": {e.name: picked(e, "value", "unit") for e in fit.estimates},
         "axes": {
             "origin": fit.names[fit.axes.origin],
             "xy"[fit.axes.axis]: fit.names[fit.axes.ball],
@@ -114,11 +112,7 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
         "residuals": _by_ball(fit.names, found.residuals),
         "multiple_redundancy": {
             "relation": {
-                e.name: {
-                    "value": None if np.isnan(e.value) else e.value,
-                    "standard_uncertainty": None if np.isnan(e.value) else e.standard_uncertainty,
-                    "unit": e.unit,
-                }
+                e.name: plain(picked(e, "value", "standard_uncertainty", "unit"))
                 for e in fit.redundant
             },
             **fit.full.to_dict(),

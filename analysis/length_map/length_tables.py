@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,16 @@ from ballplate.simulator.inputs.quantities import LengthFunction, format_length
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.rounding import comparable
 
-from ..results.formatting import aligned, finite, number, percent, uncertainty_words
+from ..results.formatting import (
+    aligned,
+    csv_lines,
+    number,
+    percent,
+    picked,
+    plain,
+    records,
+    uncertainty_words,
+)
 from .length_map import Groups, LengthMap, Settings, length_pairs
 
 AXES = "xyz"
@@ -170,82 +180,73 @@ def _table(
 def point_csv(found: LengthMap) -> Iterator[str]:
     """A line for each point of the grid: of the lengths that start or end there."""
     axes = AXES[: found.design.dimension]
-    yield ",".join([*(f"{axis}_mm" for axis in axes), POINT_COLUMNS])
     groups = found.by_point
-    columns = [
+    return csv_lines(
+        [*(f"{axis}_mm" for axis in axes), POINT_COLUMNS],
         1e3 * found.points,
         groups.count,
         groups.undetermined,
         1e6 * groups.average,
         1e6 * groups.maximum,
-    ]
-    columns += [groups.average_ratio, groups.maximum_ratio, groups.share(), groups.share(True)]
-    for row in np.column_stack(columns).tolist():
-        yield _csv(row)
+        groups.average_ratio,
+        groups.maximum_ratio,
+        groups.share(),
+        groups.share(True),
+    )
 
 
 def pair_csv(experiment: Experiment, settings: Settings) -> Iterator[str]:
     """A line for each length; what is undetermined is left empty."""
     points, tiles = length_pairs(experiment, settings)
     axes = AXES[: points.shape[1]]
-    yield ",".join(
-        [
-            *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
-            "length_mm,u_um,expanded_um,target_um",
-        ]
-    )
-    for tile in tiles:
+    heads = [
+        *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
+        "length_mm,u_um,expanded_um,target_um",
+    ]
+    for k, tile in enumerate(tiles):
         u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
-        target = 1e6 * settings.target.at(tile.lengths)
-        columns = [1e3 * points[tile.first], 1e3 * points[tile.second], 1e3 * tile.lengths, u]
-        for row in np.column_stack([*columns, settings.coverage_factor * u, target]).tolist():
-            yield _csv(row)
-
-
-def _csv(row: list[float]) -> str:
-    return ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
+        lines = csv_lines(
+            heads,
+            1e3 * points[tile.first],
+            1e3 * points[tile.second],
+            1e3 * tile.lengths,
+            u,
+            settings.coverage_factor * u,
+            1e6 * settings.target.at(tile.lengths),
+        )
+        # The heads stand above the first lengths alone.
+        yield from islice(lines, int(k > 0), None)
 
 
 def length_data(label: str, title: str, found: LengthMap) -> dict[str, Any]:
     """The same as plain data in metres; what is undetermined is None."""
-    settings = found.settings
-    edges = found.edges.tolist()
+    settings, edges = found.settings, found.edges.tolist()
     classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
-    return {
-        "experiment": label,
-        "title": title,
-        "rank_deficiency": found.deficiency,
-        "grid": list(settings.grid),
-        "probe": settings.probe,
-        "target": {"constant": settings.target.constant, "slope": settings.target.slope},
-        "coverage_factor": settings.coverage_factor,
-        "target_coverage_factor": settings.target_factor,
-        "with_repeatability": settings.with_repeatability,
-        "all": _group_data(found.whole)[0],
-        "worst": None if found.worst is None else [found.points[k].tolist() for k in found.worst],
-        "by_length": _with(classes, found.by_length),
-        "by_direction": _with(
-            [{"direction": name} for name in found.directions], found.by_direction
-        ),
-        "by_point": _with([{"point": point} for point in found.points.tolist()], found.by_point),
-    }
-
-
-def _with(heads: list[dict[str, Any]], groups: Groups) -> list[dict[str, Any]]:
-    return [{**head, **own} for head, own in zip(heads, _group_data(groups), strict=True)]
-
-
-def _group_data(groups: Groups) -> list[dict[str, Any]]:
-    return [
+    data: dict[str, Any] = plain(
         {
-            "lengths": int(groups.count[i]),
-            "undetermined": int(groups.undetermined[i]),
-            "average": finite(float(groups.average[i])),
-            "maximum": finite(float(groups.maximum[i])),
-            "average_ratio": finite(float(groups.average_ratio[i])),
-            "maximum_ratio": finite(float(groups.maximum_ratio[i])),
-            "share_within": finite(float(groups.share()[i])),
-            "share_expanded_within": finite(float(groups.share(True)[i])),
+            "experiment": label,
+            "title": title,
+            "rank_deficiency": found.deficiency,
+            **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+            "target": picked(settings.target, "constant", "slope"),
+            "target_coverage_factor": settings.target_factor,
+            "all": _group_data([{}], found.whole)[0],
+            "worst": None if found.worst is None else [found.points[k] for k in found.worst],
+            "by_length": _group_data(classes, found.by_length),
+            "by_direction": _group_data(
+                [{"direction": name} for name in found.directions], found.by_direction
+            ),
+            "by_point": _group_data([{"point": point} for point in found.points], found.by_point),
         }
-        for i in range(len(groups.count))
-    ]
+    )
+    return data
+
+
+def _group_data(heads: list[dict[str, Any]], groups: Groups) -> list[dict[str, Any]]:
+    rows = records(
+        lengths=groups.count,
+        **picked(groups, "undetermined", "average", "maximum", "average_ratio", "maximum_ratio"),
+        share_within=groups.share(),
+        share_expanded_within=groups.share(True),
+    )
+    return [head | row for head, row in zip(heads, rows, strict=True)]

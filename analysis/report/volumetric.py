@@ -214,7 +214,7 @@ def draw_along(one: AlongAxis, path: Path) -> None:
     :raises OSError: the file cannot be written.
     """
     positions = 1e3 * one.positions
-    name, unit = one.error.name, micro(SHOWN["rad" if one.error.is_rotation else "m"])
+    name, unit = one.error.name, micro(SHOWN[one.unit])
     with drawing(280.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
         band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -116,13 +116,13 @@ class ErratumLine:
     The deviations are the largest of a figure from the common factor.
     """
 
+    statistic: Statistic
     headed: str
     meant: str
-    statistic: Statistic
-    as_headed: dict[str, float]
-    as_meant: dict[str, float]
-    deviation_headed: float
-    deviation_meant: float
+    ratios_as_headed: dict[str, float]
+    ratios_as_meant: dict[str, float]
+    deviation_as_headed: float
+    deviation_as_meant: float
 
 
 @dataclass(frozen=True)
@@ -136,8 +136,8 @@ class ComparedErratum:
     @property
     def agrees(self) -> bool:
         """Whether the figures are those of the designs meant, and not those of the heading."""
-        meant = all(line.deviation_meant <= self.limit for line in self.lines)
-        return meant and any(line.deviation_headed > self.limit for line in self.lines)
+        meant = all(line.deviation_as_meant <= self.limit for line in self.lines)
+        return meant and any(line.deviation_as_headed > self.limit for line in self.lines)
 
 
 @dataclass(frozen=True)
@@ -255,14 +255,11 @@ class Section:
 
     @property
     def agrees(self) -> bool:
-        return (
-            all(one.agrees for one in self.ranks)
-            and all(one.agrees for one in self.columns)
-            and all(one.agrees for one in self.remarks)
-            and all(one.agrees for one in self.errata)
-            and all(one.agrees for one in self.progress)
-            and all(one.agrees for one in self.differences)
+        compared: tuple[Any, ...] = (
+            *(*self.ranks, *self.columns, *self.remarks),
+            *(*self.errata, *self.progress, *self.differences),
         )
+        return all(one.agrees for one in compared)
 
 
 @dataclass(frozen=True)
@@ -463,9 +460,7 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
                 factor = common_factor(ratios[symbol] for symbol in regular)
                 deviations.append(max(abs(ratios[symbol] / factor - 1.0) for symbol in regular))
             lines.append(
-                ErratumLine(
-                    headed, meant, column.statistic, both[0], both[1], deviations[0], deviations[1]
-                )
+                ErratumLine(column.statistic, headed, meant, both[0], both[1], *deviations)
             )
     return ComparedErratum(erratum, tuple(lines), stated.limits.figure)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from ballplate.simulator.machines.arrangement import AXES
@@ -230,6 +231,10 @@ class AlongAxis:
     values: Array | None
     deviation: Array | None
     measured: Points | None
+
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        return "rad" if self.error.is_rotation else "m"
 
     @property
     def range(self) -> float:

@@ -14,7 +14,7 @@ from ballplate.simulator.machines.protocol import Array, Parameter
 from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
 from ballplate.simulator.numerics.rounding import comparable
 
-from ..results.formatting import SHOWN, aligned, number
+from ..results.formatting import SHOWN, aligned, csv_lines, number, plain, records
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = (
@@ -30,19 +30,10 @@ def machine_lines(built: Volumetric) -> list[str]:
     lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
     rows = [["", "symbol", "error", "range", "random", "unit", "stated as"]]
     for one in along_axes(machine):
-        unit = "rad" if one.error.is_rotation else "m"
-        factor = 1e6
-        random = "" if one.deviation is None else number(factor * float(one.deviation.max()))
-        found = "" if one.values is None else number(factor * one.range)
-        cells = [
-            one.error.name,
-            symbol(one.error.name),
-            meaning(one.error.name),
-            found,
-            random,
-            SHOWN[unit],
-        ]
-        rows.append([*cells, _stated_as(one)])
+        name = one.error.name
+        random = "" if one.deviation is None else number(1e6 * float(one.deviation.max()))
+        found = "" if one.values is None else number(1e6 * one.range)
+        rows.append([name, symbol(name), meaning(name), found, random, _unit(one), _stated_as(one)])
     lines += (
         aligned(rows, [False, False, False, True, True, False, False])
         if len(rows) > 1
@@ -211,13 +202,7 @@ def extreme_lines(found: VolumetricErrors) -> list[str]:
 
 def along_lines(one: AlongAxis) -> list[str]:
     """A parametric error along its axis."""
-    unit = SHOWN["rad" if one.error.is_rotation else "m"]
-    columns = [
-        ("stated", one.stated),
-        ("at the reference point", one.values),
-        ("random", one.deviation),
-    ]
-    given = [(name, values) for name, values in columns if values is not None]
+    given, unit = _given(one, "at the reference point"), _unit(one)
     positions = one.positions
     keep = (
         np.arange(0, len(positions), 5)
@@ -225,12 +210,12 @@ def along_lines(one: AlongAxis) -> list[str]:
         else np.flatnonzero(np.isin(positions, one.measured.positions))
     )
     axis = one.error.name[2].lower()
-    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name, _ in given)]]
+    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name in given)]]
     for k in keep:
         rows.append(
             [
                 _millimetres(float(positions[k])),
-                *(_fixed(float(1e6 * values[k]), 3) for _, values in given),
+                *(_fixed(1e6 * values[k], 3) for values in given.values()),
             ]
         )
     head = f"{one.error.name} {symbol(one.error.name)}: {meaning(one.error.name)}"
@@ -251,30 +236,38 @@ def _line_stated(one: AlongAxis) -> str:
 
 def error_csv(found: VolumetricErrors) -> Iterator[str]:
     """Errors as lines of a CSV file."""
-    yield (
-        "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um,"
-        "random_x_um,random_y_um,random_z_um"
-    )
-    columns = (
+    return csv_lines(
+        [
+            "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um",
+            "random_x_um,random_y_um,random_z_um",
+        ],
         1e3 * found.points,
         1e6 * found.systematic,
-        1e6 * found.resultant[:, None],
+        1e6 * found.resultant,
         1e6 * found.deviation,
     )
-    for row in np.concatenate(columns, axis=1).tolist():
-        yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
 
 def along_csv(one: AlongAxis) -> Iterator[str]:
     """A parametric error along its axis as lines of a CSV file."""
-    unit = SHOWN["rad" if one.error.is_rotation else "m"]
-    columns = [("stated", one.stated), (one.error.name, one.values), ("random", one.deviation)]
-    given = [(name, values) for name, values in columns if values is not None]
-    yield ",".join(["position_mm", *(f"{name}_{unit}" for name, _ in given)])
-    for row in np.column_stack(
-        [1e3 * one.positions, *(1e6 * values for _, values in given)]
-    ).tolist():
-        yield ",".join(f"{value + 0.0:.12g}" for value in row)
+    given = _given(one, one.error.name)
+    return csv_lines(
+        ["position_mm", *(f"{name}_{_unit(one)}" for name in given)],
+        1e3 * one.positions,
+        *(1e6 * values for values in given.values()),
+    )
+
+
+def _given(one: AlongAxis, name: str) -> dict[str, Array]:
+    """What there is of an error along its axis, where `name` is what it is at the reference
+    point.
+    """
+    columns = {"stated": one.stated, name: one.values, "random": one.deviation}
+    return {key: values for key, values in columns.items() if values is not None}
+
+
+def _unit(one: AlongAxis) -> str:
+    return SHOWN[one.unit]
 
 
 def machine_data(built: Volumetric) -> dict[str, Any]:
@@ -284,7 +277,7 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
     for one in along_axes(machine):
         functions[one.error.name] = {
             "symbol": symbol(one.error.name),
-            "unit": "rad" if one.error.is_rotation else "m",
+            "unit": one.unit,
             "range": None if one.values is None else one.range,
             "random": None if one.deviation is None else float(one.deviation.max()),
         }
@@ -309,47 +302,34 @@ def diagonal_data(found: LengthErrors) -> list[dict[str, Any]]:
 
 def length_data(found: LengthErrors) -> list[dict[str, Any]]:
     """Length errors, in metres."""
-    return [
-        {
-            "from": found.starts[k].tolist(),
-            "to": found.ends[k].tolist(),
-            "length": float(found.nominal[k]),
-            "error": float(found.error[k]),
-            "random": float(found.deviation[k]),
-        }
-        for k in range(len(found.error))
-    ]
+    ends = {"from": found.starts, "to": found.ends}
+    rows = records(**ends, length=found.nominal, error=found.error, random=found.deviation)
+    return list(plain(rows))
 
 
 def error_data(found: VolumetricErrors) -> list[dict[str, Any]]:
     """Errors point by point, in metres."""
-    return [
-        {"position": point, "error": error, "resultant": resultant, "random": random}
-        for point, error, resultant, random in zip(
-            found.points.tolist(),
-            found.systematic.tolist(),
-            found.resultant.tolist(),
-            found.deviation.tolist(),
-            strict=True,
-        )
-    ]
+    rows = records(
+        position=found.points,
+        error=found.systematic,
+        resultant=found.resultant,
+        random=found.deviation,
+    )
+    return list(plain(rows))
 
 
 def along_data(one: AlongAxis) -> dict[str, Any]:
     """A parametric error along its axis, in metres and radians."""
-
-    def listed(values: Array | None) -> list[float] | None:
-        return None if values is None else [float(value) for value in values]
-
-    return {
+    data = {
         "error": one.error.name,
         "symbol": symbol(one.error.name),
-        "unit": "rad" if one.error.is_rotation else "m",
-        "position": listed(one.positions),
-        "stated": listed(one.stated),
-        "value": listed(one.values),
-        "random": listed(one.deviation),
+        "unit": one.unit,
+        "position": one.positions,
+        "stated": one.stated,
+        "value": one.values,
+        "random": one.deviation,
     }
+    return dict(plain(data))
 
 
 def _fixed(value: float, decimals: int) -> str:
