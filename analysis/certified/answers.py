@@ -10,7 +10,7 @@ from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.reading_files import read_readings
 
-from ..results.formatting import picked, plain
+from ..results.formatting import as_data, picked
 from ..results.study import fit, predict
 from ..uncertainty.summaries import Quantity
 from .problems import CertifiedProblem
@@ -71,7 +71,7 @@ def _geometry(design: Design, state: State) -> dict[str, Any]:
 def _uncertainties(quantities: dict[str, Quantity]) -> dict[str, Any]:
     """U1 to U6 as certified problems have them."""
     return {
-        symbol: plain(picked(quantity, "maximum", "average", "count", "undetermined"))
+        symbol: as_data(picked(quantity, "maximum", "average", "count", "undetermined"))
         for symbol, quantity in quantities.items()
         if symbol in SYMBOLS
     }

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ..results.formatting import aligned, plain
+from ..results.formatting import aligned, as_data
 from .problems import CertifiedProblem
 from .score import Score
 
@@ -66,4 +66,4 @@ def _cell(score: Score | None) -> str:
 
 def score_data(found: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
     """Scores, and the answers that they are of."""
-    return {"scores": plain(found), "problems": results}
+    return {"scores": as_data(found), "problems": results}

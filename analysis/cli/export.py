@@ -15,7 +15,7 @@ from .telling import complain
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ..sweeps.store import Results
+    from ..sweeps.stored import Results
 
 BAD_FILE = 3
 
@@ -93,7 +93,7 @@ def run(options: Namespace) -> int:
             complain(error)
         found = results(store, number, cells)
         if cells is None:
-            cells = len(found.cells) + len(found.unreadable)
+            cells = len(found.rows) + len(found.unreadable)
         is_damaged = warn_of_damage(store.path, found, cells) or defined is None
         table = frame_of(found, defined)
         warn_of_other_methods(store.path, found.keys)

@@ -163,18 +163,16 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
     )
     print(in_one_line(told))
     found = results(store, number, summary.cells)
-    versions = set(zip(*found.versions.values(), strict=True))
+    versions = {tuple(row.versions.items()) for row in found.rows}
     if len(versions) > 1:
         complain(
             f"{store.path}: the rows were computed with {len(versions)} different sets of versions"
         )
     if summary.failed:
         reasons: dict[str, list[int]] = {}
-        for cell, status, reason in zip(
-            found.cells.tolist(), found.statuses, found.reasons, strict=True
-        ):
-            if status == "failed":
-                reasons.setdefault(reason, []).append(cell)
+        for row in found.rows:
+            if row.status == "failed":
+                reasons.setdefault(row.reason, []).append(row.number)
         for reason, cells in list(reasons.items())[:10]:
             more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
             print(f"cell {cells[0]}{more} failed: {reason}", file=sys.stderr)

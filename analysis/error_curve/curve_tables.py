@@ -14,7 +14,7 @@ from ballplate.simulator.splines.constraints import Constraint
 from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
 from ballplate.simulator.splines.read import Column
 
-from ..results.formatting import aligned, number, picked, plain, records
+from ..results.formatting import aligned, as_data, number, picked, records
 from .error_curve import Curve
 
 ORDERS = {
@@ -202,7 +202,7 @@ def curve_data(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> dict[
     fitted, points, space = curve.fit, curve.points, curve.fit.space
     found = pieces(fitted, powers)
     units = {"length": "m", "angle": "rad"}
-    data: dict[str, Any] = plain(
+    data: dict[str, Any] = as_data(
         {
             "file": file,
             "x": {"name": points.x_column.name, "unit": units[points.x_column.kind]},

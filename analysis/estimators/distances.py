@@ -31,7 +31,7 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
 from ..results.estimates import ParameterEstimate
-from ..results.formatting import SHOWN, aligned, number, picked, plain
+from ..results.formatting import SHOWN, aligned, as_data, number, picked
 from ..running.steps import Report, unreported
 from .length_fits import has_all_errors
 
@@ -385,7 +385,7 @@ def _used(pairs: int, lengths: int) -> str:
 
 def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
     """A rival's fit as plain data in metres and radians; what is undetermined is None."""
-    data: dict[str, Any] = plain(
+    data: dict[str, Any] = as_data(
         {
             "experiment": fit.label,
             **picked(fit, "title", "pairs", "lengths"),
@@ -462,4 +462,4 @@ def comparison_data(found: Comparison, published: dict[str, float | None]) -> di
         value = published.get(key)
         if value is not None:
             data[key] |= {"published": value, "share_below_published": share_below(values, value)}
-    return dict(plain(data))
+    return dict(as_data(data))

@@ -25,7 +25,7 @@ from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.formatting import aligned, number, picked, plain
+from ..results.formatting import aligned, as_data, number, picked
 from ..results.parts import adjustment_data, adjustment_lines
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
@@ -197,7 +197,7 @@ def _millimetres(value: float, decimals: int) -> str:
 def length_fit_data(fit: LengthFit) -> dict[str, Any]:
     """Solved length equations as plain data in metres and radians; what is open is None."""
     found = fit.solution
-    data: dict[str, Any] = plain(
+    data: dict[str, Any] = as_data(
         {
             "experiment": fit.label,
             **picked(fit, "title", "remarks"),

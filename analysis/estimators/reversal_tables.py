@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.geometry.axes import axes_words
 
-from ..results.formatting import SHOWN, aligned, number, picked, plain, to_uncertainty
+from ..results.formatting import SHOWN, aligned, as_data, number, picked, to_uncertainty
 from ..results.parts import MOST_BALLS
 from .reversal_fits import ReversalFit
 
@@ -112,7 +112,7 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
         "residuals": _by_ball(fit.names, found.residuals),
         "multiple_redundancy": {
             "relation": {
-                e.name: plain(picked(e, "value", "standard_uncertainty", "unit"))
+                e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
                 for e in fit.redundant
             },
             **fit.full.to_dict(),

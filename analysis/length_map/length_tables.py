@@ -14,11 +14,11 @@ from ballplate.simulator.numerics.rounding import comparable
 
 from ..results.formatting import (
     aligned,
+    as_data,
     csv_lines,
     number,
     percent,
     picked,
-    plain,
     records,
     uncertainty_words,
 )
@@ -222,7 +222,7 @@ def length_data(label: str, title: str, found: LengthMap) -> dict[str, Any]:
     """The same as plain data in metres; what is undetermined is None."""
     settings, edges = found.settings, found.edges.tolist()
     classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
-    data: dict[str, Any] = plain(
+    data: dict[str, Any] = as_data(
         {
             "experiment": label,
             "title": title,

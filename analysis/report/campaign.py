@@ -18,7 +18,18 @@ from ..planning.criteria import DESCRIPTIONS
 from ..results.formatting import number
 from .pictures import draw_scene
 from .scene import scene
-from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, placed_axes, save
+from .svg import (
+    DASHES,
+    INK,
+    MARKERS,
+    MUTED,
+    PAPER,
+    SERIES,
+    drawing,
+    legend_above,
+    placed_axes,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -191,16 +202,7 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
             markeredgewidth=2.0 if is_inside and marker == "|" else 1.0,
             clip_on=False,
         )
-        axes.annotate(
-            mark.told,
-            (1.0, k),
-            (VALUES - RIGHT + 2.0, 0.0),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=9.0,
-        )
+        _told_beside(axes, mark.told, k, high)
     _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
@@ -273,16 +275,7 @@ def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
     )
     _plain_numbers(axes.yaxis, axes.get_yscale() == "log")
     axes.grid(True)
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(-0.09, 1.04),
-        ncols=3,
-        borderaxespad=0.2,
-        borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.0,
-        handletextpad=0.5,
-    )
+    legend_above(axes, 3, -0.09, 1.04)
 
 
 def _limits(values: Sequence[float], target: float | None) -> tuple[float, float]:
@@ -384,23 +377,21 @@ def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
         is_candidate = bool(row.told)
         name = row.name if len(row.name) <= MOST_LETTERS else row.name[: MOST_LETTERS - 1] + "…"
         axes.text(0.008, k, name, va="center", fontsize=9.0, color=INK if is_candidate else MUTED)
-        axes.annotate(
-            row.told,
-            (1.0, k),
-            (VALUES - RIGHT + 2.0, 0.0),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=9.0,
-            annotation_clip=False,
-        )
-        axes.annotate(
-            row.mark,
-            (0.0, k),
-            (-6.0, 0.0),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=9.0,
-            annotation_clip=False,
-        )
+        _told_beside(axes, row.told, k, 1.0)
+        _told_beside(axes, row.mark, k, 0.0, -6.0)
+
+
+def _told_beside(
+    axes: Axes, text: str, row: int, x: float, points: float = VALUES - RIGHT + 2.0
+) -> None:
+    """A text that ends so many points to the right of a place."""
+    axes.annotate(
+        text,
+        (x, row),
+        (points, 0.0),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        fontsize=9.0,
+        annotation_clip=False,
+    )

@@ -11,7 +11,18 @@ from ballplate.simulator.splines.read import Points
 
 from ..error_curve.curve_tables import derivative_unit, shown
 from ..error_curve.error_curve import Curve, whole_profile
-from .svg import INK, MUTED, PAPER, SERIES, drawing, micro, placed_axes, round_number, save
+from .svg import (
+    INK,
+    MUTED,
+    PAPER,
+    SERIES,
+    common_legend,
+    drawing,
+    micro,
+    placed_axes,
+    round_number,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,8 +92,7 @@ def plot(curve: Curve, path: Path) -> None:
             )
         axes.set_xlabel(f"{x.words}, {micro(x.unit)}")
         axes.set_ylabel(f"{y.words}, {micro(y.unit)}")
-        handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3)
+        common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3)
         save(figure, path, words(curve))
 
 
@@ -152,9 +162,8 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
         _scale(axes, scale * magnification / factor, f"{scale * 1e6:g} µm")
         axes.set_xlabel(f"axial co-ordinate, {unit}")
         axes.set_ylabel(f"radius, {unit}")
-        handles, labels = axes.get_legend_handles_labels()
         title = f"{points.y_column.words}, magnified {magnification:g} times"
-        figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
+        common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
         worst = int(np.argmax(comparable(np.abs(points.y))))
         told = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
         largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"

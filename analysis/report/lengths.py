@@ -14,7 +14,19 @@ from numpy.typing import NDArray
 from ..length_map.length_map import LengthMap
 from ..length_map.length_tables import target_words
 from ..results.formatting import percent
-from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
+from .svg import (
+    DASHES,
+    INK,
+    MARKERS,
+    MUTED,
+    PAPER,
+    SERIES,
+    drawing,
+    legend_above,
+    micro,
+    placed_axes,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -192,13 +204,4 @@ def _curves(axes: Axes, found: LengthMap) -> None:
     axes.grid(True)
     axes.set_xlabel("length, mm")
     axes.set_ylabel("µm")
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=4,
-        borderaxespad=0.3,
-        borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.4,
-        handletextpad=0.5,
-    )
+    legend_above(axes, 4)

@@ -9,7 +9,19 @@ import numpy as np
 
 from ..results.formatting import number
 from .series import Line, Panel, Plot
-from .svg import DASHES, INK, MARKERS, PAPER, SERIES, WIDTH, as_svg, drawing, micro, placed_axes
+from .svg import (
+    DASHES,
+    INK,
+    MARKERS,
+    PAPER,
+    SERIES,
+    WIDTH,
+    as_svg,
+    common_legend,
+    drawing,
+    micro,
+    placed_axes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,8 +55,7 @@ def plot_svg(plot: Plot, name: str) -> str:
             found[k].tick_params(labelbottom=k == count - 1)
         found[-1].set_xlabel(micro(plot.axis.title))
         if has_legend:
-            handles, labels = found[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="lower center", ncols=columns, borderaxespad=0.0)
+            common_legend(figure, found[0], loc="lower center", ncols=columns, borderaxespad=0.0)
         return as_svg(figure, name, words(plot))
 
 

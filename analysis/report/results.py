@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..sweeps.columns import MORE, symbol_column
 from ..sweeps.frame import frame_of
-from ..sweeps.store import Results as Found
 from ..sweeps.store import Store, chosen_sweep, definition_of, results
+from ..sweeps.stored import Results as Found
 from ..uncertainty.quantities import RECORDED
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def read_results(store: Store, sweep: int | None) -> Results:
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = results(store, number, len(cells))
-    texts = dict(zip(found.cells.tolist(), found.details, strict=True))
+    texts = {row.number: row.details for row in found.rows}
     return Results(
         number,
         definition,

@@ -36,25 +36,37 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """A design on the paper, in metres: edges (k, 2, 2) of the volume, hidden ones marked, and
-    positions, rear first.
+class Box:
+    """A volume on the paper, in metres: its edges (k, 2, 2), hidden ones marked.
 
-    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, `tips`
-    the probes' tips about the reference point.
+    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, and
+    the co-ordinates there.
     """
 
     edges: Array
     hidden: NDArray[np.bool_]
-    places: tuple[Place, ...]
     axes: tuple[tuple[str, Array, float, float], ...]
+
+    @property
+    def size(self) -> float:
+        """The larger side of what is drawn."""
+        return float(np.ptp(self.edges, axis=(0, 1)).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A design on the paper, in metres: the volume, positions, rear first, and the probes' tips
+    about the reference point.
+    """
+
+    box: Box
+    places: tuple[Place, ...]
     tips: tuple[tuple[str, Array], ...]
 
 
 def scene(design: Design) -> Scene:
     """The scene of a design; one in two dimensions is seen from above."""
     view, towards = projection(design.dimension)
-    edges, hidden = box_edges(design.lower, design.upper, towards)
     where = locations(design, nominal_state(design), design.readings)
     places = []
     for k, name in enumerate(design.position_names):
@@ -86,7 +98,14 @@ def scene(design: Design) -> Scene:
         (name, view @ offset)
         for name, offset in zip(design.probe_names, design.probes, strict=True)
     )
-    return Scene(edges @ view.T, hidden, tuple(places), _axes(design, view), tips)
+    return Scene(box(design.lower, design.upper), tuple(places), tips)
+
+
+def box(lower: Array, upper: Array) -> Box:
+    """The volume between two corners (d,) on the paper."""
+    view, away = projection(len(lower))
+    edges, hidden = box_edges(lower, upper, away)
+    return Box(edges @ view.T, hidden, _axes(lower, upper, view))
 
 
 def projection(dimension: int) -> tuple[Array, Array]:
@@ -117,11 +136,10 @@ def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[n
     return np.array(edges), np.array(hidden)
 
 
-def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
+def _axes(lower: Array, upper: Array, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
     """Axes along the edges that stand outermost on the paper: x and y below, z on the left."""
-    lower, upper = design.lower, design.upper
-    starts = [lower.copy() for _ in range(design.dimension)]
-    if design.dimension == 3:
+    starts = [lower.copy() for _ in lower]
+    if len(lower) == 3:
         # The vertical edge at the left, the lower one at the right.
         left = min(
             ([x, y] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])),

@@ -118,6 +118,26 @@ def blank_axes(figure: Figure) -> Axes:
     return axes
 
 
+def legend_above(axes: Axes, columns: int, left: float = 0.0, bottom: float = 1.0) -> None:
+    """A legend in a few columns above axes, where it covers nothing."""
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(left, bottom),
+        ncols=columns,
+        borderaxespad=0.3,
+        borderpad=0.2,
+        columnspacing=1.2,
+        handlelength=2.0,
+        handletextpad=0.5,
+    )
+
+
+def common_legend(figure: Figure, axes: Axes, **more: Any) -> None:
+    """A legend of the figure for what its axes hold."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, **more)
+
+
 def micro(text: str) -> str:
     """Units of micrometres as they are printed.
 

@@ -14,7 +14,8 @@ from ballplate.simulator.numerics.rounding import comparable
 
 from ..results.formatting import SHOWN, number
 from ..volumetric.volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
-from .scene import box_edges, projection
+from .pictures import draw_box
+from .scene import box, projection
 from .svg import (
     DASHES,
     INK,
@@ -24,6 +25,7 @@ from .svg import (
     SERIES,
     blank_axes,
     drawing,
+    legend_above,
     micro,
     placed_axes,
     round_number,
@@ -44,9 +46,6 @@ MOST_LINES, MOST_ON_LINE = 41, 201
 
 # Between the plot and its title, in points: the legend stands there and covers nothing.
 TITLE_PAD = 26.0
-
-# Part of the drawing's size below which an edge is too short for its name between its numbers.
-SHORT = 0.25
 
 # Points beyond which they are not marked one by one.
 MOST_MARKS = 60
@@ -76,11 +75,8 @@ def draw_grid(
     moved = nominal + factor * found.systematic.reshape(*counts, 3)
     with drawing(430.0, WIDTH) as figure:
         axes = blank_axes(figure)
-        edges, hidden = box_edges(nominal[0, 0, 0], nominal[-1, -1, -1], away)
-        for edge, is_hidden in zip(edges, hidden, strict=True):
-            axes.plot(
-                *(edge @ view.T).T, color=MUTED, linewidth=0.9, linestyle=":" if is_hidden else "-"
-            )
+        volume = box(nominal[0, 0, 0], nominal[-1, -1, -1])
+        draw_box(axes, volume)
         for axis in range(3):
             near = -1 if away[axis] < 0 else 0
             for side, is_near in ((near, True), (-1 - near, False)):
@@ -88,10 +84,9 @@ def draw_grid(
                 # front stays readable.
                 _face(axes, nominal.take(side, axis) @ view.T, MUTED, 0.5, is_near)
                 _face(axes, moved.take(side, axis) @ view.T, SERIES[0], 1.1, is_near)
-        size = float(np.ptp(edges @ view.T, axis=(0, 1)).max())
-        drawn = np.concatenate([edges.reshape(-1, 3), moved.reshape(-1, 3)]) @ view.T
+        size = volume.size
+        drawn = np.concatenate([volume.edges.reshape(-1, 2), moved.reshape(-1, 3) @ view.T])
         low, high = drawn.min(axis=0), drawn.max(axis=0)
-        _axis_names(axes, nominal, view, size)
         middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
         for k, corner in enumerate(diagonals.starts @ view.T):
             x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
@@ -112,7 +107,7 @@ def draw_grid(
         ]
         lengths = f"length errors of the diagonals from the corners {', '.join(told)}"
         figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
-        axes.set_xlim(low[0] - 0.16 * size, high[0] + 0.12 * size)
+        axes.set_xlim(low[0] - 0.2 * size, high[0] + 0.16 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
         save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
 
@@ -128,37 +123,6 @@ def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> 
 def _spread(count: int, most: int) -> Integers:
     """Indices of all, or of `most` evenly spread ones of them, both ends included."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
-
-
-def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
-    """Names and ends of the axes along the lower front edges and the left one."""
-    middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
-    ends = [nominal[0, 0, 0], nominal[-1, -1, -1]]
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        choices = []
-        for one in (0, 1):
-            for two in (0, 1):
-                line = np.array([ends[0], ends[1]])
-                line[:, others[0]], line[:, others[1]] = ends[one][others[0]], ends[two][others[1]]
-                choices.append(line @ view.T)
-        # Horizontal axes stand lowest, the vertical one furthest to the left.
-        edge = min(choices, key=lambda line, axis=axis: float(line.mean(axis=0)[int(axis != 2)]))  # type: ignore[misc]
-        along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
-        out = np.array([along[1], -along[0]])
-        out = out if out @ (edge.mean(axis=0) - middle) > 0 else -out
-        # Beside a short edge the name stands outside its numbers.
-        off = 0.02 if np.linalg.norm(edge[1] - edge[0]) > SHORT * size else 0.12
-        texts = [(edge.mean(axis=0) + off * size * out, f"{'xyz'[axis]}, mm")]
-        texts += [(edge[k] + 0.02 * size * out, f"{1e3 * ends[k][axis] + 0.0:.6g}") for k in (0, 1)]
-        for (x, y), text in texts:
-            axes.text(
-                x,
-                y,
-                text,
-                ha="left" if out[0] > 0 else "right",
-                va="center" if axis == 2 else "top",
-            )
 
 
 def draw_line(found: VolumetricErrors, path: Path) -> None:
@@ -285,13 +249,4 @@ def _finish(axes: Axes, x: str, y: str) -> None:
     axes.margins(x=0.0)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=5,
-        borderaxespad=0.3,
-        borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.0,
-        handletextpad=0.5,
-    )
+    legend_above(axes, 5)

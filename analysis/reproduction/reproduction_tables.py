@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.formatting import aligned, number, picked, plain
+from ..results.formatting import aligned, as_data, number, picked
 from .compare import (
     ComparedColumn,
     ComparedErratum,
@@ -481,7 +481,7 @@ def reproduction_data(found: Reproduction) -> dict[str, Any]:
         },
         "sections": [_section_data(section) for section in found.sections],
     }
-    plain_data: dict[str, Any] = plain(data)
+    plain_data: dict[str, Any] = as_data(data)
     return plain_data
 
 

@@ -98,11 +98,11 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def plain(value: Any) -> Any:
+def as_data(value: Any) -> Any:
     """A result as JSON can have it: objects by their fields, arrays and tuples as lists, and None
     for what is undetermined.
 
-    >>> plain({"u": (0.5, math.nan)})
+    >>> as_data({"u": (0.5, math.nan)})
     {'u': [0.5, None]}
     """
     if is_dataclass(value):
@@ -110,9 +110,9 @@ def plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
+        return {key: as_data(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [as_data(item) for item in value]
     return finite(value) if isinstance(value, float) else value
 
 

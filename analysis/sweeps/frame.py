@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Results, Store, chosen_sweep, definition_of, results
+from .store import Store, chosen_sweep, definition_of, results
+from .stored import Results
 
 if TYPE_CHECKING:
     import pandas
@@ -48,11 +49,13 @@ def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame
         if axis["unit"] == "1" and is_whole:
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
-    columns |= {"status": found.statuses, "reason": found.reasons, **found.figures}
+    columns |= {name: [getattr(row, name) for row in found.rows] for name in ("status", "reason")}
+    columns |= found.figures
     columns |= {
-        "data_set_seed": found.seeds,
+        "data_set_seed": np.array([row.seed for row in found.rows], np.int64),
         "fingerprint": found.keys,
-        "duration_s": found.seconds,
+        "duration_s": np.array([row.seconds for row in found.rows], float),
     }
-    columns |= {f"{name}_version": texts for name, texts in found.versions.items()}
+    for name in dict.fromkeys(name for row in found.rows for name in row.versions):
+        columns[f"{name}_version"] = [row.versions.get(name, "") for row in found.rows]
     return pandas.DataFrame(columns)

@@ -14,7 +14,7 @@ from ballplate.simulator.machines.protocol import Array, Parameter
 from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
 from ballplate.simulator.numerics.rounding import comparable
 
-from ..results.formatting import SHOWN, aligned, csv_lines, number, plain, records
+from ..results.formatting import SHOWN, aligned, as_data, csv_lines, number, records
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = (
@@ -304,7 +304,7 @@ def length_data(found: LengthErrors) -> list[dict[str, Any]]:
     """Length errors, in metres."""
     ends = {"from": found.starts, "to": found.ends}
     rows = records(**ends, length=found.nominal, error=found.error, random=found.deviation)
-    return list(plain(rows))
+    return list(as_data(rows))
 
 
 def error_data(found: VolumetricErrors) -> list[dict[str, Any]]:
@@ -315,7 +315,7 @@ def error_data(found: VolumetricErrors) -> list[dict[str, Any]]:
         resultant=found.resultant,
         random=found.deviation,
     )
-    return list(plain(rows))
+    return list(as_data(rows))
 
 
 def along_data(one: AlongAxis) -> dict[str, Any]:
@@ -329,7 +329,7 @@ def along_data(one: AlongAxis) -> dict[str, Any]:
         "value": one.values,
         "random": one.deviation,
     }
-    return dict(plain(data))
+    return dict(as_data(data))
 
 
 def _fixed(value: float, decimals: int) -> str:
