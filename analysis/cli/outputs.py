@@ -24,6 +24,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
+from .interruption import named_paths
+
 if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import Message
 
@@ -218,15 +220,14 @@ def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
     """Files that the options name and that are not written, and those that these files name."""
     from ..sweeps.named_files import named_by
 
-    for name, value in vars(options).items():
-        paths = value if isinstance(value, list) else [value]
-        for path in paths:
-            if name not in outputs and isinstance(path, Path):
-                yield path
-                if name == "store":
-                    yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
-                if name in NAMING and path.suffix.lower() != ".csv":
-                    yield from named_by(path)
+    for name, path in named_paths(options):
+        if name in outputs:
+            continue
+        yield path
+        if name == "store":
+            yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
+        if name in NAMING and path.suffix.lower() != ".csv":
+            yield from named_by(path)
 
 
 def _reasons_against(output: Output, force: bool) -> list[Message]:

@@ -72,29 +72,26 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
         row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members)
     )
     entries, medians = [], np.full(len(members), np.nan)
-    for k, rows_here in enumerate(members):
-        known = rows_here[np.isfinite(values[rows_here])]
-        if len(known):
-            medians[k] = np.median(values[known])
-        text = (
-            number(measure.factor * medians[k], DIGITS)
-            if len(known)
-            else "-"
-            if len(rows_here)
-            else NOT_DONE
-        )
-        is_open = bool((open_ & results.done)[rows_here].any())
+    for k, here in enumerate(members):
+        known = values[here][np.isfinite(values[here])]
+        medians[k] = np.median(known) if len(known) else np.nan
+        is_open = bool((open_ & results.done)[here].any())
         any_open |= is_open
-        if is_open and len(rows_here) == 1 and np.isfinite(figures[rows_here[0]]):
-            text = number(measure.factor * figures[rows_here[0]], DIGITS)
+        # A single figure that leaves something out is told, without a shade.
+        told = figures[here[0]] if is_open and len(here) == 1 else medians[k]
+        text = number(measure.factor * told, DIGITS) if len(here) else NOT_DONE
         text += STAR if is_open else ""
-        if planned[k] == 1 and len(rows_here):
-            row = int(rows_here[0])
-            status = results.statuses[row]
-            is_done = status == "done"
-            value = float(figures[row]) if is_done else None
-            cell = int(results.frame["cell"].to_numpy()[row])
-            entries.append(Entry(text if is_done else status, value, cell, measure.figure))
+        if planned[k] == 1 and len(here):
+            row, cells = here[0], results.frame["cell"].to_numpy()
+            is_done = results.done[row]
+            entries.append(
+                Entry(
+                    text if is_done else results.statuses[row],
+                    float(figures[row]) if is_done else None,
+                    int(cells[row]),
+                    measure.figure,
+                )
+            )
         else:
             entries.append(Entry(text if planned[k] else ""))
     notes = [] if planned.max() <= 1 else ["Medians over all cells that share the two values."]

@@ -43,10 +43,7 @@ def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame
     chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells] if axes else None
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
-        is_whole = all(
-            abs(value) < MOST_WHOLE and float(value).is_integer() for value in axis["values"]
-        )
-        if axis["unit"] == "1" and is_whole:
+        if axis["unit"] == "1" and ((abs(values) < MOST_WHOLE) & (values % 1.0 == 0.0)).all():
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
     columns |= {name: [getattr(row, name) for row in found.rows] for name in ("status", "reason")}
