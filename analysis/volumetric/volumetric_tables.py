@@ -334,7 +334,7 @@ def along_data(one: AlongAxis) -> dict[str, Any]:
 
 def _fixed(value: float, decimals: int) -> str:
     """A number with so many decimals; what rounds to zero has no sign."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
 def _millimetres(value: float) -> str:
