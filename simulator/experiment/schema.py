@@ -40,6 +40,9 @@ def tidied(part: Any) -> Any:
             or (key == "default" and not _is_writable(value, part))
         ):
             continue
+        elif key == "description" and isinstance(value, str):
+            # Docstrings have line ends.
+            found[key] = " ".join(value.split())
         else:
             found[key] = tidied(value)
     choices: list[Any] = found.get("anyOf", [])
