@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.numerics.rounding import comparable
@@ -22,10 +21,9 @@ from .svg import (
     placed_axes,
     round_number,
     save,
+    scale_bar,
+    sticks,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 # Points: of the drawings.
 WIDTH, HEIGHT = 460.0, 300.0
@@ -152,14 +150,18 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
         fitted = set(curve.points.names)
         inside = np.array([name in fitted for name in points.names])
         for chosen, colour, label in ((inside, SERIES[0], "fitted"), (~inside, INK, "not fitted")):
-            _bars(
-                axes,
-                start[chosen] / factor,
-                tips[chosen] / factor,
-                colour,
-                label if not inside.all() else "error",
-            )
-        _scale(axes, scale * magnification / factor, f"{scale * 1e6:g} µm")
+            if chosen.any():
+                sticks(
+                    axes,
+                    start[chosen] / factor,
+                    tips[chosen] / factor,
+                    color=colour,
+                    linewidth=1.2,
+                    marker="o",
+                    markersize=2.5,
+                    label=label if not inside.all() else "error",
+                )
+        scale_bar(axes, scale * magnification / factor, 0.08, f"{scale * 1e6:g} µm")
         axes.set_xlabel(f"axial co-ordinate, {unit}")
         axes.set_ylabel(f"radius, {unit}")
         title = f"{points.y_column.words}, magnified {magnification:g} times"
@@ -178,20 +180,3 @@ def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.nd
     for first, last in features:
         parts += [places[first : last + 1, ::-1], np.full((1, 2), np.nan)]
     return np.concatenate(parts)
-
-
-def _bars(axes: Axes, start: np.ndarray, tips: np.ndarray, colour: str, label: str) -> None:
-    if not len(start):
-        return
-    gaps = np.full_like(start, np.nan)
-    x, y = np.stack([start, tips, gaps], axis=1).reshape(-1, 2).T
-    axes.plot(x, y, color=colour, linewidth=1.2, label=label)
-    axes.plot(*start.T, color=colour, marker="o", markersize=2.5, linestyle="none")
-
-
-def _scale(axes: Axes, length: float, text: str) -> None:
-    """A bar of a length in the lower left corner."""
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    x, y = left + 0.05 * (right - left), bottom + 0.08 * (top - bottom)
-    axes.plot([x, x + length], [y, y], color=INK, linewidth=2.0)
-    axes.text(x, y + 0.02 * (top - bottom), text, va="bottom", ha="left")

@@ -14,7 +14,10 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
+    from ballplate.simulator.machines.protocol import Array
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -116,6 +119,23 @@ def blank_axes(figure: Figure) -> Axes:
     axes.set_axis_off()
     axes.set_aspect("equal")
     return axes
+
+
+def sticks(axes: Axes, starts: Array, tips: Array, **style: Any) -> None:
+    """Lines from starts to tips (m, 2), each with a marker where it starts."""
+    ends = np.stack([starts, tips, np.full_like(starts, np.nan)], axis=1)
+    axes.plot(*ends.reshape(-1, 2).T, markevery=3, **style)
+
+
+def scale_bar(axes: Axes, length: float, height: float, text: str) -> None:
+    """A bar of a length along x at the left of axes, in a height as a share of theirs, and what it
+    means.
+    """
+    left, right = axes.get_xlim()
+    x = left + 0.05 * (right - left)
+    style: Any = {"transform": axes.get_xaxis_transform(), "clip_on": False}
+    axes.plot([x, x + length], [height, height], color=INK, linewidth=2.5, **style)
+    axes.text(x + length + 0.02 * (right - left), height, text, va="center", **style)
 
 
 def legend_above(axes: Axes, columns: int, left: float = 0.0, bottom: float = 1.0) -> None:
