@@ -224,7 +224,7 @@ def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
         if name in outputs:
             continue
         yield path
-        if name == "store":
+        if name == "store" and path.name:
             yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
         if name in NAMING and path.suffix.lower() != ".csv":
             yield from named_by(path)

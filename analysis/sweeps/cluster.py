@@ -65,16 +65,22 @@ def cluster_runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runne
 def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
     except ImportError:
         raise ClusterError(
             "dask is not installed; install it with: python -m pip install 'ballplate[dask]'"
         ) from None
     try:
+        get_address_host_port(address)
+    except ValueError:
+        text = f"{address}: is no address of a scheduler; give one such as tcp://127.0.0.1:8786"
+        raise ClusterError(text) from None
+    try:
         client = Client(address, timeout=10, set_as_default=False)
     except Exception as error:
         # Of an address that makes no sense there may come anything.
         text = (
-            f"there is no scheduler at {address} ({type(error).__name__}); start one with: dask"
+            f"{address}: there is no scheduler ({type(error).__name__}); start one with: dask"
             " scheduler"
         )
         raise ClusterError(text) from None

@@ -256,9 +256,8 @@ def format_of(path: Path, connection: sqlite3.Connection) -> int | None:
         )
     if known is None:
         names = ", ".join(sorted(map(str, tables))[:4])
-        raise StoreError(
-            f"{path}: is no store of ballplate sweep but a database with the tables {names}; {MEND}"
-        )
+        held = f"with the tables {names}" if names else "without tables"
+        raise StoreError(f"{path}: is no store of ballplate sweep but a database {held}; {MEND}")
     number = int(known[1])
     if number > NEWEST:
         text = (

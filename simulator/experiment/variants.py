@@ -171,7 +171,7 @@ def _replaced(
         below = _replaced(node.items[i], rest, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
     raise ValueError(
-        f"{format_path(above)} is {describe(node.value)} and has nothing below it; replace it as a"
+        f"{format_path(above) or 'the experiment'} is {describe(node.value)} and has nothing below it; replace it as a"
         " whole"
     )
 
@@ -183,6 +183,8 @@ def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:
         raise ValueError(
             f"there is no {format_path(above)}[{step}]; the indices are 0 to {len(node.items) - 1}"
         )
+    if not above:
+        raise ValueError("the experiment is a list; write its sections, such as machine, as keys")
     names = [_name(item) for item in node.items]
     if names.count(step) == 1:
         return names.index(step)

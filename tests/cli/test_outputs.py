@@ -874,3 +874,15 @@ def test_an_extra_that_cannot_be_loaded_is_told(
     assert not write_outputs({tmp_path / "a.svg": broken}, force=False)
     assert "python -m pip install 'ballplate[report]'" in capsys.readouterr().err
     assert content(tmp_path) == {}
+
+
+def test_a_folder_in_the_place_of_a_store(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "page.html").write_text("mine")
+    assert main(["report", ".", "--output", "page.html"]) == 3
+    assert (tmp_path / "page.html").read_text() == "mine"
+    assert main(["report", ".", "--output", "page.html", "--force"]) == 3
+    assert (tmp_path / "page.html").read_text() == "mine"
+    assert all(line for line in capsys.readouterr().err.splitlines())

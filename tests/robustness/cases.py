@@ -270,7 +270,8 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
         (read if is_read else written).update(paths)
     stores = set[Path]()
     if command == "sweep":
-        stores = {options.store or options.file.with_suffix(".sqlite")}
+        file = options.file if options.file.name else options.file / "nothing"
+        stores = {options.store or file.with_suffix(".sqlite")}
     elif command in ("export", "report"):
         stores = {options.store}
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}

@@ -175,6 +175,10 @@ NO_STORES: dict[str, Damage] = {
     "format of bytes": by_sql("UPDATE about SET value = x'ff00'"),
     "no format": by_sql("DELETE FROM about"),
     "no about": by_sql("DROP TABLE about"),
+    "no tables": by_sql(
+        *(f"DROP TABLE {name}" for name in ("about", "sweep", "bundle", "cell", "text", "result")),
+        "CREATE VIEW cell AS SELECT 1 AS sweep",
+    ),
     "no results": by_sql("DROP TABLE result"),
     "no cells": by_sql("DROP TABLE cell"),
     "column missing": by_sql("ALTER TABLE result DROP COLUMN details"),

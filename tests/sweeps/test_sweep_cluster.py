@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.cli import main
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep, stored
 
@@ -123,5 +124,14 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
 
 def test_no_scheduler(tmp_path: Path) -> None:
     done = run("sweep", small_sweep(tmp_path, 2), "--scheduler", "tcp://127.0.0.1:1")
-    assert done.returncode == 3 and "there is no scheduler at tcp://127.0.0.1:1" in done.stderr
+    assert done.returncode == 3 and "tcp://127.0.0.1:1: there is no scheduler" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("address", ["7", "nan", "tcp://x", "foo://a:1", ""])
+def test_an_address_that_is_none(
+    address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sweep", str(small_sweep(tmp_path, 2)), "--scheduler", address]) == 3
+    err = capsys.readouterr().err
+    assert err.splitlines()[-1].startswith(f"{address}: is no address of a scheduler; ")

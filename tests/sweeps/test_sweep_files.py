@@ -267,6 +267,12 @@ def test_what_is_wrong_is_said(written: Written, text: str, expected: list[str])
         assert any(line.startswith(one) for line in found), (one, found)
 
 
+def test_a_base_file_that_is_a_list(written: Written, tmp_path: Path) -> None:
+    path = written(f"axes:\n  size: {{paths: {SIZE}, values: [500 mm]}}\n")
+    (tmp_path / "quickstart.yaml").write_text("- 1\n- 2\n")
+    assert "the experiment is a list; write its sections" in "\n".join(refusal(path))
+
+
 def test_a_wrong_base_file_is_refused(written: Written, tmp_path: Path) -> None:
     path = written("axes:\n  a: {path: seed, values: [1]}\n")
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
