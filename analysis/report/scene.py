@@ -8,6 +8,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, locations, nominal_state
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 # The eye: turned about z, then raised, in degrees.
 TURN, RISE = -35.0, 24.0
@@ -161,25 +162,15 @@ def _axes(lower: Array, upper: Array, view: Array) -> tuple[tuple[str, Array, fl
 
 
 def hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2) counter-clockwise, by Andrew's chain.
+    """Corners of the convex hull of points (n, 2) counter-clockwise; the ends, where all of them
+    stand on a line.
 
-    >>> hull(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.1], [1.0, 1.0], [0.0, 1.0]])).tolist()
-    [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    >>> hull(np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])).tolist()
+    [[0.0, 0.0], [1.0, 1.0]]
     """
-    size = float(np.ptp(points, axis=0).max(initial=0.0))
     ordered = np.unique(points, axis=0)
-    if len(ordered) < 3:
-        return ordered
-
-    def chain(one_way: Array) -> list[Array]:
-        kept: list[Array] = []
-        for point in one_way:
-            while len(kept) > 1:
-                (a, b), (c, d) = kept[-1] - kept[-2], point - kept[-2]
-                if a * d - b * c > 1e-12 * size * size:
-                    break
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    return np.array(chain(ordered) + chain(ordered[::-1]))
+    try:
+        corners = ordered[ConvexHull(ordered).vertices] if len(ordered) > 2 else ordered
+    except QhullError:
+        return ordered[[0, -1]]
+    return np.asarray(corners)
