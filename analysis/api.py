@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
 
-from .running.steps import Report, unreported
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     import pandas
 
     from .gross_errors.reliability import Reliability
-    from .montecarlo.trials import Progress
+    from .montecarlo.trials import MonteCarloProgress
     from .planning.criteria import CriterionName
+    from .planning.requirements.answers import Reach
+    from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
-    from .requirements.answers import Reach
-    from .requirements.unknowns import UnknownName
     from .results.fit import Fit
     from .results.prediction import Prediction
     from .sweeps.execute import Summary
@@ -128,7 +128,7 @@ def run(
     until: float | None = None,
     seed: int | None = None,
     workers: int = 1,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Callable[[MonteCarloProgress], None] = lambda progress: None,
 ) -> Prediction:
     """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials`
     are asked for.
@@ -292,9 +292,9 @@ def reach(
     >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
     True
     """
-    from .requirements.goals import parse_goal
-    from .requirements.search import reach as search
-    from .requirements.unknowns import NAMES
+    from .planning.requirements.goals import parse_goal
+    from .planning.requirements.root_search import reach as search
+    from .planning.requirements.unknowns import NAMES
 
     names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns or NAMES)
     for name in names:

@@ -62,9 +62,9 @@ def test_a_changed_experiment_is_one_with_the_text_changed(tmp_path: Path) -> No
 
 
 def test_sections_are_replaced_and_entries_removed() -> None:
-    given = bp.quickstart().with_(target_accuracy="1 um", title="another")
-    assert given.title == "another" and given.target_accuracy is not None
-    assert given.with_(target_accuracy=None).target_accuracy is None
+    given = bp.quickstart().with_(target_uncertainty="1 um", title="another")
+    assert given.title == "another" and given.target_uncertainty is not None
+    assert given.with_(target_uncertainty=None).target_uncertainty is None
     less = given.with_({"positions[z high]": None})
     assert [one.name for one in less.positions] == ["z low", "x low", "x high", "y low", "y high"]
     assert len(given.positions) == 6

@@ -112,10 +112,9 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
+    from ballplate.simulator.computing.internal_error import InternalError
+    from ballplate.simulator.computing.unusable import UnusableError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
-
-    from ..running.internal_error import InternalError
-    from ..running.unusable import UnusableError
 
     try:
         check_outputs(options)

@@ -12,7 +12,7 @@ from .outputs import UsageError
 from .telling import warn
 
 if TYPE_CHECKING:
-    from ..checking.check_files import CheckedDesign
+    from .check_files import CheckedDesign
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
@@ -54,7 +54,8 @@ def add_options(parser: ArgumentParser) -> None:
         default=[],
         help=(
             "what a design must reach, too, as in ballplate reach: lengths (U6 within"
-            ' target_accuracy), tasks, or a quantity such as "U6 average 0.5 um"; may be repeated'
+            " target_uncertainty), tasks, or a quantity such as "
+            '"U6 average 0.5 um"; may be repeated'
         ),
     )
     parser.add_argument(
@@ -77,13 +78,13 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..checking.check_files import Wanted, check_files
-    from ..checking.file_patterns import matching_files
-    from ..checking.github import advice_lines, annotation_lines
-    from ..checking.junit import junit_report
-    from ..requirements.goals import GoalError, parse_goal
+    from ..planning.requirements.goals import GoalError, parse_goal
+    from .check_files import Wanted, check_files
     from .common import print_json, print_lines
     from .excerpts import print_errors
+    from .file_patterns import matching_files
+    from .github import advice_lines, annotation_lines
+    from .junit import junit_report
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
     try:

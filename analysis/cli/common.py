@@ -18,7 +18,7 @@ from .telling import warn
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
-    from ..results.result import Result
+    from ..presentation.result import Result
 
 
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
@@ -132,7 +132,7 @@ def add_picture(parser: Any, name: str, help: str) -> None:
 
 
 def _picture(text: str) -> Path:
-    from ..report.svg import PICTURES
+    from ..presentation.svg import PICTURES
 
     if Path(text).suffix.lower() not in PICTURES:
         raise ArgumentTypeError(f'a picture\'s name ends in {", ".join(PICTURES)}, unlike "{text}"')

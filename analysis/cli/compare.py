@@ -9,7 +9,7 @@ from .common import add_file, add_json, at_most, count, trial_count, whole
 PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "braced", "all")
 
 
-HELP = "compare a rival estimator with the full one on synthetic data"
+HELP = "compare an alternative estimator with the full one on synthetic data"
 DESCRIPTION = (
     "Estimate synthetic data sets of the file's true machine with the full estimator and"
     " with one that uses distances or lengths alone, and tell how far the distances that"
@@ -52,7 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
-    """Add the choice of the pairs of balls whose distances a rival estimator uses."""
+    """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
     parser.add_argument(
         "--pairs",
         choices=PAIR_SETS,

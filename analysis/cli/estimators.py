@@ -1,7 +1,7 @@
 """Estimators beside the full one that `ballplate fit --estimator` offers.
 
-A further one is a function from the options, the experiment and its readings to an `Outcome`, and
-one line in `ESTIMATORS`.
+A further one is a function from the options, the experiment and its readings to an
+`EstimatorOutcome`, and one line in `ESTIMATORS`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EstimatorOutcome:
     """What an estimator has found, as lines of text and as plain data in metres and radians.
 
     `complaint` says why the exit status is 1 and is empty where all is well; `warnings` do not
@@ -32,15 +32,15 @@ class Outcome:
     draw: Callable[[Path], None] | None = None
 
 
-Estimator = Callable[[Namespace, "Experiment", "ObservedReadings"], Outcome]
+Estimator = Callable[[Namespace, "Experiment", "ObservedReadings"], EstimatorOutcome]
 
 
 def _of_distances(
     options: Namespace, experiment: Experiment, observed: ObservedReadings
-) -> Outcome:
-    from ..estimators.distances import fit_rival, rival_fit_data, rival_fit_lines
+) -> EstimatorOutcome:
+    from ..estimators.distances import alternative_fit_data, alternative_fit_lines, fit_alternative
 
-    found = fit_rival(
+    found = fit_alternative(
         experiment,
         observed,
         options.estimator,
@@ -53,10 +53,12 @@ def _of_distances(
         complaint = f"the estimate has {found.solution.status}; see the record of iterations"
     elif found.solution.deficiency:
         complaint = f"rank deficiency {found.solution.deficiency}: what is undetermined is left out"
-    return Outcome(rival_fit_lines(found), rival_fit_data(found), complaint)
+    return EstimatorOutcome(alternative_fit_lines(found), alternative_fit_data(found), complaint)
 
 
-def _reversal(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
+def _reversal(
+    options: Namespace, experiment: Experiment, observed: ObservedReadings
+) -> EstimatorOutcome:
     from ..estimators.reversal_fits import fit_reversal
     from ..estimators.reversal_tables import reversal_data, reversal_lines
 
@@ -68,16 +70,18 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
         complaint = found.full.verdict.complaint
 
     def draw(path: Path) -> None:
-        from ..report.vectors import draw_vectors
+        from ..presentation.vectors import draw_vectors
 
         draw_vectors(found.residual_vectors(), found.title, path)
 
-    return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings, draw)
+    return EstimatorOutcome(
+        reversal_lines(found), reversal_data(found), complaint, found.warnings, draw
+    )
 
 
 def _of_length_equations(
     options: Namespace, experiment: Experiment, observed: ObservedReadings
-) -> Outcome:
+) -> EstimatorOutcome:
     from ..estimators.length_fits import (
         fit_lengths,
         has_all_errors,
@@ -102,7 +106,7 @@ def _of_length_equations(
         remarks += (
             "--sigma has no effect: uncertainties come from the scatter about the equations",
         )
-    return Outcome(length_fit_lines(found), length_fit_data(found), complaint, remarks)
+    return EstimatorOutcome(length_fit_lines(found), length_fit_data(found), complaint, remarks)
 
 
 ESTIMATORS: dict[str, Estimator] = {

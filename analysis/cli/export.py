@@ -15,7 +15,8 @@ from .telling import complain
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ..sweeps.stored import Results
+    from ..sweeps.stored import StoredResults
+
 
 BAD_FILE = 3
 
@@ -61,13 +62,13 @@ def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
         complain(f"{path}: {text}; run ballplate sweep again to compute them anew")
 
 
-def warn_of_damage(path: Path, found: Results, count: int) -> bool:
+def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
     """Tell what of a store could not be read; whether there is anything."""
     from ..sweeps.store import unread
     from ..sweeps.store_file import GO_ON
 
-    go_on = GO_ON if found.damage else "ballplate sweep computes anew what is missing"
-    text = unread(path, found.unreadable, found.strays, count, found.damage, go_on)
+    go_on = GO_ON if results.damage else "ballplate sweep computes anew what is missing"
+    text = unread(path, results.unreadable, results.strays, count, results.damage, go_on)
     if text:
         complain(text)
     return bool(text)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
+    from ..results.fit import Fit
 
 HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
@@ -93,17 +94,49 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
     from ballplate.simulator.design.layout import lay_out
-    from ballplate.simulator.inputs.settings import listing
     from ballplate.simulator.readings.certificate_files import read_certificate
-    from ballplate.simulator.readings.gross_error_messages import (
-        doubts_about_lengths,
-        doubts_about_volume,
-    )
     from ballplate.simulator.readings.reading_files import read_readings
 
     from ..results.study import fit
     from .common import show, single
 
+    _refuse_misused(options)
+    experiment = single(options)
+    if options.certificate:
+        experiment = read_certificate(options.certificate, experiment)
+    if options.plot and (
+        experiment.dimension != 2 or options.estimator not in ("full", "reversal")
+    ):
+        raise UsageError(
+            "--plot draws residuals of readings in two dimensions, by the full estimator or"
+            " reversal; leave it out"
+        )
+    observed = read_readings(options.readings, lay_out(experiment))
+    _warn_of_readings(options, observed)
+    if options.estimator != "full":
+        return _run_other(options, experiment, observed)
+    result = fit(experiment, observed, options.sigma, options.monomials)
+    if options.plot and result.converged:
+        write(options, {options.plot: result.plot})
+    show(options, result)
+    if not result.converged:
+        complain(
+            f"the estimate has {result.solution.status} and nothing is made of it: see the record"
+            " of iterations, and look for wrong units, balls or probes among the readings"
+        )
+        return 1
+    _warn(result)
+    if not result.verdict.as_expected:
+        complain(result.verdict.complaint)
+        return 1
+    return 0
+
+
+def _refuse_misused(options: Namespace) -> None:
+    """Refuse options that do not go together.
+
+    :raises UsageError: there are such.
+    """
     for option, given, estimators in (
         ("--scale", options.scale, ("reversal",)),
         ("--no-offsets", options.no_offsets, ("reversal",)),
@@ -122,17 +155,16 @@ def run(options: Namespace) -> int:
             f"the experiment file comes first, then the readings: fit {options.readings}"
             f" {options.files[0]}"
         )
-    experiment = single(options)
-    if options.certificate:
-        experiment = read_certificate(options.certificate, experiment)
-    if options.plot and (
-        experiment.dimension != 2 or options.estimator not in ("full", "reversal")
-    ):
-        raise UsageError(
-            "--plot draws residuals of readings in two dimensions, by the full estimator or"
-            " reversal; leave it out"
-        )
-    observed = read_readings(options.readings, lay_out(experiment))
+
+
+def _warn_of_readings(options: Namespace, observed: ObservedReadings) -> None:
+    """Warn of readings that are missing or not planned, and of those that are in doubt."""
+    from ballplate.simulator.inputs.settings import listing
+    from ballplate.simulator.readings.gross_error_messages import (
+        doubts_about_lengths,
+        doubts_about_volume,
+    )
+
     for what, names in (
         ("planned but not read", observed.missing),
         ("read but not planned", observed.unplanned),
@@ -141,32 +173,20 @@ def run(options: Namespace) -> int:
             complain(f"{options.readings}: {what} ({len(names)}): {listing(names)}")
     warn(doubts_about_lengths(observed.design, observed.x))
     warn(doubts_about_volume(observed.design, observed.x, observed.marks))
-    if options.estimator != "full":
-        return _run_other(options, experiment, observed)
-    result = fit(experiment, observed, options.sigma, options.monomials)
-    if options.plot and result.converged:
-        write(options, {options.plot: result.plot})
-    show(options, result)
-    if not result.converged:
-        complain(
-            f"the estimate has {result.solution.status} and nothing is made of it: see the record"
-            " of iterations, and look for wrong units, balls or probes among the readings"
-        )
-        return 1
+
+
+def _warn(result: Fit) -> None:
+    """Warn where the fit leaves more than the stated uncertainties explain, and of its doubts."""
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
-        cure = (
+        advice = (
             "no single mistake explains that: try a richer error model or larger uncertainties, and"
             " think of drifts"
         )
         if result.diagnosis.suspects or result.diagnosis.scatter:
-            cure = "look at what is suspected"
-        warn([f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}"])
+            advice = "look at what is suspected"
+        warn([f"S^2 is {times:.3g} times what the stated uncertainties explain; {advice}"])
     warn(result.doubts)
-    if not result.verdict.as_expected:
-        complain(result.verdict.complaint)
-        return 1
-    return 0
 
 
 def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:

@@ -16,7 +16,8 @@ from .outputs import UsageError, Writer, add_force, add_output, text_writer, wri
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
-    from ..length_map.length_map import Settings
+    from ..error_maps.length_map import LengthMapSettings
+
 
 # Lines of a table of all lengths.
 MOST_PAIRS = 500_000
@@ -39,7 +40,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--grid",
@@ -92,8 +93,8 @@ def _factor(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ..length_map.length_map import length_map
-    from ..length_map.length_tables import length_data, length_lines, pair_csv, point_csv
+    from ..error_maps.length_map import length_map
+    from ..error_maps.length_tables import length_data, length_lines, pair_csv, point_csv
     from .progress import progress
 
     experiment = single(options)
@@ -112,7 +113,7 @@ def run(options: Namespace) -> int:
     if options.pairs is not None:
         writers[options.pairs] = _of_lines(pair_csv(experiment, settings))
     if options.plot is not None:
-        from ..report.lengths import draw_lengths
+        from ..report.length_plots import draw_lengths
 
         writers[options.plot] = partial(draw_lengths, found)
     write(options, writers)
@@ -125,7 +126,7 @@ def run(options: Namespace) -> int:
     return 0 if is_expected and not is_missed else 1
 
 
-def _settings(experiment: Experiment, options: Namespace) -> Settings:
+def _settings(experiment: Experiment, options: Namespace) -> LengthMapSettings:
     """What was asked for.
 
     :raises UsageError: it cannot be had of this experiment.
@@ -133,17 +134,19 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings:
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
     from ballplate.simulator.inputs.settings import hint
 
-    from ..length_map.length_map import MOST_POINTS, Settings
+    from ..error_maps.length_map import MOST_POINTS, LengthMapSettings
     from ..uncertainty.tasks import expansion
 
     try:
-        stated = None if experiment.target_accuracy is None else experiment.target_accuracy.stated
+        stated = (
+            None if experiment.target_uncertainty is None else experiment.target_uncertainty.stated
+        )
         target = stated if options.target is None else parse_length_function(options.target)
     except QuantityError as error:
         raise UsageError(f"--target: {error}") from None
     if target is None:
         raise UsageError(
-            'the file states no target_accuracy; add it, or give --target, such as "0.5 um +'
+            'the file states no target_uncertainty; add it, or give --target, such as "0.5 um +'
             ' L/1000000"'
         )
     d = experiment.dimension
@@ -162,7 +165,7 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings:
         raise UsageError(f'unknown probe "{probe}"; {hint(probe, experiment.probes)}')
     factor = experiment.coverage_factor
     expanded = options.coverage_factor or expansion(factor)
-    return Settings(grid, probe, target, expanded, options.with_repeatability, factor)
+    return LengthMapSettings(grid, probe, target, expanded, options.with_repeatability, factor)
 
 
 def _of_lines(lines: Iterable[str]) -> Writer:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.machines.description import Three
     from ballplate.simulator.machines.protocol import Array
 
-    from ..volumetric.volumetric_errors import AlongAxis, Volumetric
+    from ..error_maps.volumetric_errors import AlongAxis, Volumetric
 
 # Points along a line unless told.
 POINTS = 21
@@ -72,7 +72,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _grid(text: str) -> tuple[int, ...]:
-    from ..volumetric.volumetric_errors import MOST_POINTS
+    from ..error_maps.volumetric_errors import MOST_POINTS
 
     counts = common.grid(text)
     if counts is None or len(counts) != 3:
@@ -84,7 +84,7 @@ def _grid(text: str) -> tuple[int, ...]:
 
 
 def _points(text: str) -> int:
-    from ..volumetric.volumetric_errors import MOST_POINTS
+    from ..error_maps.volumetric_errors import MOST_POINTS
 
     found = count(text)
     if not 2 <= found <= MOST_POINTS:
@@ -118,7 +118,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.experiment.machine_file import load_machine
     from ballplate.simulator.inputs.messages import Message
 
-    from ..volumetric.volumetric_errors import Volumetric, along_axes
+    from ..error_maps.volumetric_errors import Volumetric, along_axes
 
     doubts: list[Message] = []
     machine = load_machine(options.file, doubts)
@@ -129,7 +129,7 @@ def run(options: Namespace) -> int:
     if options.points is not None and options.line is None:
         raise UsageError("--points is for --line; leave it out")
     if options.error is not None:
-        from ..volumetric.volumetric_tables import why_not_along
+        from ..error_maps.volumetric_tables import why_not_along
 
         every = {one.error.name: one for one in along_axes(machine)}
         if options.error not in every:
@@ -149,18 +149,18 @@ def run(options: Namespace) -> int:
     return _on_a_line(built, start, end, options)
 
 
-def _of_one(found: AlongAxis, options: Namespace) -> int:
-    from ..report.volumetric import draw_along
-    from ..volumetric.volumetric_tables import along_csv, along_data, along_lines
+def _of_one(along: AlongAxis, options: Namespace) -> int:
+    from ..error_maps.volumetric_tables import along_csv, along_data, along_lines
+    from ..report.volumetric_plots import draw_along
 
-    _draw(options, partial(draw_along, found))
-    return _tell(options, along_lines(found), along_csv(found), along_data(found))
+    _draw(options, partial(draw_along, along))
+    return _tell(options, along_lines(along), along_csv(along), along_data(along))
 
 
 def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace) -> int:
-    from ..report.volumetric import draw_line
-    from ..volumetric import volumetric_tables as tables
-    from ..volumetric.volumetric_errors import between
+    from ..error_maps import volumetric_tables as tables
+    from ..error_maps.volumetric_errors import between
+    from ..report.volumetric_plots import draw_line
 
     found = machine.errors(between(start, end, options.points or POINTS))
     length = machine.lengths(start[None], end[None])
@@ -171,8 +171,8 @@ def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace
 
 
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
-    from ..report.volumetric import draw_grid
-    from ..volumetric import volumetric_tables as tables
+    from ..error_maps import volumetric_tables as tables
+    from ..report.volumetric_plots import draw_grid
 
     found, diagonals = machine.errors(machine.grid(options.grid)), machine.diagonals()
     _draw(options, partial(draw_grid, found, diagonals, options.grid, options.magnification))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from ..running.memory import want_of_memory
+from ballplate.simulator.computing.memory import want_of_memory
+
 from .interruption import named_paths
 
 # What makes a command's work smaller.

@@ -382,9 +382,9 @@ def _is_in_place(path: Path) -> bool:
     return found is not None and not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode)
 
 
-def _is_standard_output(found: os.stat_result) -> bool:
+def _is_standard_output(status: os.stat_result) -> bool:
     try:
-        return os.path.samestat(found, os.fstat(1))
+        return os.path.samestat(status, os.fstat(1))
     except OSError:
         return False
 
@@ -474,12 +474,12 @@ def _write_in_place(path: Path, writer: Writer) -> None:
                     shutil.copyfileobj(content, stream)
 
 
-def _in_place(path: Path, found: os.stat_result | None) -> BinaryIO:
+def _in_place(path: Path, status: os.stat_result | None) -> BinaryIO:
     """A device or pipe to be written, or an open file of the process's, which goes on where it is
     and loses nothing.
     """
     own = OPEN_FILE.fullmatch(os.path.abspath(path))
-    if own is None or found is None or not stat.S_ISREG(found.st_mode):
+    if own is None or status is None or not stat.S_ISREG(status.st_mode):
         return path.open("wb")
     number = own[1] or own[2]
     return os.fdopen(os.dup(int(number)), "wb") if number else path.open("ab")

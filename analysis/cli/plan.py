@@ -141,6 +141,7 @@ def _sheet(text: str) -> Path:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
+    from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.experiment.load import load
     from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 
@@ -149,7 +150,6 @@ def run(options: Namespace) -> int:
     from ..planning.done import done_candidates
     from ..planning.earlier import earlier_choice
     from ..planning.offer import offer
-    from ..running.processes import processors
     from .excerpts import print_errors
     from .progress import progress
 
@@ -196,27 +196,27 @@ def run(options: Namespace) -> int:
     return 0 if found.is_determined and is_full else 1
 
 
-def _write(found: Campaign, sheet: RunSheet, options: Namespace) -> None:
+def _write(campaign: Campaign, sheet: RunSheet, options: Namespace) -> None:
     """Write what was asked for."""
     writers: dict[Path, Writer] = {}
     if options.output is not None:
         from ..planning.experiment_file import experiment_text
 
         header = (
-            f"Chosen by ballplate plan from {options.files[0].name}: {found.criterion}, no more"
-            f" than {found.budget}."
+            f"Chosen by ballplate plan from {options.files[0].name}: {campaign.criterion}, no more"
+            f" than {campaign.budget}."
         )
-        deficiency = found.left_open or None
+        deficiency = campaign.left_open or None
         text = experiment_text(
-            found.experiment, sheet.chosen, header, options.output.parent, None, deficiency
+            campaign.experiment, sheet.chosen, header, options.output.parent, None, deficiency
         )
         writers[options.output] = text_writer(lambda stream: stream.write(text))
     if options.sheet is not None:
-        told = _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet)
+        told = _sheet_text(options.sheet.suffix.lower())(campaign.experiment, sheet)
         writers[options.sheet] = text_writer(lambda stream: stream.write(told))
     if options.plot is not None:
         # Numbered as on the run sheet.
-        writers[options.plot] = replace(found, chosen=sheet.chosen).plot
+        writers[options.plot] = replace(campaign, chosen=sheet.chosen).plot
     if write(options, writers):
         for path in filter(None, (options.output, options.sheet)):
             note(options, f"{path} written")

@@ -20,7 +20,7 @@ LINE_INTERVAL = 5.0
 
 
 @dataclass
-class Progress:
+class ProgressDisplay:
     """Shows one step after the other; `what` is counted, which is also what tells steps apart."""
 
     is_quiet: bool = False
@@ -75,9 +75,9 @@ class Progress:
 
 
 @contextmanager
-def progress(options: Namespace) -> Iterator[Progress]:
+def progress(options: Namespace) -> Iterator[ProgressDisplay]:
     """What shows the steps of a command, for as long as they take."""
-    shown = Progress(options.quiet, options.verbose)
+    shown = ProgressDisplay(options.quiet, options.verbose)
     try:
         yield shown
     finally:

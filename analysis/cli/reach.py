@@ -30,7 +30,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--goal",
         default="lengths",
         help=(
-            "lengths (default: distances between corrected points, U6, within target_accuracy),"
+            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
             ' tasks, or a quantity such as "U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average'
             ' 0.1 um"'
         ),
@@ -44,7 +44,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--artefact",
@@ -69,9 +69,9 @@ def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
 
-    from ..requirements.goals import GoalError, parse_goal
-    from ..requirements.search import reach
-    from ..requirements.unknowns import NotVariableError
+    from ..planning.requirements.goals import GoalError, parse_goal
+    from ..planning.requirements.root_search import reach
+    from ..planning.requirements.unknowns import NotVariableError
     from .progress import progress
 
     try:

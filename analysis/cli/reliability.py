@@ -33,7 +33,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="80%",
         type=_share,
         default=0.8,
-        help="chance that a detectable bias is found; default 80%%",
+        help="chance that a bias of the size of the MDB is found; default 80%%",
     )
     parser.add_argument(
         "--sigma",

@@ -84,8 +84,8 @@ def run(options: Namespace) -> int:
             with progress(options) as shown:
                 text = page(store, results, options.run_modules, shown.show)
         else:
+            from ..presentation.formats import FORMATS
             from ..report.tables import report_tables
-            from ..results.formats import FORMATS
 
             text = FORMATS[form](results.title, report_tables(results))
         if not results.count("done") and not is_damaged:

@@ -122,10 +122,10 @@ def _certified(options: Namespace) -> int:
     """
     from ballplate.designs import shipped
 
-    from ..certified.answers import answers
-    from ..certified.problems import certified_problems, read_results
-    from ..certified.score import all_right, scores
-    from ..certified.score_tables import score_data, score_lines
+    from ..reproduction.certified_answers import answers
+    from ..reproduction.certified_problems import certified_problems, read_results
+    from ..reproduction.score import all_right, scores
+    from ..reproduction.score_tables import score_data, score_lines
     from .common import print_json, print_lines
     from .progress import progress
 

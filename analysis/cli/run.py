@@ -86,14 +86,15 @@ def run(options: Namespace) -> int:
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
+    from ballplate.simulator.computing.processes import processors
+
     from ..montecarlo.experiments import trials
-    from ..montecarlo.trials import MOST_TRIALS, Progress
-    from ..running.processes import processors
+    from ..montecarlo.trials import MOST_TRIALS, MonteCarloProgress
     from .progress import progress
 
     with progress(options) as shown:
 
-        def report(now: Progress) -> None:
+        def report(now: MonteCarloProgress) -> None:
             options.interruption.answer()
             options.interruption.kept = lambda: (
                 f"the figures of the {now.done} data sets done are lost"

@@ -16,10 +16,10 @@ from .outputs import UsageError, Writer, add_force, add_output, text_writer, wri
 
 if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import ExperimentError
-    from ballplate.simulator.splines.problems import SplineError
-    from ballplate.simulator.splines.read import Column, Points
+    from ballplate.simulator.splines.read import Column, CurvePoints
+    from ballplate.simulator.splines.spline_problems import SplineError
 
-    from ..error_curve.error_curve import CurveSettings, Place
+    from ..error_maps.error_curve import CurveSettings, Place
 
 
 HELP = "fit a spline with prescribed values and slopes to measured errors"
@@ -152,12 +152,12 @@ POWERS = (
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
     import numpy as np
-    from ballplate.simulator.splines.problems import SplineError
     from ballplate.simulator.splines.read import choose_points, read_points
+    from ballplate.simulator.splines.spline_problems import SplineError
 
-    from ..error_curve.curve_tables import coefficients_csv, curve_data, curve_lines
-    from ..error_curve.error_curve import fit_curve
-    from ..report.curves import plot, whiskers
+    from ..error_maps.curve_tables import coefficients_csv, curve_data, curve_lines
+    from ..error_maps.error_curve import fit_curve
+    from ..report.error_curve_plots import plot, whiskers
 
     everything = read_points(options.file, options.x, options.y)
     points = everything
@@ -202,13 +202,13 @@ def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
     """The problems with places in the unit of the abscissa."""
     from ballplate.simulator.inputs.messages import ExperimentError, Message
 
-    from ..error_curve.curve_tables import shown
+    from ..error_maps.curve_tables import shown
 
     texts = [problem.told(lambda place: shown(place, column)) for problem in error.problems]
     return ExperimentError(Message(str(file), 0, 0, "", text) for text in texts)
 
 
-def _check(options: Namespace, points: Points) -> None:
+def _check(options: Namespace, points: CurvePoints) -> None:
     """Refuse options that do not go together.
 
     :raises UsageError: there are such.
@@ -229,12 +229,12 @@ def _check(options: Namespace, points: Points) -> None:
         raise UsageError("--json and --coefficients - both go to the screen; name a file for one")
 
 
-def _settings(options: Namespace, points: Points) -> CurveSettings:
+def _settings(options: Namespace, points: CurvePoints) -> CurveSettings:
     """What the options ask for.
 
     :raises UsageError: a value that is no length, angle or slope.
     """
-    from ..error_curve.error_curve import EVERY, CurveSettings, Hold
+    from ..error_maps.error_curve import EVERY, CurveSettings, Hold
 
     x, y = points.x_column, points.y_column
     holds = []

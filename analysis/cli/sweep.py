@@ -140,7 +140,8 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
 
 
 def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
-    from ..running.processes import processors
+    from ballplate.simulator.computing.processes import processors
+
     from ..sweeps.cluster import cluster_runner
     from ..sweeps.local import local_runner
 
@@ -181,7 +182,8 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    from ..running.processes import processors
+    from ballplate.simulator.computing.processes import processors
+
     from ..sweeps.estimate import seconds_of
     from .progress import duration
 

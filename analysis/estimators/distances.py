@@ -1,5 +1,5 @@
-"""The rival estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as
-in section 6.2.7.
+"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a
+comparison as in section 6.2.7.
 """
 
 from __future__ import annotations
@@ -8,15 +8,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.alternative_estimators import (
+    AlternativeName,
+    AlternativeSolution,
+    alternative_estimate,
+)
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
 from ballplate.simulator.estimation.length_equations import (
     LengthEstimator,
     NotAMetricError,
     length_estimate,
 )
-from ballplate.simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, refused
@@ -30,15 +35,14 @@ from ballplate.simulator.readings.generate import (
 )
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
+from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
 from ..results.estimates import ParameterEstimate
-from ..results.formatting import SHOWN, aligned, as_data, number, picked
-from ..running.steps import Report, unreported
 from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
-# Derivatives, terms times parameters, of a rival estimator, which takes some 70 bytes for each, and
-# more for few parameters.
+# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for
+# each, and more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
 # Pairs of points of a comparison.
@@ -46,27 +50,27 @@ MOST_POINTS = 100_000
 
 # Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth
 # of that.
-ENOUGH = GaussNewtonSettings(smallest_step=1e-8)
+COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 
 @dataclass(frozen=True)
-class RivalFit:
-    """Estimates of the machine's parameters by a rival estimator from `pairs` pairs of balls,
-    without uncertainties.
+class AlternativeFit:
+    """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of
+    balls, without uncertainties.
     """
 
     label: str
     title: str
-    solution: RivalSolution
+    solution: AlternativeSolution
     pairs: int
     lengths: int
     estimates: tuple[ParameterEstimate, ...]
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic
-    data sets.
+class EstimatorComparison:
+    """How far an alternative estimator's corrected distances are from the full estimator's, over
+    `trials` synthetic data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
@@ -75,7 +79,7 @@ class Comparison:
 
     label: str
     title: str
-    estimator: RivalName | LengthEstimator
+    estimator: AlternativeName | LengthEstimator
     trials: int
     pairs: int
     lengths: int
@@ -107,12 +111,12 @@ def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
 def count_terms(
     experiment: Experiment,
     design: Design,
-    estimator: RivalName,
+    estimator: AlternativeName,
     name: str | None = None,
     across_probes: bool = False,
 ) -> int:
-    """Number of terms of a rival estimator, but for certificates and priors, if every position has
-    all the balls.
+    """Number of terms of an alternative estimator, but for certificates and priors, if every
+    position has all the balls.
     """
     count = 0
     artefact_of = design.ball_artefact[design.readings.ball]
@@ -135,7 +139,7 @@ def count_terms(
 def _refuse_many_terms(
     experiment: Experiment,
     design: Design,
-    estimator: RivalName,
+    estimator: AlternativeName,
     name: str | None,
     across_probes: bool,
 ) -> None:
@@ -196,14 +200,14 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         raise refused(experiment.source, text, what)
 
 
-def fit_rival(
+def fit_alternative(
     experiment: Experiment,
     observed: ObservedReadings,
-    estimator: RivalName,
+    estimator: AlternativeName,
     pair_set: str | None = None,
     across_probes: bool = False,
     monomials: bool = False,
-) -> RivalFit:
+) -> AlternativeFit:
     """Estimate machine errors from the distances of readings.
 
     Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of
@@ -213,7 +217,7 @@ def fit_rival(
     _refuse_unknown_lengths(experiment, design)
     _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
     chosen = ball_pairs(experiment, pair_set)
-    solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
+    solution = alternative_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
     names, units, matrix = (
         [p.name for p in parameters],
@@ -231,7 +235,7 @@ def fit_rival(
         ParameterEstimate(name, float(value), np.nan, unit)
         for name, value, unit in zip(names, values, units, strict=True)
     )
-    return RivalFit(
+    return AlternativeFit(
         experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates
     )
 
@@ -239,14 +243,14 @@ def fit_rival(
 def compare_estimators(
     experiment: Experiment,
     trials: int,
-    estimator: RivalName | LengthEstimator = "distances",
+    estimator: AlternativeName | LengthEstimator = "distances",
     pair_set: str | None = None,
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
     report: Report = unreported,
-) -> Comparison:
-    """Compare a rival with the full estimator on readings of the file's true machine.
+) -> EstimatorComparison:
+    """Compare an alternative with the full estimator on readings of the file's true machine.
 
     Each data set has noise, a certificate and `points` random pairs of points in the volume of its
     own, all drawn from `seed` (default: the file's) and its number, so that more data sets only add
@@ -287,7 +291,7 @@ def compare_estimators(
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
         report(f"data sets of {experiment.label}", trial + 1, trials)
-    return Comparison(
+    return EstimatorComparison(
         experiment.label,
         experiment.title,
         estimator,
@@ -307,7 +311,7 @@ def _both_estimates(
     on_truth: Design,
     truth: State,
     chosen: Integers,
-    estimator: RivalName | LengthEstimator,
+    estimator: AlternativeName | LengthEstimator,
     across_probes: bool,
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
@@ -316,7 +320,7 @@ def _both_estimates(
     """
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
-    full = estimate(observed.design, observed.x, ENOUGH)
+    full = estimate(observed.design, observed.x, COMPARISON_TOLERANCE)
     if estimator == "length-equations" or estimator == "sphere-then-metric":
         try:
             solved = length_estimate(observed.design, observed.x, estimator)
@@ -327,12 +331,18 @@ def _both_estimates(
             if full.status == "converged" and solved.converged
             else None
         )
-    rival = rival_estimate(
-        observed.design, observed.x, chosen, estimator, across_probes, ENOUGH, start=full.state.a
+    alternative = alternative_estimate(
+        observed.design,
+        observed.x,
+        chosen,
+        estimator,
+        across_probes,
+        COMPARISON_TOLERANCE,
+        start=full.state.a,
     )
-    if full.status != "converged" or rival.status != "converged":
+    if full.status != "converged" or alternative.status != "converged":
         return None
-    return full.state.a, rival.a
+    return full.state.a, alternative.a
 
 
 def _distances(design: Design, a: Array, ends: Array) -> Array:
@@ -347,8 +357,8 @@ def share_below(values: Array, published: float) -> float:
     return float((values < published).mean()) if len(values) else float("nan")
 
 
-def rival_fit_lines(fit: RivalFit) -> list[str]:
-    """A rival's fit as lines of text: iterations and the machine's parameters."""
+def alternative_fit_lines(fit: AlternativeFit) -> list[str]:
+    """An alternative estimator's fit as lines of text: iterations and the machine's parameters."""
     record = fit.solution.iterations
     rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
     used = _used(fit.pairs, fit.lengths)
@@ -383,8 +393,10 @@ def _used(pairs: int, lengths: int) -> str:
     return " and ".join([*words, *([f"{lengths} lengths of standards"] if lengths else [])])
 
 
-def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
-    """A rival's fit as plain data in metres and radians; what is undetermined is None."""
+def alternative_fit_data(fit: AlternativeFit) -> dict[str, Any]:
+    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
+    None.
+    """
     data: dict[str, Any] = as_data(
         {
             "experiment": fit.label,
@@ -398,26 +410,28 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
     return data
 
 
-def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
+def comparison_lines(
+    comparison: EstimatorComparison, published: dict[str, float | None]
+) -> list[str]:
     """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum")
     stand in them.
     """
-    across = ", across probes" if found.across_probes else ""
-    used = _used(found.pairs, found.lengths)
+    across = ", across probes" if comparison.across_probes else ""
+    used = _used(comparison.pairs, comparison.lengths)
     lines = [
-        f"{found.label}: {found.title}",
+        f"{comparison.label}: {comparison.title}",
         (
-            f"estimator {found.estimator} ({used}{across}) against the full one: corrected"
-            f" distances of {found.points} random pairs of points in each of {found.trials} data"
-            " sets, differences in um"
+            f"estimator {comparison.estimator} ({used}{across}) against the full one: corrected"
+            f" distances of {comparison.points} random pairs of points in each of"
+            f" {comparison.trials} data sets, differences in um"
         ),
     ]
-    if found.failed:
+    if comparison.failed:
         lines.append(
-            f"not converged: {len(found.failed)} data sets, numbers"
-            f" {', '.join(map(str, found.failed[:20]))}"
+            f"not converged: {len(comparison.failed)} data sets, numbers"
+            f" {', '.join(map(str, comparison.failed[:20]))}"
         )
-    if not len(found.rms):
+    if not len(comparison.rms):
         return lines
     rows = [
         [
@@ -430,8 +444,8 @@ def comparison_lines(found: Comparison, published: dict[str, float | None]) -> l
         ]
     ]
     for words, key, values in (
-        ("root mean square", "rms", found.rms),
-        ("largest", "maximum", found.maximum),
+        ("root mean square", "rms", comparison.rms),
+        ("largest", "maximum", comparison.maximum),
     ):
         value = published.get(key)
         placed = (
@@ -445,15 +459,17 @@ def comparison_lines(found: Comparison, published: dict[str, float | None]) -> l
     return lines + aligned(rows, [False] + [True] * (len(rows[0]) - 1))
 
 
-def comparison_data(found: Comparison, published: dict[str, float | None]) -> dict[str, Any]:
+def comparison_data(
+    comparison: EstimatorComparison, published: dict[str, float | None]
+) -> dict[str, Any]:
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
-        "experiment": found.label,
-        **picked(found, "title", "estimator", "trials", "pairs", "lengths"),
-        **picked(found, "across_probes", "points"),
-        "not_converged": found.failed,
+        "experiment": comparison.label,
+        **picked(comparison, "title", "estimator", "trials", "pairs", "lengths"),
+        **picked(comparison, "across_probes", "points"),
+        "not_converged": comparison.failed,
     }
-    for key, values in (("rms", found.rms), ("maximum", found.maximum)):
+    for key, values in (("rms", comparison.rms), ("maximum", comparison.maximum)):
         quantiles = np.quantile(values, QUANTILES) if len(values) else ()
         data[key] = {
             "quantiles": {str(q): value for q, value in zip(QUANTILES, quantiles, strict=False)},

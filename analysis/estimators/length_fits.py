@@ -24,8 +24,8 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
+from ..presentation.formatting import aligned, as_data, number, picked
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.formatting import aligned, as_data, number, picked
 from ..results.parts import adjustment_data, adjustment_lines
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
@@ -65,25 +65,7 @@ def fit_lengths(
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
     """
     design = observed.design
-    if design.dimension != 3 or not len(design.lengths):
-        what, has = "artefacts", "has no ball bar or Bryan gauge whose lengths are read"
-        if design.dimension != 3:
-            what, has = "machine.volume", "has two dimensions"
-        text = (
-            f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
-        )
-        bars = [
-            name
-            for name, one in experiment.artefacts.items()
-            if isinstance(one, TwoSpheresSettings)
-        ]
-        if bars and design.dimension == 3:
-            text = (
-                f"is a plate, but {estimator} needs length standards; state role: length_standard"
-            )
-            mark = experiment.place(("artefacts", bars[0]))
-            raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
-        raise refused(experiment.source, text, what)
+    _refuse_other_artefacts(experiment, design, estimator)
     try:
         solution = length_estimate(design, observed.x, estimator)
     except NotAMetricError as error:
@@ -92,6 +74,49 @@ def fit_lengths(
             " directions"
         )
         raise refused(experiment.source, text) from None
+    remarks = _remarks(design, estimator, solution)
+    factors = np.where(solution.open_factors, np.nan, solution.factors)
+    centres = np.where(solution.open_centres, np.nan, solution.centres)
+    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
+    return LengthFit(
+        experiment.label,
+        experiment.title,
+        solution,
+        adjustments(
+            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
+        ),
+        tuple(factors.tolist()),
+        tuple(
+            (design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
+        ),
+        tuple(zip(design.length_names, lengths.tolist(), strict=True)),
+        tuple(remarks),
+        tuple(_spheres(design, observed.x)),
+    )
+
+
+def _refuse_other_artefacts(
+    experiment: Experiment, design: Design, estimator: LengthEstimator
+) -> None:
+    """Refuse an experiment that has no lengths in three dimensions."""
+    if design.dimension == 3 and len(design.lengths):
+        return
+    what, has = "artefacts", "has no ball bar or Bryan gauge whose lengths are read"
+    if design.dimension != 3:
+        what, has = "machine.volume", "has two dimensions"
+    text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
+    bars = [
+        name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)
+    ]
+    if bars and design.dimension == 3:
+        text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
+        mark = experiment.place(("artefacts", bars[0]))
+        raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
+    raise refused(experiment.source, text, what)
+
+
+def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolution) -> list[str]:
+    """What should be known beside the figures."""
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
@@ -122,24 +147,7 @@ def fit_lengths(
     instead = "the full estimator with --sigma given takes the uncertainties as stated"
     doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
     remarks += [doubt] if doubt else []
-    factors = np.where(solution.open_factors, np.nan, solution.factors)
-    centres = np.where(solution.open_centres, np.nan, solution.centres)
-    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
-    return LengthFit(
-        experiment.label,
-        experiment.title,
-        solution,
-        adjustments(
-            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
-        ),
-        tuple(factors.tolist()),
-        tuple(
-            (design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
-        ),
-        tuple(zip(design.length_names, lengths.tolist(), strict=True)),
-        tuple(remarks),
-        tuple(_spheres(design, observed.x)),
-    )
+    return remarks
 
 
 def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:

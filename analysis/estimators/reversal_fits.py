@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.estimation.parameters import SharedLayout
@@ -30,14 +31,13 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.settings import MetricSettings, build_error_model
-from ballplate.simulator.numerics.threads import single_threaded
 from ballplate.simulator.readings.reading_files import ObservedReadings
 from numpy.typing import NDArray
 
-from ..report.vectors import Vectors
+from ..presentation.formatting import number
+from ..presentation.vectors import Vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fit import Fit
-from ..results.formatting import number
 from ..results.plates import axes_of_plates
 from ..results.study import fit
 

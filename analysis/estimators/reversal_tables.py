@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.geometry.axes import axes_words
 
-from ..results.formatting import SHOWN, aligned, as_data, number, picked, to_uncertainty
+from ..presentation.formatting import SHOWN, aligned, as_data, number, picked, to_uncertainty
 from ..results.parts import MOST_BALLS
 from .reversal_fits import ReversalFit
 

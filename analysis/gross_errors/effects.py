@@ -9,18 +9,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.estimation.functions import (
     Coordinates,
     Displacements,
     Distances,
+    MeasuredPoints,
     Places,
-    Points,
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable
 
 from ..uncertainty.quantities import QUANTITIES
 from .response import Response
@@ -94,7 +94,7 @@ def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[I
     if isinstance(given, Coordinates):
         found = _coordinates(made, places)
         return lambda asked: found
-    if isinstance(given.places, Points):
+    if isinstance(given.places, MeasuredPoints):
         chosen = (
             np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
         )

@@ -58,7 +58,7 @@ LEAST_PART, MOST_STARTS = 3, 60
 
 
 @dataclass(frozen=True)
-class Block:
+class BiasPatterns:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
     `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position,
@@ -85,7 +85,7 @@ class Block:
 @dataclass(frozen=True)
 class Patterns:
     """Patterns as columns of `matrix` (rows, k), with `kind`, `subject`, `axis` and `start` (k,) as
-    in `Block`.
+    in `BiasPatterns`.
     """
 
     design: Design
@@ -202,10 +202,10 @@ def _block(
     subject: Any,
     axis: Any = -1,
     start: Any = -1,
-) -> Block:
+) -> BiasPatterns:
     subject = np.atleast_1d(np.asarray(subject, np.int64))
     axis = np.broadcast_to(np.asarray(axis, np.int64), subject.shape)
-    return Block(
+    return BiasPatterns(
         kind, *entries, subject, axis, np.broadcast_to(np.asarray(start, np.int64), subject.shape)
     )
 
@@ -215,7 +215,7 @@ def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integer
     return row, column, value
 
 
-def _single_readings(at: _Place) -> Iterator[Block]:
+def _single_readings(at: _Place) -> Iterator[BiasPatterns]:
     m, d = at.weight.shape
     rows = np.arange(m * d)
     yield _block(
@@ -226,7 +226,7 @@ def _single_readings(at: _Place) -> Iterator[Block]:
     )
 
 
-def _single_lengths(at: _Place) -> Iterator[Block]:
+def _single_lengths(at: _Place) -> Iterator[BiasPatterns]:
     """Lengths that share no reading with others."""
     alone, white = at.white.alone, at.white.single
     row, column = _pairs_within(white, white.group)
@@ -235,7 +235,7 @@ def _single_lengths(at: _Place) -> Iterator[Block]:
     yield _block("length", (at.places.lengths.start + row, column, value), alone)
 
 
-def _ends(at: _Place) -> Iterator[Block]:
+def _ends(at: _Place) -> Iterator[BiasPatterns]:
     """Readings of standards whose lengths are read together, each along the axes that change
     lengths differently.
     """
@@ -277,7 +277,7 @@ def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers
     return row, column
 
 
-def _single_items(at: _Place) -> Iterator[Block]:
+def _single_items(at: _Place) -> Iterator[BiasPatterns]:
     """Priors, co-ordinates and distances: a value that is stated too large makes residuals
     smaller.
     """
@@ -293,7 +293,7 @@ def _single_items(at: _Place) -> Iterator[Block]:
         yield _block(kind, (rows.start + every, every, -1.0 / uncertainty), every, axis)
 
 
-def _dirty_balls(at: _Place) -> Iterator[Block]:
+def _dirty_balls(at: _Place) -> Iterator[BiasPatterns]:
     """A ball that is read several times in a position, displaced there; read once, it is the same
     as its reading.
     """
@@ -311,7 +311,7 @@ def _dirty_balls(at: _Place) -> Iterator[Block]:
     yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
 
 
-def _moved_balls(at: _Place) -> Iterator[Block]:
+def _moved_balls(at: _Place) -> Iterator[BiasPatterns]:
     """Balls that have been displaced on their plate, along its axes, from one position on."""
     d, readings = at.design.dimension, at.readings
     place = position_order(at.design)[readings.position]
@@ -367,7 +367,7 @@ def _slip_starts(at: _Place, rows: Integers) -> Integers:
     return np.unique(np.append(between, len(rows) // 2))
 
 
-def _slips(at: _Place) -> Iterator[Block]:
+def _slips(at: _Place) -> Iterator[BiasPatterns]:
     """Plates that slipped within a position."""
     d = at.design.dimension
     for k in at.has_plate:
@@ -389,7 +389,7 @@ def _slips(at: _Place) -> Iterator[Block]:
         yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
 
 
-def _probes(at: _Place) -> Iterator[Block]:
+def _probes(at: _Place) -> Iterator[BiasPatterns]:
     """Probes whose offsets are stated too large; of one that is estimated only its prior can be
     wrong.
     """
@@ -413,7 +413,7 @@ def _probes(at: _Place) -> Iterator[Block]:
         yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
 
 
-def _length_values(at: _Place) -> Iterator[Block]:
+def _length_values(at: _Place) -> Iterator[BiasPatterns]:
     """Certified lengths that are stated too long and are read several times, or together with
     others.
     """
@@ -428,7 +428,7 @@ def _length_values(at: _Place) -> Iterator[Block]:
         yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
 
 
-def _scales(at: _Place) -> Iterator[Block]:
+def _scales(at: _Place) -> Iterator[BiasPatterns]:
     """Certificates of an artefact of which all values are too long by one ratio."""
     design, places = at.design, at.places
     known = (
@@ -464,7 +464,7 @@ def _scales(at: _Place) -> Iterator[Block]:
         yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
 
 
-def _expansions(at: _Place) -> Iterator[Block]:
+def _expansions(at: _Place) -> Iterator[BiasPatterns]:
     """Artefacts that are larger in one position."""
     design = at.design
     values = length_values(design, at.state)
@@ -480,7 +480,7 @@ def _expansions(at: _Place) -> Iterator[Block]:
         )
 
 
-BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (
+BUILDERS: tuple[Callable[[_Place], Iterator[BiasPatterns]], ...] = (
     _single_readings,
     _single_lengths,
     _single_items,

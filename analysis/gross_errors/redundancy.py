@@ -8,6 +8,9 @@ import math
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import Functions, Parameters
@@ -16,11 +19,9 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.numerics.rounding import comparable
-from ballplate.simulator.numerics.threads import single_threaded
 
-from ..running.steps import Report, unreported
 from ..uncertainty.quantities import QUANTITIES
+from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, changes_of
 from .events import event_groups
 from .leftover import Columns, leftover, too_many_entries
@@ -28,7 +29,6 @@ from .patterns import patterns
 from .power import noncentrality
 from .reliability import Effects, Reliability
 from .response import responses
-from .search import FAMILY
 
 FALSE_ALARM, POWER = 0.001, 0.8
 
@@ -62,6 +62,7 @@ def reliability(
     )
 
 
+# In one piece: one pass over the responses fills all sums of the result.
 @single_threaded
 def reliability_of(
     design: Design,
@@ -141,12 +142,15 @@ def _nothing(count: int, groups: tuple[Functions, ...]) -> Effects:
     )
 
 
-def _put(effects: Effects, index: Integers, changes: Changes, found: Largest) -> None:
+def _put(effects: Effects, index: Integers, changes: Changes, largest: Largest) -> None:
     """Enter what patterns `index` change, where that is more than what has been entered of other
     artefacts.
     """
-    more = comparable(found.change) > comparable(effects.change[index])
-    use = (found.function >= 0) & (more | (effects.first[index] < 0))
-    index, function = index[use], found.function[use]
-    effects.change[index], effects.uncertainty[index] = found.change[use], found.uncertainty[use]
+    more = comparable(largest.change) > comparable(effects.change[index])
+    use = (largest.function >= 0) & (more | (effects.first[index] < 0))
+    index, function = index[use], largest.function[use]
+    effects.change[index], effects.uncertainty[index] = (
+        largest.change[use],
+        largest.uncertainty[use],
+    )
     effects.first[index], effects.second[index] = changes.first[function], changes.second[function]

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Functions, function_name
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable
 
-from ..results.formatting import SHOWN, aligned, finite, number
-from ..results.result import Result
+from ..presentation.formatting import SHOWN, aligned, finite, number
+from ..presentation.result import Result
 from ..uncertainty.quantities import QUANTITIES
 from .effects import LENGTHS, MOST_PLACES, SYMBOLS
 from .names import name
@@ -123,7 +123,7 @@ class Reliability(Result):
         return self._biases(self.fit_noncentrality)
 
     @property
-    def detectable(self) -> Array:
+    def minimal_detectable(self) -> Array:
         """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can
         be detected.
         """
@@ -180,7 +180,8 @@ def _heading(result: Reliability) -> list[str]:
             f" {number(total)} in all, {number(total / count, 3)} of an observation on average"
         ),
         (
-            f"detectable: found with a power of {_percent(result.power)} by a test with a false"
+            "MDB: minimal detectable bias, found with a power of"
+            f" {_percent(result.power)} by a test with a false"
             f" alarm of {_percent(result.false_alarm)}, sigma {sigma}:"
             f" {number(result.noncentrality)} standard deviations"
         ),
@@ -189,8 +190,9 @@ def _heading(result: Reliability) -> list[str]:
             f"{number(result.fit_noncentrality)} standard deviations"
         ),
         (
-            f"effects: the most that a bias just detectable changes in {', '.join(effects[:-1])}"
-            f" and {effects[-1]}, with the standard uncertainty there in brackets"
+            "effects: the most that a bias of the size of the MDB changes in"
+            f" {', '.join(effects[:-1])} and {effects[-1]}, with the standard uncertainty there in"
+            " brackets"
         ),
     ]
     if result.among_repeats:
@@ -212,7 +214,7 @@ def _positions(result: Reliability) -> list[str]:
         "readings",
         "redundancy: smallest",
         "average",
-        "detectable, um",
+        "MDB, um",
         "by fit, um",
         "largest at",
     ]
@@ -221,7 +223,7 @@ def _positions(result: Reliability) -> list[str]:
     of_u6 = _effect(result, "U6")
     for k in np.unique(position):
         own = readings[position == k]
-        by_bias = own[comparable(result.detectable[own]).argmax()]
+        by_bias = own[comparable(result.minimal_detectable[own]).argmax()]
         by_effect = own[comparable(_finite_or_zero(of_u6[own])).argmax()]
         known = bool(np.isfinite(of_u6[by_effect]))
         u = (
@@ -234,7 +236,7 @@ def _positions(result: Reliability) -> list[str]:
                 str(len(own) // design.dimension),
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
-                _shown(result.detectable[by_bias]),
+                _shown(result.minimal_detectable[by_bias]),
                 _shown(result.found_by_fit[by_bias]),
                 name(given, int(by_bias), with_position=False),
                 u if known else "-",
@@ -253,7 +255,7 @@ def _table(
         [
             title,
             *(["redundancy"] if with_redundancy else []),
-            "detectable",
+            "MDB",
             "by fit",
             "unit",
             *(f"{s}, um" for s in SYMBOLS),
@@ -265,12 +267,12 @@ def _table(
         cells = [name(result.patterns, k)]
         if with_redundancy:
             cells.append(number(result.left[k], 3))
-        cells += [_shown(result.detectable[k]), _shown(result.found_by_fit[k]), SHOWN[unit]]
+        cells += [_shown(result.minimal_detectable[k]), _shown(result.found_by_fit[k]), SHOWN[unit]]
         for symbol in SYMBOLS:
             effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
             told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
             cells.append("-" if math.isnan(effect) else told)
-        cells.append("" if math.isinf(result.detectable[k]) else _where(result, "U6", k))
+        cells.append("" if math.isinf(result.minimal_detectable[k]) else _where(result, "U6", k))
         rows.append(cells)
     right = [
         False,
@@ -292,13 +294,13 @@ def _effect_number(result: Reliability, symbol: str, k: int) -> str:
 
 
 def _effect(result: Reliability, symbol: str) -> np.ndarray:
-    """Effects (k,) of biases that are just detectable; NaN where nothing can be detected or nothing
+    """Effects (k,) of biases of the size of the MDB; NaN where nothing can be detected or nothing
     is determined.
     """
     effects = result.effects[symbol]
-    known = np.isfinite(result.detectable) & (effects.first >= 0)
+    known = np.isfinite(result.minimal_detectable) & (effects.first >= 0)
     with np.errstate(invalid="ignore"):
-        return np.where(known, result.detectable * effects.change, np.nan)
+        return np.where(known, result.minimal_detectable * effects.change, np.nan)
 
 
 def _finite_or_zero(values: np.ndarray) -> np.ndarray:
@@ -315,7 +317,7 @@ def _worst_first(result: Reliability, chosen: Integers) -> list[int]:
 
 
 def _is_dangerous(result: Reliability, k: int) -> bool:
-    return math.isinf(result.detectable[k]) and not result.is_harmless(k)
+    return math.isinf(result.minimal_detectable[k]) and not result.is_harmless(k)
 
 
 def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
@@ -430,18 +432,19 @@ def _data(result: Reliability) -> dict[str, Any]:
 
 
 def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
-    hidden = math.isinf(result.detectable[k])
+    hidden = math.isinf(result.minimal_detectable[k])
     return {
         "name": name(result.patterns, k),
         "kind": str(result.patterns.kind[k]),
         "unit": result.patterns.unit(k),
-        "minimal_detectable": finite(float(result.detectable[k])),
+        "minimal_detectable": finite(float(result.minimal_detectable[k])),
         "found_by_fit": finite(float(result.found_by_fit[k])),
         **({"harmless": result.is_harmless(k)} if result.information[k] <= 0.0 else {}),
         "effects": {
             symbol: {
                 "per_unit" if hidden else "change": float(
-                    result.effects[symbol].change[k] * (1.0 if hidden else result.detectable[k])
+                    result.effects[symbol].change[k]
+                    * (1.0 if hidden else result.minimal_detectable[k])
                 ),
                 "standard_uncertainty": finite(float(result.effects[symbol].uncertainty[k])),
                 "at": _where(result, symbol, k),
@@ -499,7 +502,7 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             repr(float(result.left[k])),
             SHOWN[unit],
         ]
-        cells += [_cell(result.detectable[k]), _cell(result.found_by_fit[k])]
+        cells += [_cell(result.minimal_detectable[k]), _cell(result.found_by_fit[k])]
         for symbol in SYMBOLS:
             cells += [
                 _cell(effects[symbol][k]),

@@ -76,8 +76,8 @@ def ratio(left: Leftover, rows: Integers) -> float:
     return float(np.sqrt(mine / freedom / others))
 
 
-def with_scatter(design: Design, one: Scatter, times: float) -> Design:
+def with_scatter(design: Design, scatter: Scatter, times: float) -> Design:
     """The design with some readings so many times as uncertain."""
     uncertainty = reading_uncertainties(design, design.readings).copy()
-    uncertainty[one.readings] *= times
+    uncertainty[scatter.readings] *= times
     return replace(design, readings=replace(design.readings, uncertainty=uncertainty))

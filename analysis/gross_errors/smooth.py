@@ -15,7 +15,7 @@ from ballplate.simulator.estimation.observations import (
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.polynomial import legendre
 

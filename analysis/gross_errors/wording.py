@@ -8,25 +8,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 
-from ..results.formatting import SHOWN, number
+from ..presentation.formatting import SHOWN, number
+from .cause_search import MOST
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
-from .search import MOST
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
 
 # A direction of a cause is told from so many standard uncertainties on.
 CLEAR = 3.0
 
 
-def diagnosis_lines(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
+def diagnosis_lines(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
     """A line for each thing suspected, mistakes first; `marks` tell where the readings stand."""
-    lines = [f"suspected: {words}" for words in _all_words(found, marks)]
-    if len(found.suspects) == MOST:
+    lines = [f"suspected: {words}" for words in _all_words(diagnosis, marks)]
+    if len(diagnosis.suspects) == MOST:
         what = (
             "look for what these have in common, or state larger uncertainties, or a richer error"
             " model"
@@ -35,51 +35,54 @@ def diagnosis_lines(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
     return lines
 
 
-def _all_words(found: Diagnosis, marks: Sequence[Mark]) -> list[str]:
-    words = [suspect_words(one, marks) for one in found.suspects]
-    words += [scatter_words(found.scatter)] if found.scatter else []
-    return words + ([unexplained_words(found.unexplained)] if found.unexplained else [])
+def _all_words(diagnosis: Diagnosis, marks: Sequence[Mark]) -> list[str]:
+    words = [suspect_words(one, marks) for one in diagnosis.suspects]
+    words += [scatter_words(diagnosis.scatter)] if diagnosis.scatter else []
+    return words + ([unexplained_words(diagnosis.unexplained)] if diagnosis.unexplained else [])
 
 
-def suspect_words(one: Suspect, marks: Sequence[Mark] = ()) -> str:
+def suspect_words(suspect: Suspect, marks: Sequence[Mark] = ()) -> str:
     """What is suspected, how significant it is, and what to do."""
-    what, cure = _what(one, marks)
-    others = [*(_cause_name(one.patterns, columns) for columns in one.alternatives), *one.of_model]
+    what, cure = _what(suspect, marks)
+    others = [
+        *(_cause_name(suspect.patterns, columns) for columns in suspect.alternatives),
+        *suspect.of_model,
+    ]
     told = f"; it cannot be told from {listing(others)}" if others else ""
-    return f"{what} {_significance(one)}{told}; {cure}"
+    return f"{what} {_significance(suspect)}{told}; {cure}"
 
 
-def scatter_words(one: MoreScatter) -> str:
+def scatter_words(scatter: MoreScatter) -> str:
     """Which readings scatter more than the others."""
     return (
-        f"readings {_scatter_place(one)} scatter {number(one.times, 2)} times as much as stated for"
-        f" the others {_significance(one)}; look for what was different there, or state their"
-        " uncertainty in a column u"
+        f"readings {_scatter_place(scatter)} scatter {number(scatter.times, 2)} times as much as"
+        f" stated for the others {_significance(scatter)}; look for what was different there, or"
+        " state their uncertainty in a column u"
     )
 
 
-def unexplained_words(one: Unexplained) -> str:
+def unexplained_words(unexplained: Unexplained) -> str:
     """That no single mistake explains the residuals, and what may."""
     best = (
-        f"what explains most is {one.words} {_significance(one)}"
-        if one.words
-        else f"{_significance(one)[1:-1]}"
+        f"what explains most is {unexplained.words} {_significance(unexplained)}"
+        if unexplained.words
+        else f"{_significance(unexplained)[1:-1]}"
     )
     return (
         "the error model, a drift or the noise, for no single mistake explains the residuals,"
-        f" which are {number(one.times, 3)} times as large as stated; {best}; try a richer error"
-        f" model{', or larger uncertainties' if one.too_large else ''}"
+        f" which are {number(unexplained.times, 3)} times as large as stated; {best}; try a"
+        f" richer error model{', or larger uncertainties' if unexplained.too_large else ''}"
     )
 
 
-def _scatter_place(one: MoreScatter) -> str:
-    if one.of.position >= 0:
-        return f"in position {one.design.position_names[one.of.position]}"
-    return f"with probe {one.design.probe_names[one.of.probe]}"
+def _scatter_place(scatter: MoreScatter) -> str:
+    if scatter.of.position >= 0:
+        return f"in position {scatter.design.position_names[scatter.of.position]}"
+    return f"with probe {scatter.design.probe_names[scatter.of.probe]}"
 
 
-def _significance(one: Suspect | MoreScatter | Unexplained) -> str:
-    return f"(statistic {number(one.statistic, 3)}, limit {number(one.limit, 3)})"
+def _significance(cause: Suspect | MoreScatter | Unexplained) -> str:
+    return f"(statistic {number(cause.statistic, 3)}, limit {number(cause.limit, 3)})"
 
 
 def _cause_name(given: Patterns, columns: Sequence[int]) -> str:
@@ -105,8 +108,9 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
     return f"{value:.{decimals}f}({uncertainty:.{decimals}f})"
 
 
-def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
-    given, k = one.patterns, one.pattern
+# In one piece: one sentence for each kind of cause, side by side.
+def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
+    given, k = suspect.patterns, suspect.pattern
     design, kind, subject, axis = (
         given.design,
         given.kind[k],
@@ -114,25 +118,25 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         int(given.axis[k]),
     )
     size = (
-        f"{with_uncertainty(1e6 * abs(one.value), 1e6 * one.standard_uncertainty)}"
-        f" {SHOWN[one.unit]}"
+        f"{with_uncertainty(1e6 * abs(suspect.value), 1e6 * suspect.standard_uncertainty)}"
+        f" {SHOWN[suspect.unit]}"
     )
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
-    high = "high" if one.value > 0 else "low"
-    long = "long" if one.value > 0 else "short"
-    lines = _lines(_touched(one), marks)
+    high = "high" if suspect.value > 0 else "low"
+    long = "long" if suspect.value > 0 else "short"
+    lines = _lines(_touched(suspect), marks)
     leave = f"check or leave out {lines}" if lines else "check or leave out the readings"
     if kind in ("reading", "end"):
-        return f"{reading_name(design, subject)} read {_sizes(one, 'too high')}", leave
+        return f"{reading_name(design, subject)} read {_sizes(suspect, 'too high')}", leave
     if kind == "length":
         return f"{name(given, k)} read {size} too {long}", leave
     if kind == "prior":
         return f"{name(given, k)} stated {size} too {high}", "check it in the experiment file"
     if kind == "coordinate":
         return f"{name(given, k)} certified {size} too {high}", "check the certificate"
-    if kind == "distance" and len(_significant(one)) > 1:
-        common = common_ball(design, given.subject[one.columns])
-        told = f"certified distances of ball {design.ball_label(common)}: {_from(common, one)}"
+    if kind == "distance" and len(_significant(suspect)) > 1:
+        common = common_ball(design, given.subject[suspect.columns])
+        told = f"certified distances of ball {design.ball_label(common)}: {_from(common, suspect)}"
         return told, "check the certificate"
     if kind in ("distance", "length value"):
         what = length_name(design, subject, False) if kind == "length value" else name(given, k)
@@ -143,19 +147,20 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         return told, "check the certificate, and the temperature of the artefact and of the scales"
     if kind == "probe":
         told = f"offset {letter} of probe {design.probe_names[subject]} stated {size} too {high}"
-        if len(one.columns) > 1:
-            told = f"offset of probe {design.probe_names[subject]} stated {_sizes(one, 'too high')}"
+        if len(suspect.columns) > 1:
+            sizes = _sizes(suspect, "too high")
+            told = f"offset of probe {design.probe_names[subject]} stated {sizes}"
         return told, "qualify the probe again, or let its offset be estimated"
     place = design.position_names[subject] if kind in ("shift", "turn", "expansion") else ""
     if kind in ("ball", "moved"):
         ball = design.ball_label(int(design.readings.ball[subject]))
         place = design.position_names[design.readings.position[subject]]
         if kind == "ball":
-            told = f"ball {ball} in position {place} read {_sizes(one, 'too high')} each time"
+            told = f"ball {ball} in position {place} read {_sizes(suspect, 'too high')} each time"
             return told, f"clean the ball, and {leave}"
         told = (
             f"ball {ball} displaced on its plate from position {place} on, by"
-            f" {_sizes(one, 'along')}"
+            f" {_sizes(suspect, 'along')}"
         )
         return (
             told,
@@ -165,49 +170,57 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     if kind in ("shift", "turn"):
         return (
             (
-                f"{artefact} slipped in position {place}, by {_sizes(one, 'along')},"
-                f" {_moment(one, marks)}"
+                f"{artefact} slipped in position {place}, by {_sizes(suspect, 'along')},"
+                f" {_moment(suspect, marks)}"
             ),
             "read the position again, or state two positions, one for each part",
         )
     parts = []
     for column, value, uncertainty in zip(
-        one.columns, one.values, one.standard_uncertainties, strict=True
+        suspect.columns, suspect.values, suspect.standard_uncertainties, strict=True
     ):
         larger = "larger" if value > 0 else "smaller"
-        told = f"{with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)} {SHOWN[one.unit]} {larger}"
+        size = with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)
+        told = f"{size} {SHOWN[suspect.unit]} {larger}"
         parts.append(f"{told} in position {design.position_names[given.subject[column]]}")
     return f"{artefact} {' and '.join(parts)}", "check the temperature there"
 
 
-def _from(ball: int, one: Suspect) -> str:
+def _from(ball: int, suspect: Suspect) -> str:
     """Sizes by which the distances of a ball are wrong, those that are significant."""
-    given, ends = one.patterns.design.distances, one.patterns.design.ball_names
+    given, ends = suspect.patterns.design.distances, suspect.patterns.design.ball_names
     parts = []
-    for place in _significant(one):
-        distance, value = int(one.patterns.subject[one.columns[place]]), float(one.values[place])
+    for place in _significant(suspect):
+        distance, value = (
+            int(suspect.patterns.subject[suspect.columns[place]]),
+            float(suspect.values[place]),
+        )
         first, second = int(given.first[distance]), int(given.second[distance])
-        size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
+        size = with_uncertainty(
+            1e6 * abs(value), 1e6 * float(suspect.standard_uncertainties[place])
+        )
         other = ends[second if first == ball else first]
         parts.append(f"to {other} {size} um too {'long' if value > 0 else 'short'}")
     return f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
-def _significant(one: Suspect) -> Integers:
+def _significant(suspect: Suspect) -> Integers:
     """Places of the directions that are significant, at least of the most significant one."""
-    ratio = np.abs(one.values) / one.standard_uncertainties
+    ratio = np.abs(suspect.values) / suspect.standard_uncertainties
     return np.flatnonzero((ratio >= CLEAR) | (ratio == ratio.max()))
 
 
-def _sizes(one: Suspect, how: str) -> str:
+def _sizes(suspect: Suspect, how: str) -> str:
     """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "…
     along x".
     """
-    given = one.patterns
+    given = suspect.patterns
     parts = []
-    for place in _significant(one):
-        column, value = one.columns[place], float(one.values[place])
-        size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
+    for place in _significant(suspect):
+        column, value = suspect.columns[place], float(suspect.values[place])
+        size = with_uncertainty(
+            1e6 * abs(value), 1e6 * float(suspect.standard_uncertainties[place])
+        )
         letter, unit = AXIS_NAMES[given.axis[column]], SHOWN[given.unit(int(column))]
         if how == "too high":
             parts.append(f"{size} {unit} too {'high' if value > 0 else 'low'} in {letter}")
@@ -217,21 +230,25 @@ def _sizes(one: Suspect, how: str) -> str:
     return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
 
 
-def _moment(one: Suspect, marks: Sequence[Mark]) -> str:
+def _moment(suspect: Suspect, marks: Sequence[Mark]) -> str:
     """When a plate slipped, by the lines of the readings next to it."""
-    design, start = one.patterns.design, int(one.patterns.start[one.pattern])
-    rows = np.flatnonzero(design.readings.position == int(one.patterns.subject[one.pattern]))
-    before = int(rows[np.searchsorted(rows, one.first) - 1])
+    design, start = suspect.patterns.design, int(suspect.patterns.start[suspect.pattern])
+    rows = np.flatnonzero(
+        design.readings.position == int(suspect.patterns.subject[suspect.pattern])
+    )
+    before = int(rows[np.searchsorted(rows, suspect.first) - 1])
     if marks:
-        lines, file = (marks[before].line, marks[one.last].line), Path(marks[start].file).name
-        probably = f", probably before line {marks[start].line}" if one.last > one.first else ""
+        lines, file = (marks[before].line, marks[suspect.last].line), Path(marks[start].file).name
+        probably = (
+            f", probably before line {marks[start].line}" if suspect.last > suspect.first else ""
+        )
         return f"between lines {lines[0]} and {lines[1]} of {file}{probably}"
-    return f"between {reading_name(design, before)} and {reading_name(design, one.last)}"
+    return f"between {reading_name(design, before)} and {reading_name(design, suspect.last)}"
 
 
-def _touched(one: Suspect) -> list[int]:
+def _touched(suspect: Suspect) -> list[int]:
     """Readings that a suspect is about."""
-    given, k = one.patterns, one.pattern
+    given, k = suspect.patterns, suspect.pattern
     design, kind, subject = given.design, given.kind[k], int(given.subject[k])
     readings = design.readings
     if kind in ("reading", "end"):
@@ -248,8 +265,8 @@ def _touched(one: Suspect) -> list[int]:
     return []
 
 
-def _indices(found: Integers) -> list[int]:
-    return [int(i) for i in found]
+def _indices(indices: Integers) -> list[int]:
+    return [int(i) for i in indices]
 
 
 def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
@@ -265,31 +282,35 @@ def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
     return f"lines {', '.join(numbers[:-1])} and {numbers[-1]} of {file}"
 
 
-def diagnosis_data(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
+def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
     """What is suspected as plain data in metres, radians and ratios."""
-    told = [_suspect_data(one, marks) for one in found.suspects]
-    if found.scatter:
-        what = f"scatter of the readings {_scatter_place(found.scatter)}"
-        told.append(_other_data(what, "scatter", found.scatter, scatter_words(found.scatter)))
-    if found.unexplained:
-        what = found.unexplained.words or "error model, drift or noise"
+    told = [_suspect_data(one, marks) for one in diagnosis.suspects]
+    if diagnosis.scatter:
+        what = f"scatter of the readings {_scatter_place(diagnosis.scatter)}"
         told.append(
-            _other_data(what, "model", found.unexplained, unexplained_words(found.unexplained))
+            _other_data(what, "scatter", diagnosis.scatter, scatter_words(diagnosis.scatter))
+        )
+    if diagnosis.unexplained:
+        what = diagnosis.unexplained.words or "error model, drift or noise"
+        told.append(
+            _other_data(
+                what, "model", diagnosis.unexplained, unexplained_words(diagnosis.unexplained)
+            )
         )
     return told
 
 
-def _suspect_data(one: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
-    given = one.patterns
+def _suspect_data(suspect: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
+    given = suspect.patterns
     return {
-        "name": name(given, one.pattern),
-        "kind": str(given.kind[one.pattern]),
-        "value": one.value,
-        "standard_uncertainty": one.standard_uncertainty,
-        "unit": one.unit,
-        "statistic": one.statistic,
-        "limit": one.limit,
-        "lines": [marks[i].line for i in _touched(one)] if marks else [],
+        "name": name(given, suspect.pattern),
+        "kind": str(given.kind[suspect.pattern]),
+        "value": suspect.value,
+        "standard_uncertainty": suspect.standard_uncertainty,
+        "unit": suspect.unit,
+        "statistic": suspect.statistic,
+        "limit": suspect.limit,
+        "lines": [marks[i].line for i in _touched(suspect)] if marks else [],
         "directions": [
             {
                 "name": name(given, k),
@@ -298,29 +319,31 @@ def _suspect_data(one: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
                 "unit": given.unit(k),
             }
             for k, value, u in zip(
-                one.columns.tolist(),
-                one.values.tolist(),
-                one.standard_uncertainties.tolist(),
+                suspect.columns.tolist(),
+                suspect.values.tolist(),
+                suspect.standard_uncertainties.tolist(),
                 strict=True,
             )
         ],
         "alternatives": [
-            *(_cause_name(given, columns) for columns in one.alternatives),
-            *one.of_model,
+            *(_cause_name(given, columns) for columns in suspect.alternatives),
+            *suspect.of_model,
         ],
-        "words": suspect_words(one, marks),
+        "words": suspect_words(suspect, marks),
     }
 
 
-def _other_data(what: str, kind: str, one: MoreScatter | Unexplained, words: str) -> dict[str, Any]:
+def _other_data(
+    what: str, kind: str, cause: MoreScatter | Unexplained, words: str
+) -> dict[str, Any]:
     return {
         "name": what,
         "kind": kind,
-        "value": one.times,
+        "value": cause.times,
         "standard_uncertainty": None,
         "unit": "1",
-        "statistic": one.statistic,
-        "limit": one.limit,
+        "statistic": cause.statistic,
+        "limit": cause.limit,
         "lines": [],
         "directions": [],
         "alternatives": [],

@@ -7,22 +7,24 @@ from typing import Any
 
 from ballplate.simulator.inputs.settings import listing
 
-from ..results.formatting import aligned, number, shown_unit
+from ..presentation.formatting import aligned, number, shown_unit
 from ..uncertainty.quantities import QUANTITIES
 from .experiments import Trials
-from .figures import BEYOND, Comparison, Figure, Outcome
+from .figures import BEYOND, MonteCarloComparison, MonteCarloEstimate, MonteCarloOutcome
 
 # S^2 of readings without noise, for each degree of freedom, below which nothing is left but
 # rounding.
 NO_MISFIT = 1e-9
 
 
-def with_error(figure: Figure, factor: float = 1.0) -> str:
+def with_error(figure: MonteCarloEstimate, factor: float = 1.0) -> str:
     """A value with its standard error in units of the last digit, as the GUM writes it (7.2.2).
 
-    >>> with_error(Figure(0.99213, 0.0066)), with_error(Figure(0.9534, 0.0164), 100)
-    ('0.992(7)', '95(2)')
-    >>> with_error(Figure(581.3, 7.3))
+    >>> with_error(MonteCarloEstimate(0.99213, 0.0066))
+    '0.992(7)'
+    >>> with_error(MonteCarloEstimate(0.9534, 0.0164), 100)
+    '95(2)'
+    >>> with_error(MonteCarloEstimate(581.3, 7.3))
     '581(7)'
     """
     value, error = factor * figure.value, factor * figure.error
@@ -101,7 +103,7 @@ def trials_lines(done: Trials) -> list[str]:
     return lines + _misfit_lines(done, outcome)
 
 
-def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
+def _misfit_lines(done: Trials, outcome: MonteCarloOutcome) -> list[str]:
     misfit = outcome.misfit
     lines = [
         f"S^2 is {with_error(misfit.mean)} with {misfit.degrees_of_freedom} degrees of freedom, and"
@@ -177,23 +179,23 @@ def trials_data(done: Trials) -> dict[str, Any]:
     return found
 
 
-def _comparison_data(one: Comparison) -> dict[str, Any]:
+def _comparison_data(comparison: MonteCarloComparison) -> dict[str, Any]:
     return {
-        "unit": one.unit,
-        "count": one.count,
-        "sampled": one.sampled,
-        "linear": {"maximum": one.linear_maximum, "average": one.linear_average},
-        "actual": {"maximum": one.actual_maximum, "average": one.actual_average},
-        "spread_ratio": _figure(one.spread),
-        "actual_ratio": _figure(one.actual),
-        "bias_ratio": _figure(one.bias),
-        "largest_bias": one.largest_bias,
-        "coverage_sigma_given": _figure(one.known),
-        "coverage_sigma_estimated": _figure(one.estimated),
-        "flags": list(one.flags),
+        "unit": comparison.unit,
+        "count": comparison.count,
+        "sampled": comparison.sampled,
+        "linear": {"maximum": comparison.linear_maximum, "average": comparison.linear_average},
+        "actual": {"maximum": comparison.actual_maximum, "average": comparison.actual_average},
+        "spread_ratio": _figure(comparison.spread),
+        "actual_ratio": _figure(comparison.actual),
+        "bias_ratio": _figure(comparison.bias),
+        "largest_bias": comparison.largest_bias,
+        "coverage_sigma_given": _figure(comparison.known),
+        "coverage_sigma_estimated": _figure(comparison.estimated),
+        "flags": list(comparison.flags),
     }
 
 
-def _figure(figure: Figure) -> dict[str, float | None]:
+def _figure(figure: MonteCarloEstimate) -> dict[str, float | None]:
     values = {"value": figure.value, "standard_error": figure.error}
     return {name: value if math.isfinite(value) else None for name, value in values.items()}

@@ -10,6 +10,13 @@ from functools import reduce
 from operator import add
 
 import numpy as np
+from ballplate.montecarlo.reference import (
+    DivergedError,
+    RankDeficientError,
+    Reference,
+    Truth,
+    reference,
+)
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.design.observations import Priors
@@ -18,19 +25,12 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.montecarlo.reference import (
-    NoReferenceError,
-    Reference,
-    TooWildError,
-    Truth,
-    reference,
-)
 from ballplate.simulator.readings.generate import NoReadingError, on_true_machine
 
-from .figures import Outcome, outcome, power_of_difference, power_of_misfit
-from .tally import Tally
+from .accumulator import Accumulator
+from .figures import MonteCarloOutcome, outcome, power_of_difference, power_of_misfit
 from .targets import targets
-from .trials import TASK, Progress, run_trials, sum_of_task
+from .trials import TASK, MonteCarloProgress, run_trials, sum_of_task
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Trials:
     """
 
     seed: int
-    outcome: Outcome | None
+    outcome: MonteCarloOutcome | None
     reason: str = ""
     optimism: Optimism | None = None
 
@@ -85,7 +85,7 @@ def trials(
     seed: int | None = None,
     until: float | None = None,
     workers: int = 1,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Callable[[MonteCarloProgress], None] = lambda progress: None,
 ) -> Trials:
     """Estimate replicates of an experiment's true machine; see `run_trials`.
 
@@ -102,7 +102,7 @@ def trials(
 
 def block_of_trials(
     experiment: Experiment, count: int, seed: int, block: int, size: int
-) -> Tally | None:
+) -> Accumulator | None:
     """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most; None
     where there are none.
 
@@ -120,7 +120,7 @@ def block_of_trials(
     return reduce(add, parts)
 
 
-def combined(experiment: Experiment, total: Tally) -> Outcome:
+def combined(experiment: Experiment, total: Accumulator) -> MonteCarloOutcome:
     """What sums over replicates of an experiment come to.
 
     :raises ExperimentError: as `trials`.
@@ -135,9 +135,9 @@ def _shared(experiment: Experiment) -> Reference | str:
     design, truth = true_experiment(experiment)
     try:
         return reference(design, truth)
-    except NoReferenceError as error:
+    except RankDeficientError as error:
         return str(error)
-    except (NoReadingError, TooWildError) as error:
+    except (NoReadingError, DivergedError) as error:
         text = f"{error}; state smaller errors"
         raise ExperimentError([experiment.message(("true_machine",), text)]) from None
 

@@ -7,31 +7,31 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.montecarlo.reference import Reference
+from ballplate.montecarlo.reference import Reference
 
-from .tally import (
+from .accumulator import (
     ACTUAL,
     COVERAGE,
     ESTIMATED,
     KNOWN,
     SPREAD,
     SYSTEMATIC,
-    QuantityTally,
-    Tally,
+    Accumulator,
+    QuantityAccumulator,
     factors,
 )
-from .targets import Target
+from .targets import MonteCarloQuantity
 
 # Standard errors beyond which a difference is no accident; false in one of some hundred runs with
 # thirty figures each.
 BEYOND = 4.0
 
 # Data sets below which standard errors are themselves too uncertain for flags.
-ENOUGH = 100
+REPLICATES_LIMIT = 100
 
 
 @dataclass(frozen=True)
-class Figure:
+class MonteCarloEstimate:
     """A value and its Monte Carlo standard error."""
 
     value: float
@@ -42,7 +42,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MonteCarloComparison:
     """A quantity's replicates beside its linearised uncertainties.
 
     `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of
@@ -64,12 +64,12 @@ class Comparison:
     linear_average: float
     actual_maximum: float
     actual_average: float
-    spread: Figure
-    actual: Figure
-    bias: Figure
+    spread: MonteCarloEstimate
+    actual: MonteCarloEstimate
+    bias: MonteCarloEstimate
     largest_bias: float
-    known: Figure
-    estimated: Figure
+    known: MonteCarloEstimate
+    estimated: MonteCarloEstimate
     flags: tuple[str, ...]
 
 
@@ -81,14 +81,14 @@ class Misfit:
     `noise_free` is S^2 of readings without noise, zero if the fitted model holds the true machine.
     """
 
-    mean: Figure
+    mean: MonteCarloEstimate
     degrees_of_freedom: int
     noise_free: float
-    rejected: Figure
+    rejected: MonteCarloEstimate
 
 
 @dataclass(frozen=True)
-class Outcome:
+class MonteCarloOutcome:
     """All comparisons, how many replicates they rest on and which failed; no comparison where all
     did.
     """
@@ -96,14 +96,16 @@ class Outcome:
     trials: int
     failed: tuple[int, ...]
     passes: int
-    comparisons: dict[str, Comparison]
+    comparisons: dict[str, MonteCarloComparison]
     misfit: Misfit
     interrupted: bool = False
 
 
-def outcome(shared: Reference, aims: tuple[Target, ...], total: Tally) -> Outcome:
+def outcome(
+    shared: Reference, aims: tuple[MonteCarloQuantity, ...], total: Accumulator
+) -> MonteCarloOutcome:
     """Figures from sums."""
-    comparisons: dict[str, Comparison] = {}
+    comparisons: dict[str, MonteCarloComparison] = {}
     for aim, sums in zip(aims, total.quantities, strict=True):
         if not total.count:
             break
@@ -115,16 +117,16 @@ def outcome(shared: Reference, aims: tuple[Target, ...], total: Tally) -> Outcom
     freedom, n = shared.degrees_of_freedom, max(total.count, 1)
     mean = float(total.residual[0] / n)
     share = total.rejected / n
-    return Outcome(
+    return MonteCarloOutcome(
         total.count + len(total.failed),
         total.failed,
         total.passes,
         comparisons,
         Misfit(
-            Figure(mean, _error_of_mean(total.residual[0], total.residual[1], n)),
+            MonteCarloEstimate(mean, _error_of_mean(total.residual[0], total.residual[1], n)),
             freedom,
             shared.sum_of_squares,
-            Figure(share, float(np.sqrt(share * (1.0 - share) / n))),
+            MonteCarloEstimate(share, float(np.sqrt(share * (1.0 - share) / n))),
         ),
     )
 
@@ -136,7 +138,7 @@ def _error_of_mean(total: float, squares: float, n: int) -> float:
     return float(np.sqrt(variance / n))
 
 
-def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
+def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> MonteCarloComparison:
     count = max(n, 1)
     means = sums.numbers / count
     errors = [
@@ -144,14 +146,14 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
         for one, two in zip(sums.numbers, sums.numbers_squared, strict=True)
     ]
 
-    def root(which: int) -> Figure:
+    def root(which: int) -> MonteCarloEstimate:
         value = float(np.sqrt(means[which]))
-        return Figure(value, errors[which] / (2.0 * value) if value else 0.0)
+        return MonteCarloEstimate(value, errors[which] / (2.0 * value) if value else 0.0)
 
     spread, actual = root(SPREAD), root(ACTUAL)
     known, estimated = (
-        Figure(float(means[KNOWN]), errors[KNOWN]),
-        Figure(float(means[ESTIMATED]), errors[ESTIMATED]),
+        MonteCarloEstimate(float(means[KNOWN]), errors[KNOWN]),
+        MonteCarloEstimate(float(means[ESTIMATED]), errors[ESTIMATED]),
     )
     mean_error = sums.errors / count
     # Scatter alone makes means differ from zero; what it makes of their square is taken away.
@@ -164,7 +166,9 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
         else float("inf")
     )
     value = float(np.sqrt(max(square, 0.0)))
-    bias = Figure(value, error / (2.0 * value) if square > error else float(np.sqrt(error)))
+    bias = MonteCarloEstimate(
+        value, error / (2.0 * value) if square > error else float(np.sqrt(error))
+    )
     flags = []
     if spread.differs_from(1.0):
         flags.append("spread")
@@ -176,9 +180,9 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
         flags.append("coverage with sigma estimated")
     rms = np.sqrt(sums.squares / count)
     present = [unit for unit in ("m", "rad", "1") if unit in aim.units]
-    if n < ENOUGH:
+    if n < REPLICATES_LIMIT:
         flags = []
-    return Comparison(
+    return MonteCarloComparison(
         aim.symbol,
         ", ".join(present),
         len(aim.base),

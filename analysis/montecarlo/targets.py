@@ -8,24 +8,24 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.montecarlo.reference import Reference
+from ballplate.montecarlo.replicates import Deviations
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
 from ballplate.simulator.estimation.functions import (
     Balls,
     Coordinates,
     Displacements,
     Distances,
+    MeasuredPoints,
     Parameters,
     Places,
-    Points,
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.montecarlo.reference import Reference
-from ballplate.simulator.montecarlo.replicates import Deviations
-from ballplate.simulator.numerics.threads import single_threaded
 
 from ..uncertainty.pairs import pairs_of
 from ..uncertainty.quantities import QUANTITIES
@@ -35,7 +35,7 @@ MOST_PAIRS = 1000
 
 
 @dataclass(frozen=True)
-class Target:
+class MonteCarloQuantity:
     """A vector of q quantities.
 
     `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the
@@ -52,13 +52,13 @@ class Target:
 
 
 @single_threaded
-def targets(shared: Reference) -> tuple[Target, ...]:
+def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
     """The quantities that a design has; those of the model only where the true machine is one of
     the fitted model's.
     """
     at = shared.linearisation
     displaced = _displaced(shared, at)
-    found: list[Target] = []
+    found: list[MonteCarloQuantity] = []
     for symbol, kind in QUANTITIES.items():
         for functions in kind.functions(at.design, at.layout) if kind.in_replicates else ():
             if isinstance(functions, Parameters):
@@ -107,7 +107,7 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
     return displaced
 
 
-def _change(shared: Reference, places: Points) -> Callable[[Deviations], Array]:
+def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations], Array]:
     """The change (b, d, n) of corrected points in replicates."""
     model = shared.local_model(places.points, places.probes)
     n, d = places.points.shape
@@ -121,7 +121,7 @@ def _change(shared: Reference, places: Points) -> Callable[[Deviations], Array]:
     return change
 
 
-def _uncertain(target: Target) -> Target | None:
+def _uncertain(target: MonteCarloQuantity) -> MonteCarloQuantity | None:
     """A target without the members that no observation could change; None where nothing is left."""
     kept = target.uncertainty > 0.0
     if not kept.any():
@@ -133,12 +133,14 @@ def _uncertain(target: Target) -> Target | None:
     def change(replicates: Deviations) -> Array:
         return target.change(replicates)[:, kept]
 
-    return Target(
+    return MonteCarloQuantity(
         target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled
     )
 
 
-def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Parameters) -> Target:
+def _parameters(
+    symbol: str, shared: Reference, at: Linearisation, functions: Parameters
+) -> MonteCarloQuantity:
     design, layout, start, real = at.design, at.layout, shared.start, shared.truth.state
     used = functions.rows.any(axis=0)
     rows = functions.rows[:, used]
@@ -155,33 +157,37 @@ def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Pa
     def change(replicates: Deviations) -> Array:
         return np.asarray(_shared(layout, replicates)[:, used] @ rows.T)
 
-    return Target(symbol, change(error)[0], at.of_shared(functions.rows), functions.units, change)
+    return MonteCarloQuantity(
+        symbol, change(error)[0], at.of_shared(functions.rows), functions.units, change
+    )
 
 
-def _shared(layout: SharedLayout, found: Deviations) -> Array:
+def _shared(layout: SharedLayout, deviations: Deviations) -> Array:
     """Changes (b, s) of the shared parameters; those of rotations are not the sums of their
     steps.
     """
-    changed = found.shared.copy()
+    changed = deviations.shared.copy()
     position, place = np.nonzero(layout.pose_columns >= 0)
-    poses = np.concatenate([found.origins, found.rotations], axis=2)
+    poses = np.concatenate([deviations.origins, deviations.rotations], axis=2)
     changed[:, layout.pose_columns[position, place]] = poses[:, position, place]
-    changed[:, layout.model] = found.a
+    changed[:, layout.model] = deviations.a
     probe, axis = np.nonzero(layout.offset_columns >= 0)
-    changed[:, layout.offset_columns[probe, axis]] = found.offsets[:, probe, axis]
+    changed[:, layout.offset_columns[probe, axis]] = deviations.offsets[:, probe, axis]
     return changed
 
 
-def _coordinates(symbol: str, of: Displaced) -> Target:
+def _coordinates(symbol: str, of: Displaced) -> MonteCarloQuantity:
     base, moved = (of.moved.places - of.truly).ravel(), of.change
 
     def change(replicates: Deviations) -> Array:
         return moved(replicates).swapaxes(1, 2).reshape(-1, len(base))
 
-    return Target(symbol, base, of.moved.uncertainties.ravel(), ("m",) * len(base), change)
+    return MonteCarloQuantity(
+        symbol, base, of.moved.uncertainties.ravel(), ("m",) * len(base), change
+    )
 
 
-def _distances(symbol: str, functions: Distances, of: Displaced) -> Target:
+def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQuantity:
     """Distances between all places, or a sample of them, or between some."""
     places, moved = of.moved.places, of.change
     if functions.pairs is None:
@@ -207,7 +213,9 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> Target:
             gained += part
         return np.asarray(gained / (np.sqrt(length**2 + gained) + length))
 
-    return Target(symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled)
+    return MonteCarloQuantity(
+        symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled
+    )
 
 
 def sample_of_pairs(n: int, most: int) -> tuple[Integers, Integers, bool]:

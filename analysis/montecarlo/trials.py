@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.montecarlo.reference import Reference
-from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
-from ballplate.simulator.numerics.threads import single_threaded
+from ballplate.montecarlo.reference import Reference
+from ballplate.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.threads import single_threaded
 
-from ..running.processes import in_processes
-from .figures import Outcome, outcome
-from .tally import Tally, tally
-from .targets import Target, targets
+from .accumulator import Accumulator, accumulate
+from .figures import MonteCarloOutcome, outcome
+from .targets import MonteCarloQuantity, targets
 
 # Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
 BATCHES = 4
@@ -26,7 +26,7 @@ MOST_TRIALS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Progress:
+class MonteCarloProgress:
     """How far a run has come: replicates done of those wanted, and how accurate it is, relative to
     what is measured.
     """
@@ -42,8 +42,8 @@ def run_trials(
     trials: int,
     until: float | None = None,
     workers: int = 1,
-    report: Callable[[Progress], None] = lambda progress: None,
-) -> Outcome:
+    report: Callable[[MonteCarloProgress], None] = lambda progress: None,
+) -> MonteCarloOutcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
     With `until` the run ends as soon as the relative standard error of every ratio of spread to
@@ -54,7 +54,7 @@ def run_trials(
     :raises KeyboardInterrupt: before the first task was done.
     """
     aims = targets(shared)
-    total: Tally | None = None
+    total: Accumulator | None = None
     interrupted = False
     try:
         for part in _parts(shared, aims, seed, trials, workers):
@@ -66,7 +66,7 @@ def run_trials(
                 if until is None
                 else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
             )
-            report(Progress(count, enough, accuracy))
+            report(MonteCarloProgress(count, enough, accuracy))
             if until is not None and accuracy <= until:
                 break
     except KeyboardInterrupt:
@@ -77,7 +77,7 @@ def run_trials(
     return replace(outcome(shared, aims, total), interrupted=interrupted)
 
 
-def accuracy_of(total: Tally) -> float:
+def accuracy_of(total: Accumulator) -> float:
     """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite
     for 1 replicate.
     """
@@ -94,23 +94,23 @@ def accuracy_of(total: Tally) -> float:
 
 @single_threaded
 def sum_of_task(
-    shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int
-) -> Tally:
+    shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, task: int, trials: int
+) -> Accumulator:
     """Sums over the replicates of one task."""
-    total: Tally | None = None
+    total: Accumulator | None = None
     for batch in range(task * BATCHES, (task + 1) * BATCHES):
         count = min(BATCH, trials - batch * BATCH)
         if count <= 0:
             break
-        part = tally(shared, aims, estimate_batch(shared, seed, batch), count)
+        part = accumulate(shared, aims, estimate_batch(shared, seed, batch), count)
         total = part if total is None else total + part
     assert total is not None
     return total
 
 
 def _parts(
-    shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, workers: int
-) -> Iterator[Tally]:
+    shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, trials: int, workers: int
+) -> Iterator[Accumulator]:
     tasks = range(-(-trials // TASK))
     if workers == 1 or len(tasks) == 1:
         for task in tasks:

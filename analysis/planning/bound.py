@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.internal_error import InternalError
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import comparable
-from ballplate.simulator.numerics.threads import single_threaded
 
-from ..running.internal_error import InternalError
-from .search import Losses, Problem, counted_root, fill, full_root, square_root
+from .search import Losses, SelectionProblem, counted_root, fill, full_root, square_root
 
 # Relative distance of bound and relaxation at which the weights are good enough, and steps at most.
 CLOSE = 1e-3
@@ -94,7 +94,7 @@ class _Tangent:
 
 @single_threaded
 def bound(
-    problem: Problem, start: Collection[int] | None = None, steps: int = MOST_STEPS
+    problem: SelectionProblem, start: Collection[int] | None = None, steps: int = MOST_STEPS
 ) -> Bound | None:
     """Bound of all selections within the limits.
 
@@ -149,7 +149,7 @@ class _Mixture:
         return _Mixture(np.concatenate([self.vertices, vertex[None]]), shares)
 
 
-def _first(problem: Problem, start: Collection[int] | None) -> _Mixture | None:
+def _first(problem: SelectionProblem, start: Collection[int] | None) -> _Mixture | None:
     """A mixture of vertices that leaves nothing undetermined; None where none is found."""
     n = problem.constraints.count
     limits = problem.limits.linear()
@@ -170,7 +170,7 @@ def _first(problem: Problem, start: Collection[int] | None) -> _Mixture | None:
     return None
 
 
-def _tangent(problem: Problem, weights: Array, power: float) -> _Tangent | None:
+def _tangent(problem: SelectionProblem, weights: Array, power: float) -> _Tangent | None:
     """Tangent at some weights (n,); None where they leave something undetermined."""
     information = problem.information
     root = full_root(information.weighted(weights))
@@ -187,7 +187,7 @@ def _tangent(problem: Problem, weights: Array, power: float) -> _Tangent | None:
     return _Tangent(float((information.base * squared).sum()), slope, smooth, value)
 
 
-def _improved(problem: Problem, mixture: _Mixture, power: float) -> _Mixture:
+def _improved(problem: SelectionProblem, mixture: _Mixture, power: float) -> _Mixture:
     """The mixture of the same vertices that makes the criterion smallest, without those that have
     no share in it.
     """

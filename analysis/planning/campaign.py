@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.numerics.rounding import comparable
-from ballplate.simulator.numerics.threads import single_threaded
 
 from ..results.study import predict
-from ..running.processes import in_processes
-from ..running.steps import Report, counted, unreported
 from .bound import Bound, bound
 from .choice import CurvePoint, Gain
 from .constraints import Budget, Constraints, constraints
@@ -26,7 +26,7 @@ from .criteria import CriterionName, criterion, is_about_balls, refuse_many_poin
 from .information import pool_information
 from .offer import Offer, offer, open_directions
 from .schedule import Completion, run_sheet
-from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
+from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
 
 # Random starts of the search, in a large pool and in a small one.
@@ -122,6 +122,7 @@ def campaign(
     )
 
 
+# In one piece: the steps of a campaign in their order, and one result of all of them.
 def _campaign(
     experiment: Experiment,
     pool: Pool,
@@ -154,7 +155,7 @@ def _campaign(
     budget = request.budget or _as_drawn(experiment, free, drawn, reference)
     limits = replace(free, budget=budget)
     _refuse_impossible(experiment, limits, candidates)
-    problem = Problem(information, wanted, limits)
+    problem = SelectionProblem(information, wanted, limits)
 
     best, relaxed = _search(problem, drawn, request.seed, workers, report)
     if relaxed is not None:
@@ -247,7 +248,10 @@ def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget
 
 
 def _refuse_lacking(
-    experiment: Experiment, problem: Problem, best: Found, begun: Mapping[str, tuple[int, ...]]
+    experiment: Experiment,
+    problem: SelectionProblem,
+    best: Found,
+    begun: Mapping[str, tuple[int, ...]],
 ) -> None:
     """Refuse a choice without what every choice needs."""
     for plate, others in begun.items():
@@ -315,7 +319,7 @@ def _refuse_impossible(
 
 
 def _search(
-    problem: Problem, drawn: Sequence[int], seed: int, workers: int, report: Report
+    problem: SelectionProblem, drawn: Sequence[int], seed: int, workers: int, report: Report
 ) -> tuple[Found, Bound | None]:
     """The best selection found, and the bound of all."""
     limits = problem.constraints
@@ -364,7 +368,7 @@ def _search(
 
 
 @single_threaded
-def _best_of_all(problem: Problem, report: Report) -> Found:
+def _best_of_all(problem: SelectionProblem, report: Report) -> Found:
     """The best of all selections of a pool that has few."""
     limits, losses = problem.constraints, Losses(problem)
     members = [k for k in range(limits.count) if k not in limits.done]
@@ -381,7 +385,7 @@ def _best_of_all(problem: Problem, report: Report) -> Found:
     return Found(tuple(sorted(best)), value(problem, best))
 
 
-def _is_just_enough(problem: Problem, best: Found) -> bool:
+def _is_just_enough(problem: SelectionProblem, best: Found) -> bool:
     """Whether a selection leaves something undetermined without one or another of its
     candidates.
     """
@@ -393,7 +397,10 @@ def _is_just_enough(problem: Problem, best: Found) -> bool:
 
 @single_threaded
 def _task(
-    problem: Problem, from_: Sequence[Collection[int]] | None, at_once: int, by_pivots: bool = False
+    problem: SelectionProblem,
+    from_: Sequence[Collection[int]] | None,
+    at_once: int,
+    by_pivots: bool = False,
 ) -> list[Found] | Bound | None:
     if from_ is None:
         return bound(problem)
@@ -403,7 +410,7 @@ def _task(
 
 
 def _gains(
-    problem: Problem, best: Found, candidates: Sequence[Candidate], report: Report
+    problem: SelectionProblem, best: Found, candidates: Sequence[Candidate], report: Report
 ) -> tuple[Gain, ...]:
     """What each chosen candidate gains, those first that gain most, whether it has to be chosen or
     not.
@@ -417,14 +424,16 @@ def _gains(
     return tuple(sorted(gains, key=lambda gain: -float(comparable(gain.without))))
 
 
-def _left_out(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
+def _left_out(
+    problem: SelectionProblem, best: Found, candidates: Sequence[Candidate]
+) -> tuple[Gain, ...]:
     """What candidates would gain on top of the selection, those first that would gain most."""
     ranked = ranked_additions(problem, best.chosen)
     return tuple(Gain(candidates[k], best.value, after) for k, after in ranked[:LEFT_OUT])
 
 
 def _curve(
-    problem: Problem,
+    problem: SelectionProblem,
     best: Found,
     candidates: Sequence[Candidate],
     workers: int,
@@ -457,7 +466,7 @@ def _curve(
 
 
 @single_threaded
-def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
+def _curve_point(problem: SelectionProblem, best: Found) -> tuple[Found, float] | None:
     if not problem.constraints.allows(problem.constraints.must):
         return None
     without = comparable([value(problem, set(best.chosen) - {k}) for k in best.chosen])
@@ -471,7 +480,7 @@ def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
     return found, np.nan if relaxed is None else relaxed.value
 
 
-def _budgets(problem: Problem) -> list[Budget]:
+def _budgets(problem: SelectionProblem) -> list[Budget]:
     """Budgets from small to somewhat more than the one asked for."""
     budget = problem.constraints.budget
     factors = np.linspace(0.25, 1.5, CURVE_POINTS)

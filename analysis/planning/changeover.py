@@ -25,7 +25,7 @@ MOST_SETS = 500
 
 
 @dataclass(frozen=True)
-class Kind:
+class Setup:
     """What the change-over depends on: positions of equal kind follow one another without any."""
 
     artefact: str
@@ -37,19 +37,19 @@ class Kind:
 class Visit:
     """A kind in its turn, the first probe that is read with, and the last."""
 
-    kind: Kind
+    kind: Setup
     first: str
     last: str
 
 
-def kind_of(candidate: Candidate) -> Kind:
+def kind_of(candidate: Candidate) -> Setup:
     """The kind of a candidate that is a position.
 
     :raises TypeError: it is an item of calibration.
     """
     if not isinstance(candidate.item, Position):
         raise TypeError(f"{candidate.name} is no position")
-    return Kind(candidate.item.artefact, candidate.plane, frozenset(probes_of(candidate.item)))
+    return Setup(candidate.item.artefact, candidate.plane, frozenset(probes_of(candidate.item)))
 
 
 def probes_of(position: Position) -> tuple[str, ...]:
@@ -57,13 +57,13 @@ def probes_of(position: Position) -> tuple[str, ...]:
     return tuple(dict.fromkeys(probe for group in position.readings for probe in group.probes))
 
 
-def changeover(kinds: Collection[Kind], changes: ChangeTimes, first: Kind | None = None) -> float:
+def changeover(kinds: Collection[Setup], changes: ChangeTimes, first: Setup | None = None) -> float:
     """Least total change-over, in seconds, of positions of these kinds; one listed twice stands for
     two positions.
 
     A position of the kind `first` comes before all of them.
 
-    >>> down, side = (Kind("plate", "z", frozenset({name})) for name in ("down", "side"))
+    >>> down, side = (Setup("plate", "z", frozenset({name})) for name in ("down", "side"))
     >>> changeover([down, side, down], ChangeTimes(probe=120.0, plane=1800.0))
     120.0
     """
@@ -71,11 +71,11 @@ def changeover(kinds: Collection[Kind], changes: ChangeTimes, first: Kind | None
 
 
 @lru_cache(maxsize=100_000)
-def _least(kinds: frozenset[tuple[Kind, int]], changes: ChangeTimes, first: Kind | None) -> float:
+def _least(kinds: frozenset[tuple[Setup, int]], changes: ChangeTimes, first: Setup | None) -> float:
     return cheapest(kinds, changes, first, is_paid=True).seconds
 
 
-def _counted(kinds: Iterable[Kind]) -> frozenset[tuple[Kind, int]]:
+def _counted(kinds: Iterable[Setup]) -> frozenset[tuple[Setup, int]]:
     """Kinds with the least number of positions that leaves the same choice of first and last
     probes.
 
@@ -112,9 +112,9 @@ class Order:
 
 
 def cheapest(
-    kinds: Iterable[tuple[Kind, int]],
+    kinds: Iterable[tuple[Setup, int]],
     changes: ChangeTimes,
-    after: Kind | None = None,
+    after: Setup | None = None,
     is_paid: bool = False,
 ) -> Order:
     """The cheapest order of kinds with their numbers of positions.

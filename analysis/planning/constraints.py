@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes,
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from .schedule import Kind, changeover, kind_of
+from .changeover import Setup, changeover, kind_of
 
 HOUR = 3600.0
 
@@ -71,7 +71,7 @@ class Constraints:
     seconds: Array
     readings: NDArray[np.int64]
     positions: NDArray[np.int64]
-    kinds: tuple[Kind | None, ...]
+    kinds: tuple[Setup | None, ...]
     changes: ChangeTimes
     must: frozenset[int]
     at_most: tuple[AtMost, ...]
@@ -91,10 +91,10 @@ class Constraints:
         )
         return Spent(seconds, int(self.readings[own].sum()), int(self.positions[own].sum()))
 
-    def _kinds(self, own: Iterable[int]) -> list[Kind]:
+    def _kinds(self, own: Iterable[int]) -> list[Setup]:
         return [kind for k in own if k != self.first and (kind := self.kinds[k]) is not None]
 
-    def _first(self, own: Collection[int]) -> Kind | None:
+    def _first(self, own: Collection[int]) -> Setup | None:
         return None if self.first is None or self.first not in own else self.kinds[self.first]
 
     def allows(self, chosen: Collection[int]) -> bool:

@@ -15,7 +15,7 @@ from itertools import chain
 from typing import Protocol
 
 import numpy as np
-from ballplate.simulator.estimation.functions import Balls, Distances, Points, point_rows
+from ballplate.simulator.estimation.functions import Balls, Distances, MeasuredPoints, point_rows
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -101,8 +101,8 @@ class Criterion:
     `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded`
     counts functions that the pool leaves open, whatever is chosen. `functions` are None of criteria
     that are about eigenvalues; these are of the model's parameters, `scaled` (n, z), in metres.
-    `target` is the criterion at which the target accuracy is met on the average, None where there
-    is none. `needed` holds, for each artefact whose own distances count, its name and the
+    `target` is the criterion at which the target uncertainty is met on the average, None where
+    there is none. `needed` holds, for each artefact whose own distances count, its name and the
     candidates that place it: without one of them the distances are undetermined, whatever
     certificates say of them.
     """
@@ -467,10 +467,10 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
 
 
 def _target(experiment: Experiment, name: str, functions: Functions | None) -> float | None:
-    """The target accuracy of the functions: its mean for an average, for a largest value only where
-    it is constant.
+    """The target uncertainty of the functions: its mean for an average, for a largest value only
+    where it is constant.
     """
-    target = experiment.target_accuracy
+    target = experiment.target_uncertainty
     if functions is None or target is None:
         return None
     if name.endswith(MAXIMUM):
@@ -512,7 +512,7 @@ def _of_balls(information: Information, places: Balls) -> tuple[Array, Array]:
     return STEP * displacement.reshape(n, d, -1), STEP * (amounts @ open_).reshape(n, d, -1)
 
 
-def _of_points(information: Information, places: Points) -> tuple[Array, Array]:
+def _of_points(information: Information, places: MeasuredPoints) -> tuple[Array, Array]:
     """Displacements of corrected points (n, d, z), and those that the pool leaves open, in
     metres.
     """

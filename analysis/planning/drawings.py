@@ -17,6 +17,7 @@ MOST_BALLS = 400
 VIEWS = {"x": ("y", False, "z"), "y": ("x", True, "z"), "z": ("x", False, "y")}
 
 
+# In one piece: elements of one drawing, which share its scale and margins.
 def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     """A position seen against its plane's normal: the volume, the balls, filled where they are
     read, the first named.

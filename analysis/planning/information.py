@@ -16,6 +16,8 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.covariance import EXACT
 from ballplate.simulator.estimation.elimination import ALIKE
@@ -29,10 +31,8 @@ from ballplate.simulator.estimation.observations import (
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.threads import scipy_linalg, single_threaded
 
-from ..running.steps import Report, counted, unreported
-from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_rows
+from .rows import STEP, PoolDesign, Rows, always, calibration_rows, draw, position_rows
 
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
@@ -50,7 +50,7 @@ MOST_BYTES = 800_000_000
 
 
 @dataclass(frozen=True)
-class Basis:
+class InformationBasis:
     """Coordinates z in which a plan computes.
 
     `balls` (n, d, y) are the combinations of ball co-ordinates that count. In terms of their
@@ -94,9 +94,9 @@ class Information:
     observes anything.
     """
 
-    drawn: Drawn
+    drawn: PoolDesign
     candidates: tuple[Candidate, ...]
-    basis: Basis
+    basis: InformationBasis
     base: Array
     matrices: Array
     open_: Array
@@ -170,6 +170,7 @@ class Frames:
         return np.asarray(left.T @ left)
 
 
+# In one piece: two sets of rows, as stated and evenly weighted, pass through the same steps.
 @single_threaded
 def pool_information(
     experiment: Experiment,
@@ -296,7 +297,7 @@ def _in_amounts(rows: Rows, balls: Array) -> Array:
     return found
 
 
-def _position_weight(drawn: Drawn) -> float:
+def _position_weight(drawn: PoolDesign) -> float:
     """The weight of the heaviest readings and lengths of positions, for a micrometre."""
     of_readings = reading_weights(
         drawn.design, drawn.design.readings.select(drawn.design.plate_readings)
@@ -357,7 +358,7 @@ def _motions(design: Design) -> Array:
     return np.concatenate([np.zeros((n, d, 0)), *parts], axis=2)
 
 
-def _combinations(drawn: Drawn, certificates: list[Rows], all_balls: bool) -> Array:
+def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) -> Array:
     """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything
     that is shared.
 
@@ -462,7 +463,7 @@ class _Span:
 
 def _basis(
     balls: Array, shared: int, every: list[Array], even: list[Array] | None = None
-) -> tuple[Basis, Array]:
+) -> tuple[InformationBasis, Array]:
     """Basis in which the information of all rows together is the identity, and what is left out
     (shared, open).
 
@@ -485,7 +486,9 @@ def _basis(
         ball_root = by_balls[kept].T / of_balls[kept]
         ball_shared = ball_root @ left[:, kept].T @ triangle[:y, y:]
         return (
-            Basis(balls, ball_root, ball_shared, right[known].T / values[known], ball_open),
+            InformationBasis(
+                balls, ball_root, ball_shared, right[known].T / values[known], ball_open
+            ),
             open_,
         )
     collected = Collected(int(kept.sum()), shared)
@@ -495,7 +498,7 @@ def _basis(
     ball_root = by_balls[kept].T @ _inverse(found)
     of_shared = triangular(found.rest @ right[known].T, np.zeros((len(found.rest), 0)))
     return (
-        Basis(
+        InformationBasis(
             balls,
             ball_root,
             ball_root @ found.side,
@@ -506,11 +509,11 @@ def _basis(
     )
 
 
-def _inverse(found: Triangle) -> Array:
+def _inverse(triangle: Triangle) -> Array:
     """Inverse of a triangle, its rows in the order of the columns."""
-    inverse = np.empty_like(found.root)
-    inverse[found.order] = scipy_linalg().solve_triangular(
-        found.root, np.eye(len(found.root)), check_finite=False
+    inverse = np.empty_like(triangle.root)
+    inverse[triangle.order] = scipy_linalg().solve_triangular(
+        triangle.root, np.eye(len(triangle.root)), check_finite=False
     )
     return inverse
 
@@ -534,9 +537,9 @@ def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:
 
 
 def _unplaced(
-    drawn: Drawn,
+    drawn: PoolDesign,
     candidates: Sequence[Candidate],
-    basis: Basis,
+    basis: InformationBasis,
     all_balls: bool,
     has_rows: Sequence[bool],
 ) -> tuple[tuple[frozenset[int], Array], ...]:
@@ -573,7 +576,9 @@ def _unplaced(
     return tuple(found)
 
 
-def _frames(drawn: Drawn, known: list[Rows], items: dict[int, list[Rows]], basis: Basis) -> Frames:
+def _frames(
+    drawn: PoolDesign, known: list[Rows], items: dict[int, list[Rows]], basis: InformationBasis
+) -> Frames:
     """How calibrated co-ordinates fix the frames of plates."""
     motions = _motions(drawn.design)
 

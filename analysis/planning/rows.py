@@ -56,7 +56,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class PoolDesign:
     """All positions that may be chosen, laid out as one design, and the columns of shared
     parameters.
 
@@ -88,7 +88,7 @@ class Drawn:
         return np.concatenate([self.layout.scale[self.own] * STEP, np.ones(self.certificates)])
 
 
-def draw(experiment: Experiment, positions: Sequence[Position]) -> Drawn:
+def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     """Lay out an experiment with all `positions` that may be chosen, in their order.
 
     :raises ExperimentError: a prior is about a pose; what it means depends on the position that
@@ -104,10 +104,10 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> Drawn:
     if messages:
         raise ExperimentError(messages)
     design = lay_out(replace(experiment, positions=tuple(positions)))
-    return Drawn(design, shared_layout(design), nominal_state(design))
+    return PoolDesign(design, shared_layout(design), nominal_state(design))
 
 
-def position_rows(drawn: Drawn) -> Iterator[Rows]:
+def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
     """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
@@ -146,7 +146,7 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
         first = last
 
 
-def _length_rows(drawn: Drawn) -> dict[int, Rows]:
+def _length_rows(drawn: PoolDesign) -> dict[int, Rows]:
     """Rows of the lengths of standards and gauges, by position."""
     design, layout = drawn.design, drawn.layout
     if not len(design.lengths):
@@ -167,7 +167,7 @@ def _length_rows(drawn: Drawn) -> dict[int, Rows]:
     return found
 
 
-def _of_shared(drawn: Drawn, shared: Array) -> Rows:
+def _of_shared(drawn: PoolDesign, shared: Array) -> Rows:
     """Rows (m, s) that no ball takes part in."""
     none = np.full(len(shared), -1)
     return Rows(
@@ -179,7 +179,7 @@ def _of_shared(drawn: Drawn, shared: Array) -> Rows:
     )
 
 
-def always(drawn: Drawn) -> list[Rows]:
+def always(drawn: PoolDesign) -> list[Rows]:
     """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
     certificates.
     """
@@ -195,7 +195,7 @@ def always(drawn: Drawn) -> list[Rows]:
 
 
 def calibration_rows(
-    drawn: Drawn, experiment: Experiment, item: Calibration, name: str
+    drawn: PoolDesign, experiment: Experiment, item: Calibration, name: str
 ) -> list[Rows]:
     """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
@@ -228,7 +228,7 @@ def calibration_rows(
     return [_of_shared(drawn, row * drawn.scale)]
 
 
-def _of_calibration(drawn: Drawn, design: Design) -> list[Rows]:
+def _of_calibration(drawn: PoolDesign, design: Design) -> list[Rows]:
     """Rows of calibrated distances and co-ordinates of a design with the same balls."""
     given, distances = distance_rows(design, drawn.state), design.distances
     coordinates = coordinate_rows(design, drawn.state)

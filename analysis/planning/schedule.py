@@ -12,18 +12,7 @@ from typing import Any
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.inputs.settings import listing
 
-from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of
-
-__all__ = [
-    "Completion",
-    "Kind",
-    "RunSheet",
-    "Step",
-    "changeover",
-    "kind_of",
-    "ordered",
-    "run_sheet",
-]
+from .changeover import Visit, cheapest, kind_of, probes_of
 
 
 @dataclass(frozen=True)

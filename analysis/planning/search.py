@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable
-from ballplate.simulator.numerics.threads import scipy_linalg, single_threaded
 
 from .constraints import Constraints
 from .criteria import Criterion
@@ -50,7 +50,7 @@ COMPARED = 33
 
 
 @dataclass(frozen=True)
-class Problem:
+class SelectionProblem:
     """What is to be chosen from, by which criterion, within which limits."""
 
     information: Information
@@ -99,7 +99,7 @@ def full_root(information: Array) -> Array | None:
     return None if _is_deficient(inverse) else inverse.T
 
 
-def counted_root(problem: Problem, root: Array) -> Array:
+def counted_root(problem: SelectionProblem, root: Array) -> Array:
     """The part of a root of all z that the criterion is about: what is left of the last z when
     balls are eliminated.
     """
@@ -109,7 +109,7 @@ def counted_root(problem: Problem, root: Array) -> Array:
     return root[own, own]
 
 
-def value(problem: Problem, chosen: Collection[int]) -> float:
+def value(problem: SelectionProblem, chosen: Collection[int]) -> float:
     """Criterion of a selection, infinite if it leaves something undetermined, or lacks what every
     choice needs.
     """
@@ -150,7 +150,7 @@ class Losses:
     it leads from selections that are just enough to others.
     """
 
-    def __init__(self, problem: Problem, by_pivots: bool = False) -> None:
+    def __init__(self, problem: SelectionProblem, by_pivots: bool = False) -> None:
         self._problem = problem
         self.by_pivots = by_pivots
         self._known: dict[frozenset[int], float] = {}
@@ -209,7 +209,7 @@ def _ridged(information: Array) -> Array:
 
 
 def _sieve(
-    problem: Problem, information: Array, added: Integers, by_pivots: bool = False
+    problem: SelectionProblem, information: Array, added: Integers, by_pivots: bool = False
 ) -> tuple[Integers, Array]:
     """Candidates that may be the best to add to `information`, and the criterion's tangent with
     each of them.
@@ -242,7 +242,7 @@ def _sieve(
 
 
 def best_addition(
-    problem: Problem, members: frozenset[int], losses: Losses, per_second: bool = False
+    problem: SelectionProblem, members: frozenset[int], losses: Losses, per_second: bool = False
 ) -> tuple[int, float] | None:
     """The candidate that lowers the criterion most within the limits, and the criterion with it.
 
@@ -270,7 +270,7 @@ def best_addition(
 
 
 def fill(
-    problem: Problem, chosen: Collection[int], losses: Losses, thorough: bool = True
+    problem: SelectionProblem, chosen: Collection[int], losses: Losses, thorough: bool = True
 ) -> frozenset[int]:
     """Add candidates, the best first, as long as the limits allow one and it gains anything.
 
@@ -286,7 +286,7 @@ def fill(
 
 
 def _filled(
-    problem: Problem, members: frozenset[int], losses: Losses, per_second: bool
+    problem: SelectionProblem, members: frozenset[int], losses: Losses, per_second: bool
 ) -> frozenset[int]:
     while (found := best_addition(problem, members, losses, per_second)) is not None:
         addition, after = found
@@ -298,7 +298,11 @@ def _filled(
 
 @single_threaded
 def improve(
-    problem: Problem, start: Collection[int], losses: Losses, at_once: int, thorough: bool = False
+    problem: SelectionProblem,
+    start: Collection[int],
+    losses: Losses,
+    at_once: int,
+    thorough: bool = False,
 ) -> Found:
     """The best selection that exchanges lead to from a start within the limits.
 
@@ -326,7 +330,7 @@ def improve(
     return Found(tuple(sorted(members)), value(problem, members))
 
 
-def ranked_additions(problem: Problem, chosen: Collection[int]) -> list[tuple[int, float]]:
+def ranked_additions(problem: SelectionProblem, chosen: Collection[int]) -> list[tuple[int, float]]:
     """Candidates that may be added to a selection, with the criterion that each would give,
     smallest first.
     """
@@ -335,7 +339,9 @@ def ranked_additions(problem: Problem, chosen: Collection[int]) -> list[tuple[in
     return sorted(losses, key=lambda item: (float(comparable(item[1], COMPARED)), item[0]))
 
 
-def starts(problem: Problem, ranked: Sequence[int], count: int, seed: int) -> list[frozenset[int]]:
+def starts(
+    problem: SelectionProblem, ranked: Sequence[int], count: int, seed: int
+) -> list[frozenset[int]]:
     """Selections to start from: what has to be chosen alone, filled by rank, and `count` filled in
     random order.
     """

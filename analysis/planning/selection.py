@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
 
-from ..report.campaign import draw_campaign
-from ..results.formatting import aligned, finite, number
-from ..results.result import Result
+from ..presentation.formatting import aligned, finite, number
+from ..presentation.result import Result
+from .campaign_picture import draw_campaign
 from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Budget, Spent
 from .criteria import DESCRIPTIONS
@@ -82,52 +82,56 @@ class Campaign(Selection, Result):
         return draw_campaign(self, path)
 
 
-def _lines(found: Campaign) -> list[str]:
+def _lines(campaign: Campaign) -> list[str]:
     """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the
     run sheet.
     """
     lines = [
-        f"{found.plan.label}: {found.plan.title}",
-        f"{len(found.pool.candidates)} candidates{_dropped(found)}; no more than {found.budget}",
-        f"{found.criterion}: {DESCRIPTIONS[found.criterion]}",
+        f"{campaign.plan.label}: {campaign.plan.title}",
+        (
+            f"{len(campaign.pool.candidates)} candidates{_dropped(campaign)};"
+            f" no more than {campaign.budget}"
+        ),
+        f"{campaign.criterion}: {DESCRIPTIONS[campaign.criterion]}",
         "",
-        *_comparison(found),
+        *_comparison(campaign),
     ]
-    if not found.is_determined:
+    if not campaign.is_determined:
         lines.append(
             "no choice was found that determines everything; below is what the nearest one leaves"
             " open"
         )
-    elif math.isnan(found.bound):
-        lines.append(f"there is no bound of {found.criterion}")
+    elif math.isnan(campaign.bound):
+        lines.append(f"there is no bound of {campaign.criterion}")
     else:
         lines.append(
-            f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}"
+            "no choice within the limits is better by more than"
+            f" {_percent(1.0 - campaign.efficiency)}"
         )
-    if found.excluded:
+    if campaign.excluded:
         lines.append(
-            f"left out of {found.criterion}: {found.excluded} that no choice from this pool"
+            f"left out of {campaign.criterion}: {campaign.excluded} that no choice from this pool"
             " determines"
         )
-    lines += _interrupted(found)
-    if found.gains:
-        lines += ["", *_gain_table(found)]
-    if found.curve:
-        lines += ["", *_curve_table(found)]
-    return [*lines, "", *found.plan.lines()[1:], "", *sheet_lines(found.sheet)]
+    lines += _interrupted(campaign)
+    if campaign.gains:
+        lines += ["", *_gain_table(campaign)]
+    if campaign.curve:
+        lines += ["", *_curve_table(campaign)]
+    return [*lines, "", *campaign.plan.lines()[1:], "", *sheet_lines(campaign.sheet)]
 
 
-def _interrupted(found: Campaign) -> list[str]:
+def _interrupted(campaign: Campaign) -> list[str]:
     """What becomes of positions that were read in part."""
-    names = {one.name for one in found.chosen}
+    names = {one.name for one in campaign.chosen}
     lines = []
-    for one in found.interrupted:
+    for one in campaign.interrupted:
         text = (
             f"{one.name} was interrupted after {one.readings}"
             f" reading{'' if one.readings == 1 else 's'}"
         )
-        if found.completed is not None and found.completed.whole.name == one.name:
-            text += f"; {found.completed.rest.readings} more complete it"
+        if campaign.completed is not None and campaign.completed.whole.name == one.name:
+            text += f"; {campaign.completed.rest.readings} more complete it"
         elif again := [
             name for name in names if name != one.name and base_name(name) == base_name(one.name)
         ]:
@@ -135,13 +139,13 @@ def _interrupted(found: Campaign) -> list[str]:
         else:
             text += "; it is left so"
         lines.append(text)
-    if found.left_open:
-        count = "one direction" if found.left_open == 1 else f"{found.left_open} directions"
+    if campaign.left_open:
+        count = "one direction" if campaign.left_open == 1 else f"{campaign.left_open} directions"
         lines.append(
             f"too little was read there to determine {count} of where it stood; nothing else"
             " depends on that"
         )
-    for one in found.ignored:
+    for one in campaign.ignored:
         lines.append(
             f"{one.name} is left out: nothing else worth its time reads the other balls of"
             f" {one.item.artefact}; take its readings out of the file"
@@ -149,10 +153,10 @@ def _interrupted(found: Campaign) -> list[str]:
     return lines
 
 
-def _dropped(found: Campaign) -> str:
+def _dropped(campaign: Campaign) -> str:
     words = [
         f"{count} {reason}"
-        for reason, count in sorted(found.pool.dropped.items(), key=lambda item: -item[1])
+        for reason, count in sorted(campaign.pool.dropped.items(), key=lambda item: -item[1])
     ]
     if not words:
         return ""
@@ -160,23 +164,23 @@ def _dropped(found: Campaign) -> str:
     return f" (and not offered: {'; '.join([*words[:TOLD], *more])})"
 
 
-def _comparison(found: Campaign) -> list[str]:
-    rows = [["", found.criterion, "", "hours", "readings", "positions"]]
-    rows.append(["chosen", *_value(found, found.value), *_spent(found.spent)])
-    if not math.isnan(found.bound):
-        rows.append(["bound of any choice", *_value(found, found.bound), "", "", ""])
-    if found.drawn is not None and found.drawn_spent is not None:
-        words = found.drawn_words + ("" if found.drawn_is_within else " (more than allowed)")
-        rows.append([words, *_value(found, found.drawn), *_spent(found.drawn_spent)])
-    if found.target is not None:
-        rows.append(["target (of u)", *_value(found, found.target), "", "", ""])
+def _comparison(campaign: Campaign) -> list[str]:
+    rows = [["", campaign.criterion, "", "hours", "readings", "positions"]]
+    rows.append(["chosen", *_value(campaign, campaign.value), *_spent(campaign.spent)])
+    if not math.isnan(campaign.bound):
+        rows.append(["bound of any choice", *_value(campaign, campaign.bound), "", "", ""])
+    if campaign.drawn is not None and campaign.drawn_spent is not None:
+        words = campaign.drawn_words + ("" if campaign.drawn_is_within else " (more than allowed)")
+        rows.append([words, *_value(campaign, campaign.drawn), *_spent(campaign.drawn_spent)])
+    if campaign.target is not None:
+        rows.append(["target (of u)", *_value(campaign, campaign.target), "", "", ""])
     return aligned(rows, [False, True, False, True, True, True])
 
 
-def _value(found: Campaign, value: float) -> list[str]:
+def _value(campaign: Campaign, value: float) -> list[str]:
     if math.isinf(value):
         return ["-", "deficient"]
-    return [number(1e6 * value), "um"] if found.unit == "m" else [number(value), ""]
+    return [number(1e6 * value), "um"] if campaign.unit == "m" else [number(value), ""]
 
 
 def _spent(spent: Spent) -> list[str]:
@@ -187,57 +191,63 @@ def _percent(ratio: float) -> str:
     return f"{100 * ratio:.1f} %"
 
 
-def _gain_table(found: Campaign) -> list[str]:
-    rows = [["", f"{found.criterion} without it", "with it", "minutes"]]
-    rows += [["chosen: " + gain.candidate.name, *_gain(found, gain)] for gain in found.gains]
+def _gain_table(campaign: Campaign) -> list[str]:
+    rows = [["", f"{campaign.criterion} without it", "with it", "minutes"]]
+    rows += [["chosen: " + gain.candidate.name, *_gain(campaign, gain)] for gain in campaign.gains]
     rows += [
-        ["left out: " + gain.candidate.name, *_gain(found, gain)] for gain in found.left_out[:TOLD]
+        ["left out: " + gain.candidate.name, *_gain(campaign, gain)]
+        for gain in campaign.left_out[:TOLD]
     ]
     return aligned(rows, [False, True, True, True])
 
 
-def _gain(found: Campaign, gain: Gain) -> list[str]:
+def _gain(campaign: Campaign, gain: Gain) -> list[str]:
     without, with_ = (
-        " ".join(_value(found, value)).strip("- ").strip() for value in (gain.without, gain.with_)
+        " ".join(_value(campaign, value)).strip("- ").strip()
+        for value in (gain.without, gain.with_)
     )
     return [without, with_, f"{gain.candidate.seconds / 60:.0f}"]
 
 
-def _curve_table(found: Campaign) -> list[str]:
-    rows = [["no more than", found.criterion, "", "bound", "hours", "readings", "positions"]]
-    for point in found.curve:
-        bound = "-" if math.isnan(point.bound) else _value(found, point.bound)[0]
-        rows.append([str(point.budget), *_value(found, point.value), bound, *_spent(point.spent)])
+def _curve_table(campaign: Campaign) -> list[str]:
+    rows = [["no more than", campaign.criterion, "", "bound", "hours", "readings", "positions"]]
+    for point in campaign.curve:
+        bound = "-" if math.isnan(point.bound) else _value(campaign, point.bound)[0]
+        rows.append(
+            [str(point.budget), *_value(campaign, point.value), bound, *_spent(point.spent)]
+        )
     return aligned(rows, [False, True, False, True, True, True, True])
 
 
-def _data(found: Campaign) -> dict[str, Any]:
+def _data(campaign: Campaign) -> dict[str, Any]:
     """A campaign as data for JSON, in metres and seconds."""
     return {
-        "experiment": found.plan.label,
-        "candidates": len(found.pool.candidates),
-        "dropped": dict(found.pool.dropped),
-        "criterion": found.criterion,
-        "unit": found.unit,
-        "budget": _budget_data(found.budget),
-        "value": finite(found.value),
-        "bound": finite(found.bound),
-        "drawn": None if found.drawn is None else finite(found.drawn),
-        "drawn_spent": None if found.drawn_spent is None else _spent_data(found.drawn_spent),
-        "target": found.target,
-        "excluded": found.excluded,
-        "spent": _spent_data(found.spent),
-        "chosen": [candidate.name for candidate in found.chosen],
-        "done": [candidate.name for candidate in found.done],
-        "interrupted": [{"name": one.name, "readings": one.readings} for one in found.interrupted],
-        "completed": None if found.completed is None else found.completed.whole.name,
-        "left_open": found.left_open,
-        "ignored": [candidate.name for candidate in found.ignored],
-        "gains": [_gain_data(gain) for gain in found.gains],
-        "left_out": [_gain_data(gain) for gain in found.left_out],
-        "curve": [_point_data(point) for point in found.curve],
-        "run_sheet": sheet_data(found.sheet),
-        "plan": found.plan.to_dict(),
+        "experiment": campaign.plan.label,
+        "candidates": len(campaign.pool.candidates),
+        "dropped": dict(campaign.pool.dropped),
+        "criterion": campaign.criterion,
+        "unit": campaign.unit,
+        "budget": _budget_data(campaign.budget),
+        "value": finite(campaign.value),
+        "bound": finite(campaign.bound),
+        "drawn": None if campaign.drawn is None else finite(campaign.drawn),
+        "drawn_spent": None if campaign.drawn_spent is None else _spent_data(campaign.drawn_spent),
+        "target": campaign.target,
+        "excluded": campaign.excluded,
+        "spent": _spent_data(campaign.spent),
+        "chosen": [candidate.name for candidate in campaign.chosen],
+        "done": [candidate.name for candidate in campaign.done],
+        "interrupted": [
+            {"name": one.name, "readings": one.readings} for one in campaign.interrupted
+        ],
+        "completed": None if campaign.completed is None else campaign.completed.whole.name,
+        "left_open": campaign.left_open,
+        "ignored": [candidate.name for candidate in campaign.ignored],
+        "gains": [_gain_data(gain) for gain in campaign.gains],
+        "left_out": [_gain_data(gain) for gain in campaign.left_out],
+        "curve": [_point_data(point) for point in campaign.curve],
+        "run_sheet": sheet_data(campaign.sheet),
+        "plan": campaign.plan.to_dict(),
     }
 
 

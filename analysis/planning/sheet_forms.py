@@ -12,7 +12,7 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 
-from ..results.formatting import aligned
+from ..presentation.formatting import aligned
 from .drawings import place_drawing
 from .schedule import RunSheet, Step
 

@@ -10,8 +10,8 @@ equal ones the first by the order of names.
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable
 
 
 def elementary_mixture(directions: Array) -> Array:

@@ -11,11 +11,11 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import comparable
 
 from .proposed_bars import MISSING, bars_to_add, listed
 

@@ -16,7 +16,7 @@ from ballplate.simulator.machines.protocol import Array
 # their own scatter only.
 MISSING = 1e-3
 # What is added is to tell more than that.
-CLEARLY = 1e-2
+SINGULAR_VALUE_TOLERANCE = 1e-2
 
 # Elevations that a gauge on a table can reach come first, and those all round are easier read than
 # upright planes.
@@ -77,10 +77,12 @@ def _leave_open(rows: Array, strains: Array) -> int:
     size = len(strains)
     others = rows[:, size:]
     u, values, _ = np.linalg.svd(others, full_matrices=False)
-    taken = u[:, values > CLEARLY * max(values.max(initial=0.0), 1.0)]
+    taken = u[:, values > SINGULAR_VALUE_TOLERANCE * max(values.max(initial=0.0), 1.0)]
     told = rows[:, :size] @ strains
     told = told - taken @ (taken.T @ told)
-    return strains.shape[1] - int((np.linalg.svd(told, compute_uv=False) > CLEARLY).sum())
+    return strains.shape[1] - int(
+        (np.linalg.svd(told, compute_uv=False) > SINGULAR_VALUE_TOLERANCE).sum()
+    )
 
 
 def bar_directions(d: int) -> Iterator[tuple[str, str, Array]]:

@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines
-from ballplate.simulator.numerics.rounding import above, comparable, printable
 
 from .canonical import elementary_mixture, principal_directions
 from .missing_bars import reasons
@@ -31,8 +31,8 @@ ROUNDING = 1e-9
 GREAT = 1e9
 
 # A direction is weak when one standard deviation along it moves corrected points, relative to one
-# another, by more than the target accuracy at half the volume's diagonal or, without a target, this
-# many times the repeatability.
+# another, by more than the target uncertainty at half the volume's diagonal or, without a target,
+# this many times the repeatability.
 WEAK = 10.0
 
 # Curves that no polynomial of this degree describes are called irregular.

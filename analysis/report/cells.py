@@ -14,7 +14,7 @@ from ..sweeps.bundle import Bundle, has_code, unpack
 from ..sweeps.load import experiment_of, load_sweep
 from ..sweeps.named_files import MODULE, YAML, axis_paths, leads_out, path_scalars
 from ..sweeps.store import Store, StoreError, files
-from .results import Results
+from .results import ReportedSweep
 
 
 class NoExperimentError(Exception):
@@ -22,7 +22,7 @@ class NoExperimentError(Exception):
 
 
 def experiments(
-    store: Store, results: Results, cells: Sequence[int], run_modules: bool = False
+    store: Store, results: ReportedSweep, cells: Sequence[int], run_modules: bool = False
 ) -> list[Experiment]:
     """Experiments of cells.
 

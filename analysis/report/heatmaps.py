@@ -8,10 +8,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results.formatting import number
-from ..results.table import Entry
+from ..presentation.formatting import number
+from ..presentation.table import Entry
 from .measures import Measure, uncertainty_measures
-from .results import Axis, Results, criterion, partly_open
+from .results import ReportAxis, ReportedSweep, criterion, partly_open
 from .tables import DIGITS, NOT_DONE, STAR
 
 # Values of an axis that are shown, shades that can be told apart, and pairs of axes.
@@ -26,8 +26,8 @@ class Heat:
     What is undetermined even in part has none.
     """
 
-    rows: Axis
-    columns: Axis
+    rows: ReportAxis
+    columns: ReportAxis
     measure: Measure
     row_labels: tuple[str, ...]
     column_labels: tuple[str, ...]
@@ -36,7 +36,7 @@ class Heat:
     note: str
 
 
-def heat_maps(results: Results) -> list[Heat]:
+def heat_maps(results: ReportedSweep) -> list[Heat]:
     """A map of the averages that cells are judged by, for each pair of axes with few or with
     ordered values.
     """
@@ -57,7 +57,7 @@ def heat_maps(results: Results) -> list[Heat]:
     return [_heat(results, i, j, measures[0]) for i, j in pairs[:MOST_PAIRS]]
 
 
-def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
+def _heat(results: ReportedSweep, i: int, j: int, measure: Measure) -> Heat:
     rows, columns = results.axes[i], results.axes[j]
     row_of, row_labels = _grouped(rows)
     column_of, column_labels = _grouped(columns)
@@ -118,7 +118,7 @@ def _members(place: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
     return np.split(order, np.searchsorted(place[order], np.arange(1, count)))
 
 
-def _grouped(axis: Axis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+def _grouped(axis: ReportAxis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Place of each value in the map, and the labels there: neighbouring values together where
     there are many.
     """

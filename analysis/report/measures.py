@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..results.formatting import shown_unit
+from ..presentation.formatting import shown_unit
 from ..sweeps.columns import MORE, symbol_column
 from ..uncertainty.quantities import DESCRIPTIONS
-from .results import Results
+from .results import ReportedSweep
 
 STATISTICS = ("maximum", "average")
 
@@ -46,7 +46,7 @@ class Measure:
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
 
-def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measure]:
+def uncertainty_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measure]:
     """Maximum and average of all recorded uncertainties, what is open, and shares within the target
     accuracy.
 
@@ -83,7 +83,7 @@ def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measur
     return found
 
 
-def rank_measures(results: Results) -> list[Measure]:
+def rank_measures(results: ReportedSweep) -> list[Measure]:
     """The rank deficiency, where a cell has any."""
     column = "rank_deficiency"
     if column not in results.frame or not (results.figure(column) > 0).any():
@@ -91,7 +91,7 @@ def rank_measures(results: Results) -> list[Measure]:
     return [Measure("rank", "deficiency", "", column, 1.0, is_count=True)]
 
 
-def trial_measures(results: Results, of_parts: bool = True) -> list[Measure]:
+def trial_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measure]:
     """Figures of Monte Carlo; none where no trials were made."""
     found: list[Measure] = []
     for symbol in trial_symbols(results):
@@ -114,7 +114,7 @@ def trial_measures(results: Results, of_parts: bool = True) -> list[Measure]:
     return found
 
 
-def trial_symbols(results: Results) -> list[str]:
+def trial_symbols(results: ReportedSweep) -> list[str]:
     """Quantities with Monte Carlo figures, those of further artefacts marked by dashes."""
     found = []
     for symbol in DESCRIPTIONS:
@@ -136,7 +136,7 @@ def descriptions(measures: Sequence[Measure]) -> list[str]:
     return found
 
 
-def _columns(results: Results, start: str) -> list[tuple[str, str]]:
+def _columns(results: ReportedSweep, start: str) -> list[tuple[str, str]]:
     """Columns that begin so, with the unit in which they are shown."""
     found = []
     for column in results.frame.columns:

@@ -12,33 +12,33 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.settings import listing
 
-from ..results.formatting import number, percent, uncertainty_words
-from ..results.table import Block, Entry, Row, Table
-from ..running.steps import Report, counted, unreported
+from ..presentation.formatting import number, percent, uncertainty_words
+from ..presentation.pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
+from ..presentation.scene import MOST_BALLS, Scene, scene
+from ..presentation.svg import micro
+from ..presentation.table import Block, Entry, Row, Table
 from ..sweeps.store import Store
+from ..uncertainty.error_map import error_map
 from ..uncertainty.quantities import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
-from .pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
 from .plots import plot_svg
-from .results import Results, best_and_worst, cell_list, criterion, one_line
-from .scene import MOST_BALLS, Scene, scene
+from .results import ReportedSweep, best_and_worst, cell_list, criterion, one_line
 from .series import Plot, plots
-from .svg import micro
 from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
-from .volume import error_map
 
 # Values of an axis that are listed.
 LISTED = 12
 
 
 @dataclass(frozen=True)
-class Drawn:
+class Drawing:
     """A drawing with what stands below it."""
 
     svg: str
@@ -62,11 +62,11 @@ class DrawnMap:
     """The error map's uncertainty in slices."""
 
     words: str
-    figures: tuple[Drawn, ...]
+    figures: tuple[Drawing, ...]
 
 
 def page(
-    store: Store, results: Results, run_modules: bool = False, report: Report = unreported
+    store: Store, results: ReportedSweep, run_modules: bool = False, report: Report = unreported
 ) -> str:
     """The page. Experiments with code of their own are drawn only with `run_modules`; `report` is
     told what is drawn.
@@ -118,7 +118,7 @@ def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
     return [(name, words) for name, words, is_there in known if is_there]
 
 
-def _summary(results: Results) -> str:
+def _summary(results: ReportedSweep) -> str:
     parts = [f"{results.count('done')} of {len(results.cells)} cells done"]
     parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
     parts += [f"{results.left} left"] if results.left else []
@@ -127,7 +127,7 @@ def _summary(results: Results) -> str:
     return ", ".join(parts) + "."
 
 
-def _facts(results: Results) -> list[tuple[str, str]]:
+def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     stored = results.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     facts = [
@@ -163,13 +163,13 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     return facts
 
 
-def _unreadable(results: Results) -> str:
+def _unreadable(results: ReportedSweep) -> str:
     """Which cells could not be read, and why the first of them."""
     cells = sorted(results.found.unreadable)
     return f"{cell_list(cells)} ({one_line(results.found.unreadable[cells[0]])})"
 
 
-def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawn]]]:
+def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawing]]]:
     found = []
     number_of = 0
     for axis, some in groupby(
@@ -180,12 +180,14 @@ def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawn]]]:
             number_of += 1
             caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}."
             picture = plot_svg(plot, f"plot{number_of}")
-            figures.append(Drawn(picture, f"{caption} {plot.note}".strip()))
+            figures.append(Drawing(picture, f"{caption} {plot.note}".strip()))
         found.append((axis, figures))
     return found
 
 
-def _designs(store: Store, results: Results, run_modules: bool, report: Report) -> dict[str, Any]:
+def _designs(
+    store: Store, results: ReportedSweep, run_modules: bool, report: Report
+) -> dict[str, Any]:
     """The best and the worst cell's design, and the best one's error map."""
     empty: dict[str, Any] = {"designs": [], "no_designs": "", "error_map": None}
     cells, judged = best_and_worst(results), criterion(results)
@@ -259,7 +261,7 @@ def _positions(drawn: Scene, cell: int) -> Table:
     return Table(f"positions-{cell}", caption, headings, ("balls read",), (Block("", tuple(rows)),))
 
 
-def _drawn_map(experiment: Experiment, results: Results, cell: int) -> DrawnMap:
+def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> DrawnMap:
     found = error_map(experiment)
     words = (
         f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the"
@@ -271,7 +273,7 @@ def _drawn_map(experiment: Experiment, results: Results, cell: int) -> DrawnMap:
     if found.within is not None:
         words += (
             f" Of the distances between all points of this grid {percent(found.within)} are known"
-            " to within the target accuracy, by the"
+            " to within the target uncertainty, by the"
             f" {uncertainty_words(experiment.coverage_factor)}."
         )
     figures = []
@@ -279,7 +281,7 @@ def _drawn_map(experiment: Experiment, results: Results, cell: int) -> DrawnMap:
         told = slice_words(one)
         caption = told[0].upper() + told[1:] + "."
         figures.append(
-            Drawn(
+            Drawing(
                 slice_svg(found, one, f"slice{k}", f"Map of standard uncertainties, {told}"),
                 caption,
             )

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..results.formatting import number
-from .series import Line, Panel, Plot
-from .svg import (
+from ..presentation.formatting import number
+from ..presentation.svg import (
     DASHES,
     INK,
     MARKERS,
@@ -22,6 +21,7 @@ from .svg import (
     micro,
     placed_axes,
 )
+from .series import Panel, Plot, SeriesLine
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,7 +89,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
         axes.set_xticks(numbers, [f"{value:.6g}" for value in numbers])
 
 
-def _line(axes: Axes, line: Line, k: int) -> None:
+def _line(axes: Axes, line: SeriesLine, k: int) -> None:
     colour, marker = SERIES[k], MARKERS[k]
     if len(line.low):
         bars = np.stack([line.y - line.low, line.high - line.y])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..sweeps.columns import MORE, symbol_column
 from ..sweeps.frame import frame_of
 from ..sweeps.store import Store, chosen_sweep, definition_of, results
-from ..sweeps.stored import Results as Found
+from ..sweeps.stored import StoredResults as Found
 from ..uncertainty.quantities import RECORDED
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERR
 
 
 @dataclass(frozen=True)
-class Axis:
+class ReportAxis:
     """An axis of the sweep; `numbers` are its values in `unit` as the file writes them, none where
     they are texts.
     """
@@ -57,7 +57,7 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
-class Results:
+class ReportedSweep:
     """A sweep and what has come of it.
 
     `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows
@@ -67,7 +67,7 @@ class Results:
 
     number: int
     definition: dict[str, Any]
-    axes: tuple[Axis, ...]
+    axes: tuple[ReportAxis, ...]
     cells: Integers
     frame: pandas.DataFrame
     chosen: Integers
@@ -116,7 +116,7 @@ class Results:
         )
 
 
-def read_results(store: Store, sweep: int | None) -> Results:
+def read_results(store: Store, sweep: int | None) -> ReportedSweep:
     """Results of a sweep of a store, the newest unless told.
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
@@ -127,7 +127,7 @@ def read_results(store: Store, sweep: int | None) -> Results:
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = results(store, number, len(cells))
     texts = {row.number: row.details for row in found.rows}
-    return Results(
+    return ReportedSweep(
         number,
         definition,
         axes,
@@ -139,10 +139,10 @@ def read_results(store: Store, sweep: int | None) -> Results:
     )
 
 
-def _axis(stored: dict[str, Any]) -> Axis:
+def _axis(stored: dict[str, Any]) -> ReportAxis:
     labels = tuple(one_line(label) for label in stored["labels"])
     if not stored["unit"]:
-        return Axis(one_line(stored["name"]), stored["column"], labels, (), "")
+        return ReportAxis(one_line(stored["name"]), stored["column"], labels, (), "")
     # The unit as it was written, where all values have the same; otherwise metres or radians.
     found = [QUANTITY.fullmatch(label.strip()) for label in labels]
     units = {(one[2] or "").strip() for one in found if one is not None}
@@ -151,10 +151,10 @@ def _axis(stored: dict[str, Any]) -> Axis:
     if len(units) == 1 and all(found):
         unit = units.pop()
         numbers = tuple(float(exact_number(one[1])) for one in found if one is not None)
-    return Axis(one_line(stored["name"]), stored["column"], labels, numbers, unit)
+    return ReportAxis(one_line(stored["name"]), stored["column"], labels, numbers, unit)
 
 
-def partly_open(results: Results, symbol: str) -> NDArray[np.bool_]:
+def partly_open(results: ReportedSweep, symbol: str) -> NDArray[np.bool_]:
     """Rows of the frame (rows,) in which some of a quantity's values are undetermined, so that
     others stand for all.
     """
@@ -169,7 +169,7 @@ def one_line(text: object) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())
 
 
-def criterion(results: Results) -> tuple[str, str] | None:
+def criterion(results: ReportedSweep) -> tuple[str, str] | None:
     """Column of the average that cells are judged by, and its quantity; None where none is
     recorded.
     """
@@ -180,7 +180,7 @@ def criterion(results: Results) -> tuple[str, str] | None:
     return None
 
 
-def best_and_worst(results: Results) -> tuple[int, ...]:
+def best_and_worst(results: ReportedSweep) -> tuple[int, ...]:
     """The cell with the smallest average uncertainty, and that with the largest; those that leave
     less open come first.
 
@@ -191,7 +191,7 @@ def best_and_worst(results: Results) -> tuple[int, ...]:
     return tuple(dict.fromkeys((int(cells[0]), int(cells[-1])))) if len(rows) else ()
 
 
-def ranked(results: Results) -> Integers:
+def ranked(results: ReportedSweep) -> Integers:
     """Rows of the cells that are done, best first: those that leave less open, then of smaller
     average uncertainty.
     """
@@ -222,7 +222,7 @@ def cell_list(cells: Iterable[int], most: int = 12) -> str:
     return ", ".join(told) + (f" and {more} more" if more else "")
 
 
-def common_values(results: Results, cells: Sequence[int]) -> str:
+def common_values(results: ReportedSweep, cells: Sequence[int]) -> str:
     """Values of axes that a set of cells has and no other cell: what tells it from the others, if
     anything does.
     """

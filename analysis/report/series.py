@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..sweeps.columns import symbol_column
 from .measures import Measure, trial_symbols, uncertainty_measures
-from .results import Axis, Results, partly_open
+from .results import ReportAxis, ReportedSweep, partly_open
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ MOST_LINES, MOST_PLACES = 6, 24
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class SeriesLine:
     """Values along an axis; `low` and `high` their range where they are medians over several cells.
 
     `actual` and `error` are what Monte Carlo makes of it and its standard error, empty where no
@@ -42,21 +42,21 @@ class Panel:
     """Lines of one measure."""
 
     measure: Measure
-    lines: tuple[Line, ...]
+    lines: tuple[SeriesLine, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Plot:
     """Average and maximum of a quantity against an axis; `note` says what the lines are."""
 
-    axis: Axis
+    axis: ReportAxis
     symbol: str
     unit: str
     panels: tuple[Panel, ...]
     note: str
 
 
-def plots(results: Results) -> list[Plot]:
+def plots(results: ReportedSweep) -> list[Plot]:
     """A plot for each axis with numbers and each quantity of one unit."""
     measures = [
         m
@@ -78,7 +78,7 @@ def plots(results: Results) -> list[Plot]:
     return found
 
 
-def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) -> Plot:
+def _plot(results: ReportedSweep, k: int, symbol: str, measures: Sequence[Measure]) -> Plot:
     axis = results.axes[k]
     done = results.done
     others = [i for i in range(len(results.axes)) if i != k]
@@ -105,7 +105,7 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
                 )
                 empty = np.zeros(0)
                 here = (actual[chosen], error[chosen]) if len(actual) else (empty, empty)
-                lines.append(Line(words, x, y, empty, empty, *here))
+                lines.append(SeriesLine(words, x, y, empty, empty, *here))
         else:
             lines.append(_median(axis, places, groups, values))
         panels.append(Panel(measure, tuple(lines)))
@@ -121,7 +121,7 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
     return Plot(axis, symbol, measures[0].unit, tuple(panels), note)
 
 
-def _places(axis: Axis, places: NDArray[np.int64]) -> tuple[NDArray[np.int64] | None, str]:
+def _places(axis: ReportAxis, places: NDArray[np.int64]) -> tuple[NDArray[np.int64] | None, str]:
     """Groups of neighbouring values by index, where there are too many to show each; None where
     there are not.
     """
@@ -136,8 +136,8 @@ def _places(axis: Axis, places: NDArray[np.int64]) -> tuple[NDArray[np.int64] | 
 
 
 def _median(
-    axis: Axis, places: NDArray[np.int64], groups: NDArray[np.int64] | None, values: Floats
-) -> Line:
+    axis: ReportAxis, places: NDArray[np.int64], groups: NDArray[np.int64] | None, values: Floats
+) -> SeriesLine:
     """Median and range at each place."""
     import pandas
 
@@ -155,10 +155,12 @@ def _median(
         }
     ).sort_values("x")
     x, y, low, high = (found[name].to_numpy(float) for name in ("x", "y", "low", "high"))
-    return Line("median", x, y, low, high, np.zeros(0), np.zeros(0))
+    return SeriesLine("median", x, y, low, high, np.zeros(0), np.zeros(0))
 
 
-def _actual(results: Results, measure: Measure, done: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _actual(
+    results: ReportedSweep, measure: Measure, done: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
     """What Monte Carlo makes of an average, and its standard error; nothing where there is none.
 
     It is the average times the ratio of actual to linearised errors: where Monte Carlo follows a

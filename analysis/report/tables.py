@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from ..montecarlo.comparison_tables import with_error
-from ..montecarlo.figures import Figure
-from ..results.formatting import number, percent
-from ..results.table import Block, Entry, Row, Table
+from ..montecarlo.figures import MonteCarloEstimate
+from ..presentation.formatting import number, percent
+from ..presentation.table import Block, Entry, Row, Table
 from ..sweeps.columns import symbol_column
 from .measures import (
     Measure,
@@ -17,7 +17,7 @@ from .measures import (
     trial_measures,
     uncertainty_measures,
 )
-from .results import Results, criterion, partly_open, ranked
+from .results import ReportedSweep, criterion, partly_open, ranked
 
 DIGITS = 3
 
@@ -32,7 +32,7 @@ UNREADABLE = "unreadable"
 STAR = "*"
 
 
-def report_tables(results: Results) -> tuple[Table, ...]:
+def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
     """All tables of figures: the uncertainties and, where trials were made, those of Monte
     Carlo.
     """
@@ -61,7 +61,7 @@ def report_tables(results: Results) -> tuple[Table, ...]:
     return tuple(found)
 
 
-def _best(results: Results) -> list[Table]:
+def _best(results: ReportedSweep) -> list[Table]:
     """The best cells first, where cells do not stand beside each other anyway."""
     judged = criterion(results)
     if judged is None:
@@ -73,7 +73,7 @@ def _best(results: Results) -> list[Table]:
     return [_below(results, "best", "Best cells", measures, (note,), rows)] if rows else []
 
 
-def _is_beside(results: Results) -> bool:
+def _is_beside(results: ReportedSweep) -> bool:
     """Whether cells fit beside each other: one axis as columns, another as blocks."""
     counts = [len(axis.labels) for axis in results.axes]
     return (
@@ -85,7 +85,7 @@ def _is_beside(results: Results) -> bool:
 
 
 def _table(
-    results: Results,
+    results: ReportedSweep,
     name: str,
     caption: str,
     measures: Sequence[Measure],
@@ -98,7 +98,11 @@ def _table(
 
 
 def _beside(
-    results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]
+    results: ReportedSweep,
+    name: str,
+    caption: str,
+    measures: Sequence[Measure],
+    notes: tuple[str, ...],
 ) -> Table:
     """A column for each value of the last axis, a block for each of the first where there are
     two.
@@ -126,7 +130,7 @@ def _beside(
 
 
 def _below(
-    results: Results,
+    results: ReportedSweep,
     name: str,
     caption: str,
     measures: Sequence[Measure],
@@ -151,7 +155,7 @@ def _below(
     return Table(name, caption, headings, columns, (Block("", tuple(found)),), notes=notes)
 
 
-def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> Entry:
+def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None) -> Entry:
     if row is None:
         text = UNREADABLE if cell in results.found.unreadable else NOT_DONE
         return Entry(text, None, cell, measure.figure)
@@ -164,7 +168,9 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
     if measure.is_count:
         text = "-" if math.isnan(value) else f"{value:.0f}"
     elif measure.error:
-        text = with_error(Figure(value, results.value(measure.error, row)), measure.factor)
+        text = with_error(
+            MonteCarloEstimate(value, results.value(measure.error, row)), measure.factor
+        )
     elif measure.is_share:
         # Never rounded up: what is told to be all is all.
         text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
@@ -179,7 +185,7 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
     return Entry(text, value, cell, measure.figure)
 
 
-def _is_open(results: Results, measure: Measure, row: int) -> bool:
+def _is_open(results: ReportedSweep, measure: Measure, row: int) -> bool:
     """Whether the observations of a cell leave open all that a measure tells of."""
     column = f"{symbol_column(measure.symbol)}_undetermined"
     return column in results.frame and results.value(column, row) > 0

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .results import Results, cell_list, common_values
+from .results import ReportedSweep, cell_list, common_values
 
 # Groups that are told, and lines of each.
 MOST_GROUPS, MOST_LINES = 30, 8
@@ -16,7 +16,7 @@ AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?= (um|urad|ppm)\b)")
 
 
 @dataclass(frozen=True)
-class Group:
+class VerdictGroup:
     """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, less
     `more` of them.
     """
@@ -31,10 +31,10 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Groups:
+class VerdictGroups:
     """Groups in the order of their first cells; `more` are left out."""
 
-    shown: tuple[Group, ...]
+    shown: tuple[VerdictGroup, ...]
     more: int = 0
 
     @property
@@ -49,10 +49,10 @@ NOT = "not "
 Told = tuple[str, tuple[str, ...]]
 
 
-def ranks(results: Results) -> Groups:
+def ranks(results: ReportedSweep) -> VerdictGroups:
     """Cells by rank deficiency and by what is undetermined."""
     if "rank_deficiency" not in results.frame:
-        return Groups(())
+        return VerdictGroups(())
     done = results.done
     columns = (
         results.frame[name].to_numpy()[done] for name in ("cell", "rank_deficiency", "as_expected")
@@ -67,7 +67,7 @@ def ranks(results: Results) -> Groups:
     return _told(results, found)
 
 
-def weak(results: Results) -> Groups:
+def weak(results: ReportedSweep) -> VerdictGroups:
     """Cells by what is weakly determined."""
     found: dict[Told, list[int]] = {}
     for cell, texts in results.texts.items():
@@ -78,7 +78,7 @@ def weak(results: Results) -> Groups:
     return _told(results, found)
 
 
-def flags(results: Results) -> Groups:
+def flags(results: ReportedSweep) -> VerdictGroups:
     """Cells by what Monte Carlo finds different from linear theory, and by why there is no Monte
     Carlo.
     """
@@ -94,7 +94,7 @@ def flags(results: Results) -> Groups:
     return _told(results, found)
 
 
-def failures(results: Results) -> Groups:
+def failures(results: ReportedSweep) -> VerdictGroups:
     """Failed cells by reason."""
     found: dict[Told, list[int]] = {}
     failed = results.frame[results.frame["status"] == "failed"]
@@ -109,7 +109,7 @@ def failures(results: Results) -> Groups:
     return _told(results, found)
 
 
-def _told(results: Results, found: Mapping[Told, list[int]]) -> Groups:
+def _told(results: ReportedSweep, found: Mapping[Told, list[int]]) -> VerdictGroups:
     """Groups of cells of which the same is told, those together that differ in amounts only."""
     alike: dict[Told, tuple[Told, list[int]]] = {}
     for (heading, lines), cells in found.items():
@@ -119,16 +119,20 @@ def _told(results: Results, found: Mapping[Told, list[int]]) -> Groups:
     groups = [
         _group(results, *told, sorted(cells), len(found) > len(alike)) for told, cells in some
     ]
-    return Groups(tuple(groups), max(len(alike) - MOST_GROUPS, 0))
+    return VerdictGroups(tuple(groups), max(len(alike) - MOST_GROUPS, 0))
 
 
 def _group(
-    results: Results, heading: str, lines: tuple[str, ...], cells: list[int], with_example: bool
-) -> Group:
+    results: ReportedSweep,
+    heading: str,
+    lines: tuple[str, ...],
+    cells: list[int],
+    with_example: bool,
+) -> VerdictGroup:
     values = results.label(cells[0]) if len(cells) == 1 else common_values(results, cells)
     if with_example and lines and len(cells) > 1:
         heading += f", with the amounts of cell {cells[0]}"
     shown, more = lines[:MOST_LINES], max(len(lines) - MOST_LINES, 0)
-    return Group(
+    return VerdictGroup(
         heading, cell_list(cells), values, len(cells), shown, f"{NOT}as expected" in heading, more
     )

@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from ballplate.simulator.computing.steps import Report, unreported
 
-from ..estimators.distances import Comparison, compare_estimators, share_below
-from ..running.steps import Report, unreported
+from ..estimators.distances import EstimatorComparison, compare_estimators, share_below
 from ..uncertainty.summaries import Quantity
 from .published import (
     REPEATABILITY,
     SUM_OF_SQUARES,
     SYMBOLS,
-    Column,
     Difference,
     Document,
     Erratum,
     Illegible,
-    Progress,
+    PublishedColumn,
+    PublishedIterations,
     RankStatement,
     Remark,
     Reservation,
@@ -40,7 +40,7 @@ from .shipped import (
 
 
 @dataclass(frozen=True)
-class Figure:
+class ComparedFigure:
     """A published figure and ours, in metres or radians.
 
     `ratio` is published over ours, `adjusted` the same after the column's common factor, which has
@@ -66,10 +66,10 @@ class Figure:
 class ComparedColumn:
     """A column of a table with its common factor, which has to lie `within` limits."""
 
-    column: Column
+    column: PublishedColumn
     factor: float
     within: tuple[float, float]
-    figures: tuple[Figure, ...]
+    figures: tuple[ComparedFigure, ...]
 
     @property
     def factor_agrees(self) -> bool:
@@ -170,7 +170,7 @@ class ProgressLine:
 class ComparedProgress:
     """Iterations of one fit; whether it settled within the number that is published."""
 
-    progress: Progress
+    progress: PublishedIterations
     settled: bool
     iterations: int
     lines: tuple[ProgressLine, ...]
@@ -189,7 +189,7 @@ class ComparedDifference:
     """
 
     difference: Difference
-    comparison: Comparison
+    comparison: EstimatorComparison
     limit: float
 
     @property
@@ -373,7 +373,7 @@ def common_factor(ratios: Iterable[float]) -> float:
     return float(np.median(values)) if values else math.nan
 
 
-def compare_column(document: Document, shipped: Shipped, column: Column) -> ComparedColumn:
+def compare_column(document: Document, shipped: Shipped, column: PublishedColumn) -> ComparedColumn:
     """Compare the figures of one column after its common factor, in which exceptions have no
     part.
     """
@@ -390,7 +390,7 @@ def compare_column(document: Document, shipped: Shipped, column: Column) -> Comp
     for symbol, ratio in ratios.items():
         exception = exceptions[symbol]
         figures.append(
-            Figure(
+            ComparedFigure(
                 symbol,
                 quantities[symbol].unit,
                 column.figures[symbol],
@@ -406,7 +406,7 @@ def compare_column(document: Document, shipped: Shipped, column: Column) -> Comp
     return ComparedColumn(column, factor, of_factor, tuple(figures))
 
 
-def _ratios(column: Column, quantities: dict[str, Quantity]) -> dict[str, float]:
+def _ratios(column: PublishedColumn, quantities: dict[str, Quantity]) -> dict[str, float]:
     return {
         symbol: value / getattr(quantities[symbol], column.statistic)
         for symbol, value in column.figures.items()
@@ -468,7 +468,9 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
     return ComparedErratum(erratum, tuple(lines), stated.limits.figure)
 
 
-def compare_progress(document: Document, shipped: Shipped, progress: Progress) -> ComparedProgress:
+def compare_progress(
+    document: Document, shipped: Shipped, progress: PublishedIterations
+) -> ComparedProgress:
     """Compare the iterations of a fit of exact readings."""
     limits = document.statements.limits
     found = fitted_exactly(shipped_experiment(shipped, progress.design))

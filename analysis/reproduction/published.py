@@ -61,7 +61,7 @@ class Reservation(Settings):
     statistic: Statistic | None = None
     open: bool = False
 
-    def concerns(self, column: Column, quantity: str) -> bool:
+    def concerns(self, column: PublishedColumn, quantity: str) -> bool:
         """Whether a figure of a column is among them."""
         return (
             column.table in self.tables
@@ -115,7 +115,7 @@ class Remark(Settings):
     at_most: float | None = None
 
 
-class Progress(Settings):
+class PublishedIterations(Settings):
     """Length of step and sum of squares, in square metres with weight 1 for a reading, of
     Gauss-Newton iterations.
 
@@ -157,12 +157,12 @@ class Statements(Settings):
     illegible: tuple[Illegible, ...]
     ranks: tuple[RankStatement, ...]
     remarks: tuple[Remark, ...]
-    convergence: tuple[Progress, ...]
+    convergence: tuple[PublishedIterations, ...]
     differences: tuple[Difference, ...]
 
 
 @dataclass(frozen=True)
-class Column:
+class PublishedColumn:
     """One column of a printed table: the legible ones of U1 to U6, in metres and radians, of one
     design.
     """
@@ -183,7 +183,7 @@ class Document:
     """A published document's statements and the columns of its tables."""
 
     statements: Statements
-    columns: tuple[Column, ...]
+    columns: tuple[PublishedColumn, ...]
 
 
 def case_of(design: str) -> str:
@@ -219,5 +219,7 @@ def npl() -> Document:
     ):
         statistic: Statistic = "maximum" if row["statistic"] == "maximum" else "average"
         figures = {symbol: float(row[symbol]) for symbol in SYMBOLS if row[symbol]}
-        columns.append(Column(row["table"], row["experiment"], row["design"], statistic, figures))
+        columns.append(
+            PublishedColumn(row["table"], row["experiment"], row["design"], statistic, figures)
+        )
     return Document(statements, tuple(columns))

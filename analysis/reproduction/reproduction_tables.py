@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..results.formatting import aligned, as_data, number, picked
+from ..presentation.formatting import aligned, as_data, number, picked
 from .compare import (
     ComparedColumn,
     ComparedErratum,
+    ComparedFigure,
     ComparedProgress,
     ComparedRemark,
-    Figure,
     PlacedFigure,
     ProgressLine,
     Reproduction,
@@ -61,10 +61,10 @@ Block = Heading | Paragraph | Grid
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
-def reproduction_lines(found: Reproduction) -> list[str]:
+def reproduction_lines(reproduction: Reproduction) -> list[str]:
     """A reproduction as lines of text, tables being no wider than 80 characters."""
     lines: list[str] = []
-    for block in _blocks(found):
+    for block in _blocks(reproduction):
         if isinstance(block, Heading):
             lines += [*([""] if lines else []), block.text]
         elif isinstance(block, Paragraph):
@@ -75,10 +75,10 @@ def reproduction_lines(found: Reproduction) -> list[str]:
     return [line for k, line in enumerate(lines) if line or any(lines[k + 1 : k + 2])]
 
 
-def reproduction_markdown(found: Reproduction) -> str:
+def reproduction_markdown(reproduction: Reproduction) -> str:
     """A reproduction as Markdown, with the assumptions that each figure rests on."""
     parts = []
-    for block in _blocks(found, with_assumptions=True):
+    for block in _blocks(reproduction, with_assumptions=True):
         if isinstance(block, Heading):
             parts.append(f"{'#' * block.level} {block.text}")
         elif isinstance(block, Paragraph):
@@ -95,9 +95,9 @@ def reproduction_markdown(found: Reproduction) -> str:
     return "\n\n".join(parts)
 
 
-def _blocks(found: Reproduction, with_assumptions: bool = False) -> list[Block]:
-    stated = found.document.statements
-    shown = {assumption for section in found.sections for assumption in section.rests_on}
+def _blocks(reproduction: Reproduction, with_assumptions: bool = False) -> list[Block]:
+    stated = reproduction.document.statements
+    shown = {assumption for section in reproduction.sections for assumption in section.rests_on}
     blocks: list[Block] = [
         Heading(
             1, f"{stated.title}: published figures and those computed from the shipped designs"
@@ -113,9 +113,9 @@ def _blocks(found: Reproduction, with_assumptions: bool = False) -> list[Block]:
     blocks += [
         Paragraph(f"{one.key}: {one.text}.") for one in stated.assumptions if one.key in shown
     ]
-    for section in found.sections:
-        blocks += _section_blocks(found.document, section, with_assumptions)
-    return blocks + _exception_blocks(found) + _summary(found)
+    for section in reproduction.sections:
+        blocks += _section_blocks(reproduction.document, section, with_assumptions)
+    return blocks + _exception_blocks(reproduction) + _summary(reproduction)
 
 
 def _section_blocks(document: Document, section: Section, with_assumptions: bool) -> list[Block]:
@@ -232,24 +232,24 @@ def _figures(columns: Sequence[ComparedColumn], with_assumptions: bool) -> Grid:
     return _grid(head + (["rests on"] if with_assumptions else []), rows, 4)
 
 
-def _note(figure: Figure) -> str:
+def _note(figure: ComparedFigure) -> str:
     words = [] if figure.agrees else ["DIFFERS"]
     if figure.exception is not None:
         words.append(f"{'open' if figure.exception.open else 'see'} {figure.exception.key}")
     return ", ".join(words)
 
 
-def _remark(one: ComparedRemark) -> str:
-    ratios = f"{number(one.least, 3)} to {number(one.largest, 3)}"
-    if number(one.least, 3) == number(one.largest, 3):
-        ratios = number(one.least, 3)
-    names = ", ".join(one.remark.quantities)
-    against = " over the repeatability" if _over_repeatability(one.remark) else ""
-    verdict = "agrees" if one.agrees else "DIFFERS"
-    what = "" if one.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
+def _remark(compared: ComparedRemark) -> str:
+    ratios = f"{number(compared.least, 3)} to {number(compared.largest, 3)}"
+    if number(compared.least, 3) == number(compared.largest, 3):
+        ratios = number(compared.least, 3)
+    names = ", ".join(compared.remark.quantities)
+    against = " over the repeatability" if _over_repeatability(compared.remark) else ""
+    verdict = "agrees" if compared.agrees else "DIFFERS"
+    what = "" if compared.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
     return (
-        f"Said: {one.remark.text}. Ratio of {what}{names}{against}: {ratios},"
-        f" {_wanted(one.remark)}; {verdict}."
+        f"Said: {compared.remark.text}. Ratio of {what}{names}{against}: {ratios},"
+        f" {_wanted(compared.remark)}; {verdict}."
     )
 
 
@@ -266,14 +266,14 @@ def _wanted(remark: Remark) -> str:
     return "has to be " + " and ".join(words)
 
 
-def _erratum(one: ComparedErratum) -> list[Block]:
-    verdict = "confirmed" if one.agrees else "NOT confirmed"
+def _erratum(compared: ComparedErratum) -> list[Block]:
+    verdict = "confirmed" if compared.agrees else "NOT confirmed"
     blocks: list[Block] = [
-        Paragraph(f"Erratum in Table {one.erratum.table}: {one.erratum.text}; {verdict}.")
+        Paragraph(f"Erratum in Table {compared.erratum.table}: {compared.erratum.text}; {verdict}.")
     ]
-    for statistic in one.erratum.statistics:
+    for statistic in compared.erratum.statistics:
         rows = []
-        for line in one.lines:
+        for line in compared.lines:
             if line.statistic != statistic:
                 continue
             for words, design, ratios, deviation in (
@@ -286,8 +286,8 @@ def _erratum(one: ComparedErratum) -> list[Block]:
     return blocks
 
 
-def _progress(one: ComparedProgress) -> list[Block]:
-    progress = one.progress
+def _progress(compared: ComparedProgress) -> list[Block]:
+    progress = compared.progress
     text = f"Table {progress.table}, {case_of(progress.design)}: "
     if progress.settles is None:
         text += f"published with {len(progress.steps)} iterations"
@@ -295,8 +295,8 @@ def _progress(one: ComparedProgress) -> list[Block]:
         text += f"published as {'settling' if progress.settles else 'not settling'}"
         text += f" within {len(progress.steps)} iterations" if progress.steps else ""
     text += (
-        f", ours {'settles' if one.settled else 'does not'} ({one.iterations} in all);"
-        f" {_verdict(one)}."
+        f", ours {'settles' if compared.settled else 'does not'} ({compared.iterations} in all);"
+        f" {_verdict(compared)}."
     )
     if progress.reason:
         text += f" Figures without a limit: {progress.reason}."
@@ -308,7 +308,7 @@ def _progress(one: ComparedProgress) -> list[Block]:
             _wanted_of(line),
             yes(line.agrees),
         )
-        for line in one.lines
+        for line in compared.lines
     ]
     return [
         Paragraph(text),
@@ -320,8 +320,8 @@ def _figure(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.3e}"
 
 
-def _verdict(one: ComparedProgress) -> str:
-    return "agrees" if one.agrees else "DIFFERS"
+def _verdict(compared: ComparedProgress) -> str:
+    return "agrees" if compared.agrees else "DIFFERS"
 
 
 def _wanted_of(line: ProgressLine) -> str:
@@ -381,23 +381,23 @@ def _told(section: Section) -> Grid:
     return _grid(("case", "statistic", *SYMBOLS), rows, 2)
 
 
-def _excepted(found: Reproduction) -> list[tuple[Reservation, list[Figure]]]:
+def _excepted(reproduction: Reproduction) -> list[tuple[Reservation, list[ComparedFigure]]]:
     """Exceptions that figures of the sections fall under, open ones first, each with its
     figures.
     """
     figures = [
-        f for section in found.sections for column in section.columns for f in column.figures
+        f for section in reproduction.sections for column in section.columns for f in column.figures
     ]
     pairs = [
         (one, [f for f in figures if f.exception == one])
-        for one in sorted(found.document.statements.exceptions, key=lambda one: not one.open)
+        for one in sorted(reproduction.document.statements.exceptions, key=lambda one: not one.open)
     ]
     return [(one, under) for one, under in pairs if under]
 
 
-def _exception_blocks(found: Reproduction) -> list[Block]:
+def _exception_blocks(reproduction: Reproduction) -> list[Block]:
     blocks: list[Block] = []
-    excepted = _excepted(found)
+    excepted = _excepted(reproduction)
     for title, is_open in (("Open differences", True), ("Exceptions with a reason", False)):
         chosen = [(one, under) for one, under in excepted if one.open == is_open]
         if chosen:
@@ -418,8 +418,8 @@ def _exception_blocks(found: Reproduction) -> list[Block]:
     return blocks
 
 
-def _tables(one: Reservation) -> str:
-    *others, last = one.tables
+def _tables(reservation: Reservation) -> str:
+    *others, last = reservation.tables
     return f"Tables {', '.join(others)} and {last}" if others else f"Table {last}"
 
 
@@ -427,9 +427,9 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _summary(found: Reproduction) -> list[Block]:
+def _summary(reproduction: Reproduction) -> list[Block]:
     def every(part: str) -> list[Any]:
-        return [one for section in found.sections for one in getattr(section, part)]
+        return [one for section in reproduction.sections for one in getattr(section, part)]
 
     columns = every("columns")
     figures = [figure for column in columns for figure in column.figures]
@@ -445,12 +445,12 @@ def _summary(found: Reproduction) -> list[Block]:
         "differences of estimators": [p.agrees for one in every("differences") for p in one.parts],
     }
     parts = [(words, f"{sum(are)} of {len(are)}") for words, are in counted.items() if are]
-    unexplained = sum(len(under) for one, under in _excepted(found) if one.open)
+    unexplained = sum(len(under) for one, under in _excepted(reproduction) if one.open)
     if unexplained:
         parts.append(("open differences, unexplained", f"{unexplained} figures"))
     text = (
         "Everything compared agrees within what is stated."
-        if found.agrees
+        if reproduction.agrees
         else "NOT everything compared agrees."
     )
     blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), Paragraph(text)]
@@ -466,25 +466,26 @@ def _summary(found: Reproduction) -> list[Block]:
     return blocks
 
 
-def reproduction_data(found: Reproduction) -> dict[str, Any]:
+def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
     """A reproduction as plain data in metres and radians; what is undetermined is None."""
-    stated = found.document.statements
-    shown = {key for section in found.sections for key in section.rests_on}
+    stated = reproduction.document.statements
+    shown = {key for section in reproduction.sections for key in section.rests_on}
     data = {
         "document": stated.title,
-        "agrees": found.agrees,
+        "agrees": reproduction.agrees,
         "limits": stated.limits.model_dump(),
         "assumptions": {one.key: one.text for one in stated.assumptions if one.key in shown},
         "exceptions": {
             one.key: {**picked(one, "reason", "open", "within"), "figures": len(under)}
-            for one, under in _excepted(found)
+            for one, under in _excepted(reproduction)
         },
-        "sections": [_section_data(section) for section in found.sections],
+        "sections": [_section_data(section) for section in reproduction.sections],
     }
     plain_data: dict[str, Any] = as_data(data)
     return plain_data
 
 
+# In one piece: one mapping, in the form in which the JSON has it.
 def _section_data(section: Section) -> dict[str, Any]:
     return {
         "section": section.name,
@@ -557,9 +558,9 @@ def _section_data(section: Section) -> dict[str, Any]:
     }
 
 
-def _figure_data(one: ComparedColumn, figure: Figure) -> dict[str, Any]:
+def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> dict[str, Any]:
     return {
-        **picked(one.column, "table", "statistic", "case", "design"),
+        **picked(column.column, "table", "statistic", "case", "design"),
         **picked(figure, "quantity", "unit", "published", "ours", "ratio", "within", "agrees"),
         "ratio_after_factor": figure.adjusted,
         "exception": figure.exception.key if figure.exception else None,

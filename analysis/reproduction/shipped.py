@@ -18,7 +18,7 @@ from ..results.fit import Fit
 from ..results.prediction import Prediction
 from ..results.study import fit, predict
 from ..uncertainty.summaries import Quantity
-from .quantities import tabulated_quantities
+from .published_quantities import tabulated_quantities
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def fitted_exactly(experiment: Experiment) -> Fit:
     return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
 
 
-def sums_of_squares(found: Fit) -> list[float]:
+def sums_of_squares(fit: Fit) -> list[float]:
     """S^2 of each iteration in square metres, with weight 1 for a reading."""
-    scale = float(found.design.repeatability[0]) ** 2
-    return [scale * iteration.sum_of_squares for iteration in found.solution.iterations]
+    scale = float(fit.design.repeatability[0]) ** 2
+    return [scale * iteration.sum_of_squares for iteration in fit.solution.iterations]

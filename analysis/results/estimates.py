@@ -10,15 +10,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
 from ballplate.simulator.estimation.corrections import corrected_points, correction_rows
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import AXIS_NAMES, pose_parameter_names
-from ballplate.simulator.geometry.motions import vector_from_rotation
+from ballplate.simulator.geometry.motions import (
+    AXIS_NAMES,
+    pose_parameter_names,
+    vector_from_rotation,
+)
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
-from ballplate.simulator.numerics.threads import single_threaded
 
 from ..uncertainty.quantities import task_distances
 
@@ -155,6 +158,7 @@ def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
     return [one.name if times[one.name] == 1 else f"{one.kind}: {one.name}" for one in functions]
 
 
+# In one piece: names, values and derivatives of each kind of parameter are added side by side.
 @single_threaded
 def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunctions:
     """All that a fit estimates: the machine, poses, offsets, lengths of standards and balls;
@@ -251,11 +255,13 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     )
 
 
-def parameter_estimates(found: EstimatedFunctions, sigma: float) -> tuple[ParameterEstimate, ...]:
+def parameter_estimates(
+    functions: EstimatedFunctions, sigma: float
+) -> tuple[ParameterEstimate, ...]:
     """The estimates among functions, whose stated uncertainties `sigma` multiplies."""
-    uncertainties = found.uncertainties()
-    values = np.where(np.isnan(uncertainties), np.nan, found.values).tolist()
-    told = zip(found.functions, values, (sigma * uncertainties).tolist(), strict=True)
+    uncertainties = functions.uncertainties()
+    values = np.where(np.isnan(uncertainties), np.nan, functions.values).tolist()
+    told = zip(functions.functions, values, (sigma * uncertainties).tolist(), strict=True)
     return tuple(
         ParameterEstimate(one.name, value, uncertainty, one.unit, one.kind)
         for one, value, uncertainty in told

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
@@ -19,8 +19,10 @@ from ballplate.simulator.readings.reading_files import far_outside
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
+from ..presentation.formatting import SHOWN, aligned, finite, number, to_uncertainty
+from ..presentation.result import Result
+from ..presentation.vectors import Vectors, draw_vectors
 from ..rank.verdict import Verdict
-from ..report.vectors import Vectors, draw_vectors
 from ..uncertainty.summaries import Quantity
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
@@ -32,7 +34,6 @@ from .estimates import (
     estimated_functions,
     labels,
 )
-from .formatting import SHOWN, aligned, finite, number, to_uncertainty
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -48,7 +49,6 @@ from .parts import (
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals
-from .result import Result
 
 if TYPE_CHECKING:
     import pandas

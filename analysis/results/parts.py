@@ -6,14 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ballplate.simulator.numerics.rounding import printable
+from ballplate.simulator.computing.rounding import printable
 
-from ..rank.verdict import GREAT, Verdict
-from ..uncertainty.scale import Scale
-from ..uncertainty.summaries import Quantity
-from ..uncertainty.tasks import TaskUncertainty, is_determined
-from .adjustments import ARCSECOND, Adjustment
-from .formatting import (
+from ..presentation.formatting import (
     aligned,
     finite,
     number,
@@ -22,6 +17,11 @@ from .formatting import (
     to_uncertainty,
     uncertainty_words,
 )
+from ..rank.verdict import GREAT, Verdict
+from ..uncertainty.scale import Scale
+from ..uncertainty.summaries import Quantity
+from ..uncertainty.tasks import TaskUncertainty, is_determined
+from .adjustments import ARCSECOND, Adjustment
 from .plates import PlateCoordinates
 
 # Balls of a plate that a table has room for.
@@ -61,7 +61,7 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
         if quantity.within_target is not None:
             by = uncertainty_words(quantity.coverage_factor)
             lines.append(
-                f"within the target accuracy ({by}): {percent(quantity.within_target)} of"
+                f"within the target uncertainty ({by}): {percent(quantity.within_target)} of"
                 f" {quantity.symbol}"
             )
     return lines
@@ -164,29 +164,29 @@ def _lengths_words(lengths: Quantity) -> str:
 
 
 def target_lines(lengths: Quantity | None) -> list[str]:
-    """The share of lengths within the target accuracy, with U6, as a line of text; none where
+    """The share of lengths within the target uncertainty, with U6, as a line of text; none where
     nothing is compared.
     """
     if lengths is None or lengths.within_target is None:
         return []
     by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
     return [
-        f"within the target accuracy ({by}): {share} of {lengths.count} lengths;"
+        f"within the target uncertainty ({by}): {share} of {lengths.count} lengths;"
         f" {_lengths_words(lengths)}"
     ]
 
 
-def scale_lines(found: Scale | None) -> list[str]:
+def scale_lines(scale: Scale | None) -> list[str]:
     """What carries scale as lines of text, and a warning where it rests on offsets that are held
     exact.
     """
-    if found is None:
+    if scale is None:
         return []
-    if all(one.without is None for one in found.carriers):
+    if all(one.without is None for one in scale.carriers):
         # How well the other parameters are known says nothing of how right the scales are.
-        return [f"scale is that of {' and '.join(one.words for one in found.carriers)}"]
+        return [f"scale is that of {' and '.join(one.words for one in scale.carriers)}"]
     told = []
-    for one in found.carriers:
+    for one in scale.carriers:
         if one.without is None:
             told.append(one.words)
             continue
@@ -194,12 +194,12 @@ def scale_lines(found: Scale | None) -> list[str]:
             "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
         )
         told.append(f"{one.words} ({without} without)")
-    lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm from {' and '.join(told)}"]
-    if not found.rests_on_offsets:
+    lines = [f"scale known to {number(1e6 * scale.uncertainty, 3)} ppm from {' and '.join(told)}"]
+    if not scale.rests_on_offsets:
         return lines
     warning = "warning: the scale rests on probe offsets that are held exact"
-    if found.loosened is not None:
-        loose = found.loosened
+    if scale.loosened is not None:
+        loose = scale.loosened
         average, most, before = (
             number(1e6 * value) for value in (loose.average, loose.maximum, loose.before)
         )
@@ -214,18 +214,18 @@ def scale_lines(found: Scale | None) -> list[str]:
     ]
 
 
-def scale_data(found: Scale | None) -> dict[str, Any] | None:
+def scale_data(scale: Scale | None) -> dict[str, Any] | None:
     """What carries scale as plain data, relative standard uncertainties, and U6 in metres."""
-    if found is None:
+    if scale is None:
         return None
-    loose = found.loosened
+    loose = scale.loosened
     return {
-        "standard_uncertainty": found.uncertainty,
+        "standard_uncertainty": scale.uncertainty,
         "carried_by": [
             {"text": one.words, "without": None if one.without is None else finite(one.without)}
-            for one in found.carriers
+            for one in scale.carriers
         ],
-        "rests_on_exact_offsets": found.rests_on_offsets,
+        "rests_on_exact_offsets": scale.rests_on_offsets,
         "with_uncertain_offsets": (
             None
             if loose is None
@@ -270,12 +270,12 @@ def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_B
     )
 
 
-def adjustment_lines(found: Sequence[Adjustment]) -> list[str]:
+def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
     """Adjustments as a table of text."""
     rows = [
         ["adjustment", "is off by", "standard uncertainty", "expanded, 95 %", "unit", "what to do"]
     ]
-    for one in found:
+    for one in adjustments:
         shown = ARCSECOND if one.unit == "rad" else 1e-6
         value, u, expanded = (
             number(v / shown)
@@ -293,7 +293,7 @@ def adjustment_lines(found: Sequence[Adjustment]) -> list[str]:
     ]
 
 
-def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
+def adjustment_data(adjustments: Sequence[Adjustment]) -> dict[str, Any]:
     """Adjustments as plain data; what is open is None."""
     return {
         one.name: {
@@ -304,7 +304,7 @@ def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
             "unit": one.unit,
             "words": one.words,
         }
-        for one in found
+        for one in adjustments
     }
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 
 from ..montecarlo.comparison_tables import trials_data, trials_lines
+from ..presentation.pictures import draw_design
+from ..presentation.result import Result
 from ..rank.verdict import Verdict
-from ..report.pictures import draw_design
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity
 from ..uncertainty.tasks import TaskUncertainty
@@ -28,7 +29,6 @@ from .parts import (
     verdict_data,
     verdict_lines,
 )
-from .result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations import Readings
 from ballplate.simulator.estimation.gauss_newton import Solution
@@ -14,7 +15,6 @@ from ballplate.simulator.estimation.observations import (
     reading_weights,
 )
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import comparable
 
 # Residuals that a fit names.
 LARGEST = 10

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.numerics.threads import single_threaded
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
+from ..gross_errors.cause_search import diagnosis
 from ..gross_errors.leftover import too_many_entries
-from ..gross_errors.search import diagnosis
 from ..gross_errors.suspects import Diagnosis
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
@@ -59,7 +59,7 @@ def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
 def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
     """What `predict` finds, less the explanation of the rank, which takes most of its time."""
     at = linearise(lay_out(experiment))
-    found = uncertainties(at, target=experiment.target_accuracy)
+    found = uncertainties(at, target=experiment.target_uncertainty)
     return PlannedUncertainty(at.deficiency, found, task_uncertainties(at))
 
 
@@ -67,7 +67,7 @@ def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
 def _predict(
     experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool
 ) -> Prediction:
-    at, target = linearise(design), experiment.target_accuracy
+    at, target = linearise(design), experiment.target_uncertainty
     judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities: dict[str, Quantity] = {}
     tasks: tuple[TaskUncertainty, ...] = ()
@@ -102,7 +102,7 @@ def fit(
         names = experiment.label, experiment.title
         return Fit(*names, design, observed.x, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
-    judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_accuracy)
+    judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     freedom = design.observations - design.parameter_count + judged.deficiency
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
@@ -117,7 +117,7 @@ def fit(
         scale,
         estimated,
         freedom,
-        uncertainties(at, scale, experiment.target_accuracy),
+        uncertainties(at, scale, experiment.target_uncertainty),
         parameter_estimates(estimated_functions(at, monomials), scale),
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),

@@ -20,8 +20,8 @@ from ballplate.simulator.inputs.yamltree import (
     written,
 )
 
-from .model import Axis, Choice, Unit
-from .settings import AxisSettings
+from .model import Choice, SweepAxis, Unit
+from .sweep_settings import AxisSettings
 from .values import entry_names, label, numeric, of_range, subset_count, subsets
 
 MOST_VALUES = 100_000
@@ -37,7 +37,7 @@ def read_axis(
     trees: dict[str | None, Node],
     variant: str | None,
     problems: Problems,
-) -> Axis | None:
+) -> SweepAxis | None:
     """An axis of the sweep file `root`; what is wrong with it goes to `problems`."""
     here: Steps = ("axes", name)
     given = [key for key in SOURCES if getattr(settings, key) is not None]
@@ -70,7 +70,7 @@ def read_axis(
     return _with_numbers(name, choices, given[0] in ("values", "start"))
 
 
-def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> Axis:
+def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> SweepAxis:
     """The axis, with the choices' values as numbers where all of them are quantities of one
     kind.
     """
@@ -78,11 +78,11 @@ def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> Axis:
     if is_simple:
         found = [numeric(to_python(choice.changes[0][1])) for choice in choices]
     if len({unit for _, unit in found}) != 1 or not found[0][1]:
-        return Axis(name, tuple(choices), "")
+        return SweepAxis(name, tuple(choices), "")
     numbers = [
         replace(choice, value=value) for choice, (value, _) in zip(choices, found, strict=True)
     ]
-    return Axis(name, tuple(numbers), found[0][1])
+    return SweepAxis(name, tuple(numbers), found[0][1])
 
 
 def _key(source: str) -> str:

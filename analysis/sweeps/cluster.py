@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import ballplate.simulator
+from ballplate.simulator.computing.unusable import UnusableError
 
-from ..running.unusable import UnusableError
 from .bundle import Bundle, unpack
 from .execute import Runner
 from .load import load_sweep
 from .local import told
 from .model import Sweep
-from .task import Row, Task, compute, lost
+from .task import CellResult, CellTask, compute, lost
 
 # Tasks that a thread of a worker has waiting, so that it never waits itself.
 WAITING = 4
@@ -85,7 +85,7 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
         )
         raise ClusterError(text) from None
 
-    def run(tasks: Sequence[Task]) -> Iterator[Row]:
+    def run(tasks: Sequence[CellTask]) -> Iterator[CellResult]:
         try:
             yield from _rows(client, sweep, bundle, tasks)
         except (OSError, CancelledError, TimeoutError) as error:
@@ -186,7 +186,9 @@ def code_digest() -> str:
     return found.hexdigest()
 
 
-def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> Iterator[Row]:
+def _rows(
+    client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[CellTask]
+) -> Iterator[CellResult]:
     from distributed import KilledWorker, as_completed
 
     code = code_digest()
@@ -194,7 +196,7 @@ def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> I
     room = WAITING * max(sum(client.nthreads().values()), 1)
     left, under_way, tries = iter(tasks), {}, Counter[tuple[int, int]]()
 
-    def submit(task: Task) -> object:
+    def submit(task: CellTask) -> object:
         future = client.submit(_on_worker, sent[0], code, task, pure=False, retries=0)
         under_way[future.key] = task
         return future
@@ -255,7 +257,7 @@ def _wait(client: Any) -> None:
         ) from None
 
 
-def _on_worker(bundle: Bundle, code: str, task: Task) -> Row:
+def _on_worker(bundle: Bundle, code: str, task: CellTask) -> CellResult:
     if code != code_digest():
         raise OtherVersionError
     folder, source = _unpacked(bundle)

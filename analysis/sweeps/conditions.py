@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .model import Axis, Choice
-from .settings import BoundsSettings
+from .model import Choice, SweepAxis
+from .sweep_settings import BoundsSettings
 from .values import numeric
 
 
-def holds(condition: Any, axis: Axis, choice: Choice) -> bool:
+def holds(condition: Any, axis: SweepAxis, choice: Choice) -> bool:
     """Whether a condition holds for a choice: a value, one of a list, or bounds.
 
     A value is compared as a quantity where it and the axis are such, and otherwise as it is
@@ -33,7 +33,7 @@ def holds(condition: Any, axis: Axis, choice: Choice) -> bool:
     return text == choice.label
 
 
-def _bound(value: object, axis: Axis, otherwise: float) -> float:
+def _bound(value: object, axis: SweepAxis, otherwise: float) -> float:
     if value is None:
         return otherwise
     number, unit = numeric(value)

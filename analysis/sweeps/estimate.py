@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from .model import Sweep
-from .task import Row, Task, compute
+from .task import CellResult, CellTask, compute
 
 # Data sets by which the others are judged.
 SOME = 256
 
 
-def seconds_of(sweep: Sweep) -> tuple[float, list[Row]]:
+def seconds_of(sweep: Sweep) -> tuple[float, list[CellResult]]:
     """Seconds that all cells take in one process, and the rows of the cells that were tried: first,
     middle and last.
     """
@@ -19,12 +19,12 @@ def seconds_of(sweep: Sweep) -> tuple[float, list[Row]]:
     numbers = sorted({0, last // 2, last})
     total, rows = 0.0, []
     for number in numbers:
-        row = compute(replace(sweep, trials=None), Task(number))
+        row = compute(replace(sweep, trials=None), CellTask(number))
         alone = row.seconds
         total += alone
         if sweep.trials is not None and row.status == "done":
             some = min(sweep.trials, SOME)
-            row = compute(replace(sweep, trials=some), Task(number))
+            row = compute(replace(sweep, trials=some), CellTask(number))
             total += max(row.seconds - alone, 0.0) * sweep.trials / some
         rows.append(row)
     return total / len(numbers) * len(sweep.cells), rows

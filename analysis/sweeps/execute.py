@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 
-from ..montecarlo.tally import Tally
+from ..montecarlo.accumulator import Accumulator
 from .fingerprint import METHOD, method_of
 from .model import Sweep
 from .store import Store, add_keys, add_rows, block_tally, keys, statuses
-from .task import KEY_ONLY, Row, Task, blocks_of
+from .task import KEY_ONLY, CellResult, CellTask, blocks_of
 
 # Does tasks, anywhere, and yields their rows as they come.
-Runner = Callable[[Sequence[Task]], Iterator[Row]]
+Runner = Callable[[Sequence[CellTask]], Iterator[CellResult]]
 
 
 # Replicate blocks that are done before the cells that they belong to.
@@ -75,7 +75,7 @@ def run_sweep(
     if {key for key, _ in run.found} - set(run.known.values()):
         # What another sweep of this store has computed needs no second time. Rows of another method
         # give way before the first is computed anew, so that none stand beside one another.
-        unknown = [Task(k, KEY_ONLY) for k in range(run.cells) if k not in run.known]
+        unknown = [CellTask(k, KEY_ONLY) for k in range(run.cells) if k not in run.known]
         fresh = {row.number: row.key for row in runner(unknown)}
         add_keys(store, number, fresh)
         run.known |= fresh
@@ -114,19 +114,19 @@ def _groups(cells: list[int], blocks: int) -> Iterator[list[int]]:
         yield cells[start : start + size]
 
 
-def _waves(run: _Run, cells: list[int], blocks: int) -> Iterator[list[Task]]:
+def _waves(run: _Run, cells: list[int], blocks: int) -> Iterator[list[CellTask]]:
     """Tasks of the blocks that are not done yet, then those of the cells, which take the blocks'
     sums.
     """
     numbers = range(1, blocks + 1)
-    yield [Task(k, block) for k in cells for block in numbers if run.status(k, block) != "done"]
+    yield [CellTask(k, block) for k in cells for block in numbers if run.status(k, block) != "done"]
     sound = [
         k for k in cells if not blocks or all(run.status(k, block) == "done" for block in numbers)
     ]
-    yield [Task(k, 0, _total(run, k, numbers) if blocks else None) for k in sound]
+    yield [CellTask(k, 0, _total(run, k, numbers) if blocks else None) for k in sound]
 
 
-def _total(run: _Run, cell: int, blocks: range) -> Tally | None:
+def _total(run: _Run, cell: int, blocks: range) -> Accumulator | None:
     """Sums over all replicate blocks of a cell, which are done; None where it has no replicates for
     a reason.
     """

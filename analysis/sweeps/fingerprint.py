@@ -43,6 +43,9 @@ LEFT_OUT = (
     "_folder",
 )
 
+# Names of fields in the fingerprints that stores hold, where the field has another name today.
+EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
+
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)
 
@@ -118,7 +121,7 @@ def _add(digest: _Digest, value: Any) -> None:
         _text(digest, f"object {type(value).__name__}")
         for field in fields(value):
             if field.name not in LEFT_OUT:
-                _text(digest, field.name)
+                _text(digest, EARLIER_NAMES.get(field.name, field.name))
                 _add(digest, getattr(value, field.name))
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
@@ -134,7 +137,7 @@ def _settings(digest: _Digest, value: BaseModel) -> None:
     _text(digest, f"settings {type(value).__name__}")
     for name in type(value).model_fields:
         if name not in TOLD_LATER:
-            _text(digest, name)
+            _text(digest, EARLIER_NAMES.get(name, name))
             _add(digest, getattr(value, name))
     for name, item in sorted((value.__pydantic_private__ or {}).items()):
         if name not in LEFT_OUT:

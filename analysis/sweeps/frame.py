@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .store import Store, chosen_sweep, definition_of, results
-from .stored import Results
+from .stored import StoredResults
 
 if TYPE_CHECKING:
     import pandas
@@ -34,25 +34,27 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
     return frame_of(results(store, number, len(defined["cells"])), defined)
 
 
-def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame:
+def frame_of(results: StoredResults, defined: dict[str, Any] | None) -> pandas.DataFrame:
     """The table of `frame`; without a definition it has no columns for the axes."""
     import pandas
 
     axes, cells = (defined["axes"], defined["cells"]) if defined is not None else ([], [])
-    columns: dict[str, Any] = {"cell": found.cells}
-    chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells] if axes else None
+    columns: dict[str, Any] = {"cell": results.cells}
+    chosen = (
+        np.array(cells, np.int64).reshape(len(cells), len(axes))[results.cells] if axes else None
+    )
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
         if axis["unit"] == "1" and ((abs(values) < MOST_WHOLE) & (values % 1.0 == 0.0)).all():
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
-    columns |= {name: [getattr(row, name) for row in found.rows] for name in ("status", "reason")}
-    columns |= found.figures
+    columns |= {name: [getattr(row, name) for row in results.rows] for name in ("status", "reason")}
+    columns |= results.figures
     columns |= {
-        "data_set_seed": np.array([row.seed for row in found.rows], np.int64),
-        "fingerprint": found.keys,
-        "duration_s": np.array([row.seconds for row in found.rows], float),
+        "data_set_seed": np.array([row.seed for row in results.rows], np.int64),
+        "fingerprint": results.keys,
+        "duration_s": np.array([row.seconds for row in results.rows], float),
     }
-    for name in dict.fromkeys(name for row in found.rows for name in row.versions):
-        columns[f"{name}_version"] = [row.versions.get(name, "") for row in found.rows]
+    for name in dict.fromkeys(name for row in results.rows for name in row.versions):
+        columns[f"{name}_version"] = [row.versions.get(name, "") for row in results.rows]
     return pandas.DataFrame(columns)

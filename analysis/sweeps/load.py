@@ -13,7 +13,13 @@ from typing import Any
 
 from ballplate.simulator.experiment.load import build
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import is_same_place, node_at, override, variant_trees
+from ballplate.simulator.experiment.variants import (
+    is_same_place,
+    node_at,
+    override,
+    variant_trees,
+    with_present_keys,
+)
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, listing
@@ -34,8 +40,8 @@ from .axes import read_axis
 from .bundle import bundle_of, code_digest, has_code
 from .columns import is_reserved
 from .conditions import holds
-from .model import Axis, Sweep
-from .settings import SweepSettings
+from .model import Sweep, SweepAxis
+from .sweep_settings import SweepSettings
 from .values import entry_names
 
 MOST_CELLS = 1_000_000
@@ -68,7 +74,7 @@ def load_sweep(
         problems.take(error, ("base",))
         raise ExperimentError(sorted(problems.messages)) from None
     _check_variant(settings, trees, problems)
-    axes: list[Axis] = []
+    axes: list[SweepAxis] = []
     for name, one in settings.axes.items():
         found = read_axis(name, one, root, trees, settings.variant, problems)
         axes += [found] if found is not None else []
@@ -183,7 +189,7 @@ def _trees(base: Path) -> dict[str | None, Node]:
 
     :raises ExperimentError: the file cannot be read, or its variants cannot be made.
     """
-    root = read_tree(base)
+    root = with_present_keys(read_tree(base))
     problems = Problems(root)
     variants = variant_trees(root, problems)
     if problems.messages:
@@ -211,7 +217,7 @@ def _check_variant(
         problems.add(("base",), text)
 
 
-def _check_apart(axes: list[Axis], tree: Node, problems: Problems) -> None:
+def _check_apart(axes: list[SweepAxis], tree: Node, problems: Problems) -> None:
     """Refuse axes that change the same place, told by one of the variants."""
 
     def clash(one: str, other: str) -> bool:
@@ -231,7 +237,7 @@ def _check_apart(axes: list[Axis], tree: Node, problems: Problems) -> None:
             problems.add(("axes", name), text)
 
 
-def _check_names(axes: list[Axis], problems: Problems) -> None:
+def _check_names(axes: list[SweepAxis], problems: Problems) -> None:
     """Refuse axes that would share a column with another one, or with what is recorded."""
     columns: dict[str, str] = {}
     for axis in axes:
@@ -252,7 +258,7 @@ def _check_names(axes: list[Axis], problems: Problems) -> None:
         problems.add(("axes", name), text, of_key=True)
 
 
-def _check_conditions(settings: SweepSettings, axes: list[Axis], problems: Problems) -> None:
+def _check_conditions(settings: SweepSettings, axes: list[SweepAxis], problems: Problems) -> None:
     by_name = {axis.name: axis for axis in axes}
     for key, entries in (("skip", settings.skip), ("only", settings.only)):
         for k, entry in enumerate(entries):
@@ -274,7 +280,7 @@ def _check_conditions(settings: SweepSettings, axes: list[Axis], problems: Probl
                         problems.add((key, k, name), str(error))
 
 
-def _kept(settings: SweepSettings, axes: list[Axis]) -> Iterator[tuple[int, ...]]:
+def _kept(settings: SweepSettings, axes: list[SweepAxis]) -> Iterator[tuple[int, ...]]:
     """Cells that the conditions leave."""
     place = {axis.name: k for k, axis in enumerate(axes)}
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+from ballplate.simulator.computing.processes import begin_worker, in_processes
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from ..running.processes import begin_worker, in_processes
 from .bundle import Bundle, bundle_of, files_of
 from .execute import Runner
 from .load import load_sweep
 from .model import Sweep
-from .task import Row, Task, compute, lost
+from .task import CellResult, CellTask, compute, lost
 
 # Deaths of processes, without a result in between, after which the tasks at the front are tried one
 # by one.
@@ -51,7 +51,7 @@ def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
     """
     source, digest = _Source(Path(os.path.abspath(sweep.source)), sweep.folders), bundle.digest
 
-    def run(tasks: Sequence[Task]) -> Iterator[Row]:
+    def run(tasks: Sequence[CellTask]) -> Iterator[CellResult]:
         if workers > 1 and tasks:
             yield from _in_workers(sweep, source, digest, tasks, workers)
             return
@@ -63,8 +63,8 @@ def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
 
 
 def _in_workers(
-    sweep: Sweep, source: _Source, digest: str, tasks: Sequence[Task], workers: int
-) -> Iterator[Row]:
+    sweep: Sweep, source: _Source, digest: str, tasks: Sequence[CellTask], workers: int
+) -> Iterator[CellResult]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     left = {(task.number, task.block): task for task in tasks}
@@ -89,7 +89,7 @@ def _in_workers(
             deaths += 1
 
 
-def _alone(source: _Source, digest: str, task: Task) -> Row | None:
+def _alone(source: _Source, digest: str, task: CellTask) -> CellResult | None:
     """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
@@ -103,7 +103,7 @@ def _alone(source: _Source, digest: str, task: Task) -> Row | None:
     return None
 
 
-def compute_unchanged(source: _Source, digest: str, task: Task) -> Row:
+def compute_unchanged(source: _Source, digest: str, task: CellTask) -> CellResult:
     """Do a task of a sweep file, which is loaded once in each process.
 
     :raises ChangedError: its files are not those of the bundle with this digest.
@@ -134,14 +134,14 @@ def _watched(sweep: Sweep, digest: str) -> _Watched:
     raise ChangedError
 
 
-def _row(watched: _Watched, task: Task) -> Row:
+def _row(watched: _Watched, task: CellTask) -> CellResult:
     row = compute(watched.sweep, task)
     if _signature(watched.paths) != watched.signature:
         raise ChangedError
     return told(row, watched.sweep.source)
 
 
-def told(row: Row, source: Path) -> Row:
+def told(row: CellResult, source: Path) -> CellResult:
     """The row with files told from the sweep file's folder, wherever that is."""
     if not row.reason or source.parent == Path("."):
         return row

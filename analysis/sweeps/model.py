@@ -38,7 +38,7 @@ class Choice:
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class SweepAxis:
     """What varies. `unit` is that of the choices' values, empty where they are no numbers."""
 
     name: str
@@ -66,7 +66,7 @@ class Sweep:
     base: Path
     trees: dict[str | None, Node]
     variant: str | None
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
     cells: tuple[tuple[int, ...], ...]
     trials: int | None
     seed: int

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.inputs.messages import in_one_line
 from filelock import FileLock, Timeout
 
-from ..results.result import Result
-from ..running.unusable import UnusableError
+from ..presentation.result import Result
 from .bundle import Bundle, changes, definition
 from .execute import Runner, Summary, run_sweep
 from .frame import frame

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.inputs.messages import in_one_line
 
-from ..montecarlo.tally import QuantityTally, Tally
+from ..montecarlo.accumulator import Accumulator, QuantityAccumulator
 from .fingerprint import METHOD, METHODS, method_of
 from .load import MOST_CELLS
 from .store_file import (
@@ -38,7 +38,7 @@ from .store_file import (
 )
 from .stored import (
     OF_RESULT,
-    Results,
+    StoredResults,
     UnreadableError,
     check_key,
     checked_definition,
@@ -48,7 +48,7 @@ from .stored import (
     salvaged_rows,
     texts_of,
 )
-from .task import Row
+from .task import CellResult
 
 FORMAT = f"ballplate sweep store {NEWEST}"
 
@@ -410,7 +410,7 @@ def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
         )
 
 
-def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
+def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
     """Write rows: on disk when this returns. A result that is there already stays, unless it had
     failed.
     """
@@ -454,7 +454,7 @@ def _text(store: Store, value: str) -> int:
     return store.texts[value]
 
 
-def block_tally(store: Store, key: str, block: int) -> Tally | None:
+def block_tally(store: Store, key: str, block: int) -> Accumulator | None:
     """The sums of a replicate block; None where the cell has no replicates for a reason."""
     with _reading(store) as connection:
         row = connection.execute(
@@ -463,22 +463,22 @@ def block_tally(store: Store, key: str, block: int) -> Tally | None:
     return None if row is None or row[0] is None else _unpacked(row[0])
 
 
-def _packed(tally: Tally) -> bytes:
+def _packed(accumulator: Accumulator) -> bytes:
     """Sums as bytes: a line of JSON, then all arrays as 64-bit numbers."""
-    arrays = [tally.residual]
-    for one in tally.quantities:
+    arrays = [accumulator.residual]
+    for one in accumulator.quantities:
         arrays += [one.errors, one.squares, one.numbers, one.numbers_squared]
     head = {
-        "count": tally.count,
-        "failed": list(tally.failed),
-        "passes": tally.passes,
-        "rejected": tally.rejected,
+        "count": accumulator.count,
+        "failed": list(accumulator.failed),
+        "passes": accumulator.passes,
+        "rejected": accumulator.rejected,
         "sizes": [len(array) for array in arrays],
     }
     return json.dumps(head).encode() + b"\n" + np.concatenate(arrays).astype("<f8").tobytes()
 
 
-def _unpacked(content: bytes) -> Tally:
+def _unpacked(content: bytes) -> Accumulator:
     """The sums that `_packed` made bytes of.
 
     :raises UnreadableError: it did not.
@@ -489,8 +489,10 @@ def _unpacked(content: bytes) -> Tally:
         arrays = np.split(np.frombuffer(body, "<f8"), np.cumsum(head["sizes"])[:-1])
         if [len(array) for array in arrays] != head["sizes"] or len(arrays) % 4 != 1:
             raise ValueError
-        quantities = tuple(QuantityTally(*arrays[k : k + 4]) for k in range(1, len(arrays), 4))
-        return Tally(
+        quantities = tuple(
+            QuantityAccumulator(*arrays[k : k + 4]) for k in range(1, len(arrays), 4)
+        )
+        return Accumulator(
             head["count"],
             tuple(head["failed"]),
             head["passes"],
@@ -502,7 +504,7 @@ def _unpacked(content: bytes) -> Tally:
         raise UnreadableError("its sums over data sets are none") from None
 
 
-def results(store: Store, sweep: int, count: int | None = None) -> Results:
+def results(store: Store, sweep: int, count: int | None = None) -> StoredResults:
     """Results of the first `count` cells of a sweep, or of all; cells that are not done yet are
     left out.
 

@@ -285,8 +285,8 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
 
 
 @dataclass(frozen=True)
-class Results:
-    """Results of a sweep in the order of their cells; those not done yet are left out.
+class StoredResults:
+    """StoredResults of a sweep in the order of their cells; those not done yet are left out.
 
     `unreadable` says of other cells why they are not among them, and `strays` counts entries that
     belong to no cell of the sweep. `damage` is what SQLite finds wrong with the store, empty where
@@ -343,7 +343,9 @@ def _salvaged_texts(connection: sqlite3.Connection) -> Texts:
     return Texts(found)
 
 
-def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool) -> Results:
+def read_rows(
+    connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
+) -> StoredResults:
     """The rows of the first `count` cells of a sweep, from a database that is sound.
 
     :raises sqlite3.Error: it is not, or cannot be read.
@@ -380,12 +382,12 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
                 checked_row(0, key, tuple(raw), texts)
             except UnreadableError:
                 strays += 1
-    return Results(rows, unreadable, strays)
+    return StoredResults(rows, unreadable, strays)
 
 
 def salvaged_rows(
     connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
-) -> Results:
+) -> StoredResults:
     """The rows of a sweep that can be read in a damaged database, each looked for by itself."""
     texts = _salvaged_texts(connection)
     digest = "digest" if has_digests else "NULL"
@@ -405,7 +407,7 @@ def salvaged_rows(
             rows.append(checked_row(number, cell[0], raw, texts))
         except (sqlite3.DatabaseError, UnreadableError) as error:
             unreadable[number] = str(error)
-    return Results(rows, unreadable)
+    return StoredResults(rows, unreadable)
 
 
 def _of_index(connection: sqlite3.Connection, key: str, digest: str) -> tuple[Any, ...]:

@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.memory import want_of_memory
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.numerics.threads import single_threaded
 
+from ..montecarlo.accumulator import Accumulator
 from ..montecarlo.experiments import Trials, block_of_trials, combined, trials
-from ..montecarlo.figures import Figure, Outcome
-from ..montecarlo.tally import Tally
+from ..montecarlo.figures import MonteCarloEstimate, MonteCarloOutcome
 from ..results.prediction import Prediction
 from ..results.study import predict
-from ..running.memory import want_of_memory
 from .columns import symbol_column, unit_suffix
 from .fingerprint import fingerprint, with_method, without_method
 from .load import experiment_of
@@ -39,7 +39,7 @@ KEY_ONLY = -1
 
 
 @dataclass(frozen=True)
-class Task:
+class CellTask:
     """Work on cell `number`: replicate block `block`, counted from 1, or, with 0, everything that
     is left, or the cell's key alone.
 
@@ -48,11 +48,11 @@ class Task:
 
     number: int
     block: int = 0
-    total: Tally | None = None
+    total: Accumulator | None = None
 
 
 @dataclass(frozen=True)
-class Row:
+class CellResult:
     """What came of a task. `figures` by name, in SI units with the unit in the name; `details` are
     texts.
 
@@ -70,7 +70,7 @@ class Row:
     figures: dict[str, float] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
-    tally: Tally | None = None
+    tally: Accumulator | None = None
     versions: tuple[tuple[str, str], ...] = ()
 
 
@@ -80,36 +80,36 @@ def blocks_of(sweep: Sweep) -> int:
 
 
 @single_threaded
-def compute(sweep: Sweep, task: Task) -> Row:
+def compute(sweep: Sweep, task: CellTask) -> CellResult:
     """Do a task; whatever goes wrong with the cell is told by its row."""
     start = time.perf_counter()
     row = _computed(sweep, task)
     return replace(row, seconds=time.perf_counter() - start, versions=versions())
 
 
-def _computed(sweep: Sweep, task: Task) -> Row:
+def _computed(sweep: Sweep, task: CellTask) -> CellResult:
     number, block = task.number, task.block
     try:
         experiment = experiment_of(sweep, number)
     except ExperimentError as error:
-        return Row(number, block, invalid_key(sweep, number), "failed", str(error))
+        return CellResult(number, block, invalid_key(sweep, number), "failed", str(error))
     except MemoryError as error:
-        return Row(number, block, invalid_key(sweep, number), "failed", _reason(error))
+        return CellResult(number, block, invalid_key(sweep, number), "failed", _reason(error))
     key = key_of(sweep, experiment)
     seed = seed_of(sweep, key)
     if block == KEY_ONLY:
-        return Row(number, block, key, "done")
+        return CellResult(number, block, key, "done")
     try:
         if block:
             tally = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
-            return Row(number, block, key, "done", seed=seed, tally=tally)
+            return CellResult(number, block, key, "done", seed=seed, tally=tally)
         return _whole(sweep, experiment, task, key, seed)
     except ExperimentError as error:
-        return Row(number, block, key, "failed", str(error), seed)
+        return CellResult(number, block, key, "failed", str(error), seed)
     except Exception as error:
         # Of an error model written in Python anything may come; the other cells do not suffer from
         # it.
-        return Row(number, block, key, "failed", _reason(error), seed)
+        return CellResult(number, block, key, "failed", _reason(error), seed)
 
 
 def _reason(error: Exception) -> str:
@@ -120,7 +120,7 @@ def _reason(error: Exception) -> str:
     return f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
 
 
-def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int) -> Row:
+def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:
     planned = predict(experiment)
     figures, details = plan_figures(planned, sweep.record)
     if sweep.trials is not None:
@@ -138,14 +138,14 @@ def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int
                 for name, one in found.outcome.comparisons.items()
                 if one.flags
             }
-    return Row(task.number, 0, key, "done", "", seed, figures, details)
+    return CellResult(task.number, 0, key, "done", "", seed, figures, details)
 
 
-def lost(sweep: Sweep, task: Task) -> Row:
+def lost(sweep: Sweep, task: CellTask) -> CellResult:
     """The row of a task whose process ends whenever it is tried."""
     reason = "the process that computed it was ended, by lack of memory perhaps"
     # Without the experiment, which may be what ends the process.
-    return Row(
+    return CellResult(
         task.number,
         task.block,
         invalid_key(sweep, task.number),
@@ -211,15 +211,15 @@ def plan_figures(
     return figures, details
 
 
-def trial_figures(found: Outcome, record: tuple[str, ...]) -> dict[str, float]:
+def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str, float]:
     """Figures of replicates."""
-    figures = {"trials": float(found.trials), "not_converged": float(len(found.failed))}
+    figures = {"trials": float(outcome.trials), "not_converged": float(len(outcome.failed))}
 
-    def add(name: str, figure: Figure) -> None:
+    def add(name: str, figure: MonteCarloEstimate) -> None:
         figures[name] = figure.value
         figures[f"{name}_standard_error"] = figure.error
 
-    for symbol, one in found.comparisons.items():
+    for symbol, one in outcome.comparisons.items():
         if symbol.rstrip("'").partition(" ")[0] not in record:
             continue
         name, unit = symbol_column(symbol), unit_suffix(one.unit)
@@ -230,8 +230,8 @@ def trial_figures(found: Outcome, record: tuple[str, ...]) -> dict[str, float]:
         add(f"{name}_bias_ratio", one.bias)
         add(f"{name}_coverage_sigma_given", one.known)
         add(f"{name}_coverage_sigma_estimated", one.estimated)
-    add("sum_of_squares", found.misfit.mean)
-    figures["degrees_of_freedom"] = float(found.misfit.degrees_of_freedom)
+    add("sum_of_squares", outcome.misfit.mean)
+    figures["degrees_of_freedom"] = float(outcome.misfit.degrees_of_freedom)
     return figures
 
 

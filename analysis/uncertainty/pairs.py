@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable
 from numpy.typing import NDArray
 
 # Places on a side of the tiles in which pairs are worked through: their products stay in cache.

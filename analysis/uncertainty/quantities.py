@@ -17,8 +17,8 @@ from ballplate.simulator.estimation.functions import (
     Coordinates,
     Distances,
     Functions,
+    MeasuredPoints,
     Parameters,
-    Points,
 )
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Unit
@@ -34,7 +34,7 @@ class QuantityKind:
     description of its own; `unit` is that of the whole. `are_lengths` tells that it is about
     distances only, which a plan can make small, and `about_balls` that these are between balls.
     `effect` says in a few words what reliability looks at changes of, and is empty where it does
-    not. `has_target` tells whether it is compared with the target accuracy of the file,
+    not. `has_target` tells whether it is compared with the target uncertainty of the file,
     `in_replicates` whether Monte Carlo follows it, and `is_recorded` whether a sweep records it
     unless told. `needs` is what a design without it lacks.
     """
@@ -52,14 +52,16 @@ class QuantityKind:
     needs: str = ""
 
 
-def evaluation_points(design: Design) -> Points:
+def evaluation_points(design: Design) -> MeasuredPoints:
     """The evaluation points as places, with the probe that they are evaluated with."""
-    return Points(design.points, np.full(len(design.points), design.point_probe))
+    return MeasuredPoints(design.points, np.full(len(design.points), design.point_probe))
 
 
 def task_distances(design: Design) -> Distances:
     """The lengths of the measuring tasks."""
-    ends = Points(design.task_points.reshape(-1, design.dimension), design.task_probes.ravel())
+    ends = MeasuredPoints(
+        design.task_points.reshape(-1, design.dimension), design.task_probes.ravel()
+    )
     pairs = np.arange(2 * len(design.task_names)).reshape(-1, 2)
     return Distances(ends, pairs, design.task_names, design.task_targets)
 

@@ -6,23 +6,23 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import (
     Balls,
     Coordinates,
     Displacements,
     Distances,
+    MeasuredPoints,
     Parameters,
     Places,
-    Points,
     coordinate_names,
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import comparable
-from ballplate.simulator.numerics.threads import single_threaded
 
 from .pairs import PairSummary, PairTile, all_pairs, pairs_of
 from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points
@@ -35,7 +35,7 @@ class Quantity:
     `count` of them there are, `undetermined` of which the observations leave open; the maximum and
     the average are NaN when nothing is left, and `largest` then is empty, otherwise it names where
     the maximum stands. `within_target` is the share of distances whose uncertainty,
-    `coverage_factor` times the standard one, is within the target accuracy, those undetermined
+    `coverage_factor` times the standard one, is within the target uncertainty, those undetermined
     counted as not; None where no target is compared with. `places` tell where in the volume the
     evaluation points are that `largest` names.
     """
@@ -182,7 +182,7 @@ def _of_pairs(
         where = " to ".join(places.name(design, label) for label in pairs.where)
         average = sigma * pairs.total / determined
         found = replace(found, maximum=sigma * pairs.maximum, average=average, largest=where)
-        if isinstance(places, Points):
+        if isinstance(places, MeasuredPoints):
             found = replace(found, places=tuple(_point(places, label) for label in pairs.where))
     if target is None:
         return found
@@ -191,7 +191,7 @@ def _of_pairs(
     )
 
 
-def _point(places: Points, label: int) -> str:
+def _point(places: MeasuredPoints, label: int) -> str:
     """A point by its number from 1, as in the file, and its place."""
     place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in places.points[label])
     return f"point {label + 1} at ({place}) mm"

@@ -64,9 +64,9 @@ TERMINAL = {
 }
 # What the commands load when they are run; loaded before, it takes no time for each of them.
 LOADED_BEFORE = (
-    "ballplate.checking.github",
+    "ballplate.cli.github",
     "ballplate.cli",
-    "ballplate.checking.junit",
+    "ballplate.cli.junit",
     "ballplate.montecarlo.experiments",
     "ballplate.montecarlo.comparison_tables",
     "matplotlib.figure",

@@ -30,7 +30,7 @@ from ballplate.simulator.inputs.quantities import (
     Ratio,
     TemperatureDifference,
 )
-from ballplate.sweeps.schema import schema as sweep_schema
+from ballplate.sweeps.sweep_schema import schema as sweep_schema
 from pydantic import TypeAdapter
 from sphinx.application import Sphinx
 

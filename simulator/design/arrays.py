@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, ErrorModel, Integers
 from .joint_lengths import LengthWhitening, length_whitening
-from .observations import Coordinates, Distances, Lengths, Priors, Readings, no_priors
-
-
-def pose_size(dimension: int) -> int:
-    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
-    return dimension * (dimension + 1) // 2
+from .observations import (
+    CalibratedCoordinates,
+    CalibratedDistances,
+    Lengths,
+    Priors,
+    Readings,
+    no_priors,
+)
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,8 @@ class Design:
     origins: Array
     held: NDArray[np.bool_]
     readings: Readings
-    distances: Distances
-    coordinates: Coordinates
+    distances: CalibratedDistances
+    coordinates: CalibratedCoordinates
     lengths: Lengths
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
     point_probe: int = 0

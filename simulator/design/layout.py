@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..computing.rounding import comparable
 from ..experiment.model import (
     CoordinateCalibration,
     DistanceCalibration,
@@ -13,14 +14,14 @@ from ..experiment.model import (
     RadiusCalibration,
 )
 from ..geometry.artefacts import BryanGaugeSettings
+from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
-from ..numerics.rounding import comparable
-from .arrays import Design, pose_size
+from .arrays import Design
 from .length_standards import standard_lengths
-from .observations import Coordinates, Distances, Priors, Readings
+from .observations import CalibratedCoordinates, CalibratedDistances, Priors, Readings
 
 # Evaluation points of an experiment that names none.
 DEFAULT_POINTS = 200
@@ -31,6 +32,7 @@ DEFAULT_SEED = 1
 FLAT = 1e-9
 
 
+# In one piece: every array of a design is laid out beside those whose order it shares.
 def lay_out(experiment: Experiment) -> Design:
     """Design of an experiment.
 
@@ -201,7 +203,7 @@ def _readings(
     return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
-def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordinates:
+def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> CalibratedCoordinates:
     ball, axis, value, uncertainty = [], [], [], []
     for item in experiment.calibration:
         if isinstance(item, CoordinateCalibration):
@@ -210,10 +212,12 @@ def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordina
             axis.append(np.tile(np.array(item.axes, np.int64), len(item.balls)))
             value.append(item.values.ravel())
             uncertainty.append(np.tile(item.standard_uncertainties, len(item.balls)))
-    return Coordinates(_integers(ball), _integers(axis), _floats(value), _floats(uncertainty))
+    return CalibratedCoordinates(
+        _integers(ball), _integers(axis), _floats(value), _floats(uncertainty)
+    )
 
 
-def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
+def _distances(experiment: Experiment, first_ball: dict[str, int]) -> CalibratedDistances:
     """Calibrated distances between balls of plates."""
     plates = [
         (item, np.asarray(item.pairs + first_ball[item.artefact], np.int64))
@@ -221,7 +225,7 @@ def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
         if isinstance(item, DistanceCalibration)
         and experiment.artefacts[item.artefact].role == "plate"
     ]
-    return Distances(
+    return CalibratedDistances(
         _integers([pairs[:, 0] for _, pairs in plates]),
         _integers([pairs[:, 1] for _, pairs in plates]),
         _integers([np.full(len(pairs), item.dimensions) for item, pairs in plates]),
@@ -235,7 +239,7 @@ def _held(
     ball_artefact: NDArray[np.int64],
     position_artefact: NDArray[np.int64],
     rotations: Array,
-    coordinates: Coordinates,
+    coordinates: CalibratedCoordinates,
     d: int,
 ) -> NDArray[np.bool_]:
     """Which pose parameters are held (k, pose size).

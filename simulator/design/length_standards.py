@@ -31,6 +31,7 @@ class _Row:
     direction: tuple[float, ...] = ()
 
 
+# In one piece: rows, names and drawn values are counted together, in the order of the file.
 def standard_lengths(
     experiment: Experiment,
     readings: Readings,

@@ -46,7 +46,7 @@ class Readings:
 
 
 @dataclass(frozen=True)
-class Distances:
+class CalibratedDistances:
     """Calibrated distances between two balls of an artefact; arrays (m,), lengths in metres.
 
     `dimensions` is 2 where only the first two co-ordinates of the artefact's frame count.
@@ -63,7 +63,7 @@ class Distances:
 
 
 @dataclass(frozen=True)
-class Coordinates:
+class CalibratedCoordinates:
     """Calibrated ball co-ordinates in the artefact's frame; arrays (m,), metres."""
 
     ball: Integers

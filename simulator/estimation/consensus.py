@@ -7,9 +7,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..computing.rounding import comparable
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array
-from ..numerics.rounding import comparable
 
 # Subsets tried, and the points that each is judged by. With a third of the points wrong, three
 # right ones are drawn together more than once in four draws.

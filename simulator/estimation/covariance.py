@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design
 from ..machines.protocol import Array
-from ..numerics.threads import scipy_linalg, single_threaded
 from .elimination import Factor
 from .graded import triangle
 from .parameters import SharedLayout
@@ -169,10 +169,10 @@ def blank(values: Array, change: Array, size: Array) -> Array:
 
 
 @single_threaded
-def ball_covariance(design: Design, factor: Factor, found: Spectrum) -> BallCovariance:
+def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallCovariance:
     """Square root of the covariance of all balls."""
     n, d = len(design.ball_names), design.dimension
-    shared, null = found.root, found.null
+    shared, null = spectrum.root, spectrum.null
     rank, nulls, k = shared.shape[1], null.shape[1], d * len(factor.kept)
     ball = np.zeros((n, d, rank + k))
     own = np.zeros((n, d, d))

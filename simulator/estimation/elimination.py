@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, State
 from ..machines.protocol import Array, Integers
-from ..numerics.threads import scipy_linalg, single_threaded
 from .graded import Collected, without_balls
 from .observations import (
     BallRows,
@@ -101,6 +101,8 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     return _eliminate_alike(design, layout, state, x)
 
 
+# In one piece: the steps of one elimination, each of which uses up the rows that the one before
+# leaves.
 def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
     d, s = design.dimension, len(layout)
     kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
@@ -218,6 +220,8 @@ def _weighted_alike(design: Design, layout: SharedLayout, state: State) -> Desig
     )
 
 
+# In one piece: the steps of one elimination, each of which uses up the rows that the one before
+# leaves.
 def _eliminate_graded(
     design: Design, layout: SharedLayout, state: State, x: Array | None
 ) -> Factor:

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..design.arrays import Design, State
+from ..geometry.motions import AXIS_NAMES
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, Integers, Unit
 from .corrections import corrected_points, correction_rows
 from .covariance import MICROMETRE, blank
 from .linearisation import LinearFunctions, Linearisation
-from .parameters import AXIS_NAMES, SharedLayout
+from .parameters import SharedLayout
 
 # Places whose derivatives by all shared parameters are formed at once.
 PLACES_AT_ONCE = 1000
@@ -53,7 +54,7 @@ class Balls:
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class MeasuredPoints:
     """Corrected points for scale readings `points` (n, d) with probes of indices `probes` (n,)."""
 
     points: Array
@@ -73,7 +74,7 @@ class Points:
         return corrected_points(design, state, self.points, self.probes)
 
 
-Places = Balls | Points
+Places = Balls | MeasuredPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,14 +187,14 @@ def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Dis
     return Displacements(corrected, common, np.zeros((n, d, d)), null, as_drawn, size)
 
 
-def moving_columns(layout: SharedLayout, places: Points) -> Integers:
+def moving_columns(layout: SharedLayout, places: MeasuredPoints) -> Integers:
     """Columns of the shared parameters that move corrected points; poses, for instance, do not."""
     offsets = layout.offset_columns[np.unique(places.probes)].ravel()
     return np.concatenate([np.arange(len(layout))[layout.model], np.sort(offsets[offsets >= 0])])
 
 
 def point_rows(
-    design: Design, layout: SharedLayout, state: State, places: Points
+    design: Design, layout: SharedLayout, state: State, places: MeasuredPoints
 ) -> Iterator[tuple[slice, Array]]:
     """Derivatives (m, d, s) of corrected points by the shared parameters, some points at a time."""
     for start in range(0, len(places.points), PLACES_AT_ONCE):
@@ -217,7 +218,7 @@ def _derivatives(at: Linearisation, state: State, functions: Functions) -> Linea
     places, design = functions.places, at.design
     where = places.at(design, state)
     n, d = where.shape
-    if isinstance(places, Points):
+    if isinstance(places, MeasuredPoints):
         by_shared = np.concatenate(
             [rows for _, rows in point_rows(design, at.layout, state, places)]
         )

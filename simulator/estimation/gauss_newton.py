@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, State, probe_offsets, unknown_lengths
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
-from ..numerics.threads import scipy_linalg, single_threaded
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle
@@ -158,9 +158,9 @@ def linearised_fit(design: Design, solution: Solution) -> Linearisation:
     )
 
 
-def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:
+def newton_step(design: Design, factor: Factor, spectrum: Spectrum) -> tuple[Array, Array]:
     """The least-squares step: shared parameters (s,) and balls (n, d)."""
-    shared = _shared_step(factor, found)
+    shared = _shared_step(factor, spectrum)
     balls = np.zeros((len(design.ball_names), design.dimension))
     side = factor.ball_side + factor.ball_shared @ shared
     balls[factor.eliminated] = -solve_balls(factor, side[:, :, None])[:, :, 0]
@@ -170,15 +170,15 @@ def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array,
     return shared, balls
 
 
-def _shared_step(factor: Factor, found: Spectrum) -> Array:
-    if found.deficiency == 0:
+def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
+    if spectrum.deficiency == 0:
         return -solve_shared(factor, factor.side)
-    determined = found.directions[:, : found.rank]
+    determined = spectrum.directions[:, : spectrum.rank]
     if factor.orders is None:
         # root = U diag(values) V' / scale, so U' side follows from root times the directions.
         left = factor.root @ determined
         left /= np.sqrt((left**2).sum(axis=0))
-        return np.asarray(-(found.root @ (left.T @ factor.side)))
+        return np.asarray(-(spectrum.root @ (left.T @ factor.side)))
     rest = triangle(in_order(factor) @ determined, factor.side[:, None])
     steps = scipy_linalg().solve_triangular(rest.root, rest.side[:, 0], check_finite=False)
     return np.asarray(-(determined[:, rest.order] @ steps))

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg
 from ..machines.protocol import Array, Integers
-from ..numerics.threads import scipy_linalg
 
 # Rows that are collected, in multiples of the columns, before they are brought to a triangle.
 COLLECTED = 8

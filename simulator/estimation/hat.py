@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.threads import single_threaded
 from ..design.arrays import Design, State
 from ..machines.protocol import Array, Integers
-from ..numerics.threads import single_threaded
 from .elimination import ROWS_AT_ONCE
 from .linearisation import Linearisation
 from .observations import (

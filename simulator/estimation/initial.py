@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..computing.rounding import comparable
 from ..design.arrays import Design, State
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
-from ..numerics.rounding import comparable
 from .spheres import fit_sphere
 
 # Points whose spread across their main line is below this fraction of their length do not fix a

@@ -30,11 +30,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..computing.threads import single_threaded
 from ..design.arrays import Design
 from ..design.joint_lengths import equation_root
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
-from ..numerics.threads import single_threaded
 from .covariance import EXACT, MICROMETRE
 from .initial import initial_state
 
@@ -331,7 +331,7 @@ def _by_factor() -> Array:
     return derivative
 
 
-def _centres(design: Design, found: _Unknowns) -> Array:
+def _centres(design: Design, unknowns: _Unknowns) -> Array:
     centres = np.full(design.origins.shape, np.nan)
-    centres[found.pivots] = found.values[6 : 6 + 3 * len(found.pivots)].reshape(-1, 3)
+    centres[unknowns.pivots] = unknowns.values[6 : 6 + 3 * len(unknowns.pivots)].reshape(-1, 3)
     return centres

@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.threads import single_threaded
 from ..design.arrays import Design, State, nominal_state
 from ..machines.protocol import Array
-from ..numerics.threads import single_threaded
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, blank, spectrum
 from .elimination import Factor, eliminate
 from .parameters import SharedLayout, shared_layout
@@ -103,9 +103,9 @@ class Linearisation:
             size = size + MICROMETRE**2 * (as_drawn.balls**2).sum(axis=(1, 2))
         return blank(values, change, np.sqrt(size))
 
-    def covariance(self, one: LinearFunctions, other: LinearFunctions) -> Array:
+    def covariance(self, functions: LinearFunctions, other: LinearFunctions) -> Array:
         """Covariances (m, k) of functions with others, what is undetermined left out."""
-        first, second = self._root(one), self._root(other)
+        first, second = self._root(functions), self._root(other)
         width = min(first.shape[1], second.shape[1])
         return np.asarray(first[:, :width] @ second[:, :width].T)
 

@@ -15,13 +15,12 @@ from ..design.arrays import (
     Design,
     State,
     locations,
-    pose_size,
     probe_offsets,
     reading_uncertainties,
     unknown_lengths,
 )
 from ..design.observations import Readings
-from ..geometry.motions import vector_from_rotation, vector_rate
+from ..geometry.motions import pose_size, vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel, Integers
 from .parameters import SharedLayout
 
@@ -181,13 +180,13 @@ def length_derivative(design: Design, layout: SharedLayout, state: State, x: Arr
 
 
 def _length_derivative(
-    design: Design, layout: SharedLayout, state: State, found: _Measured
+    design: Design, layout: SharedLayout, state: State, measured: _Measured
 ) -> Array:
     given = design.lengths
     # What is held goes to the extra column.
     rows = np.zeros((len(given), len(layout) + 1))
-    for end in found.ends:
-        along = found.unit[end.rows]
+    for end in measured.ends:
+        along = measured.unit[end.rows]
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
         rows[end.rows, layout.model] += end.sign * np.einsum("md,mdn->mn", along, by_model)
         if design.free_offsets is not None:
@@ -202,7 +201,7 @@ def _length_derivative(
     columns = layout.pose_columns[
         design.readings.position[given.first[pivoted]], : design.dimension
     ]
-    np.add.at(rows, (pivoted[:, None], columns), -found.unit[pivoted])
+    np.add.at(rows, (pivoted[:, None], columns), -measured.unit[pivoted])
     if given.free is not None:
         free = np.flatnonzero(given.free >= 0)
         rows[free, layout.lengths.start + given.free[free]] -= 1.0

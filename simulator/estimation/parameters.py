@@ -6,21 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import Design, pose_size
+from ..design.arrays import Design
+from ..geometry.motions import AXIS_NAMES, pose_parameter_names, pose_size
 from ..machines.protocol import Array, Integers, Parameter
-
-AXIS_NAMES = ("x", "y", "z")
-
-
-def pose_parameter_names(dimension: int) -> tuple[str, ...]:
-    """Names of a pose's parameters in order.
-
-    >>> pose_parameter_names(2)
-    ('origin x', 'origin y', 'rotation z')
-    """
-    axes = AXIS_NAMES[:dimension]
-    turns = axes if dimension == 3 else ("z",)
-    return tuple(f"origin {axis}" for axis in axes) + tuple(f"rotation {axis}" for axis in turns)
 
 
 @dataclass(frozen=True)

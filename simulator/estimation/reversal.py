@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.threads import single_threaded
 from ..geometry.motions import fit_motion
 from ..machines.metric import MetricModel, Scale
 from ..machines.protocol import Array
-from ..numerics.threads import single_threaded
 
 # Balls whose spread across their main line is below this fraction of their length count as on one
 # line.

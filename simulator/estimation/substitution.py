@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg
 from ..machines.protocol import Array, Integers
-from ..numerics.threads import scipy_linalg
 from .elimination import Factor
 
 

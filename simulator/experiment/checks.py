@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..design.arrays import pose_size
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ..geometry.motions import pose_size
 from ..geometry.positions import ball_coordinates
 from ..inputs.messages import ExperimentError, Message, Steps
 from ..inputs.problems import Problems, written_text
@@ -29,7 +29,7 @@ from ..machines.settings import (
 )
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
-from .curves import read_curves
+from .curve_files import read_curves
 from .machine_file import load_machine
 from .model import (
     SLIGHTLY,

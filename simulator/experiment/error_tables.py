@@ -17,7 +17,7 @@ from ..machines.arrangement import AXES
 from ..machines.curves import Points
 from ..machines.description import Three
 from ..machines.straightness import Criterion
-from .curves import BANDWIDTH, read_numbered_curves
+from .curve_files import BANDWIDTH, read_numbered_curves
 
 COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
 KEYS = ("line", "straightness", "straightedge", "probe")
@@ -85,6 +85,7 @@ def _refuse_decimal_comma(text: str) -> None:
         raise LineError(f'"{comma[0]}" has a decimal comma; write {comma[0].replace(",", ".")}')
 
 
+# In one piece: everything that is wrong with a file is collected before any of it is refused.
 def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = None) -> ErrorTable:
     """Read the table of the error `name` from a CSV file such as
     position_mm,EYX_um,EYX_bandwidth_um.

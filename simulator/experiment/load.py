@@ -35,7 +35,7 @@ from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
-from .variants import MOST_OF_ALL, in_variants, variant_trees
+from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
 
 def load(
@@ -54,7 +54,7 @@ def load(
     """
     source = Path(path)
     refused: list[Message] = []
-    root = read_tree(source, refused)
+    root = with_present_keys(read_tree(source, refused))
     base_problems = Problems(root)
     trees = variant_trees(root, base_problems)
     if not with_modules:
@@ -119,7 +119,7 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
         text = "are for files; change an experiment with its method with_()"
         raise ExperimentError([mark.message("variants", text)])
     try:
-        tree = node_of(sections, mark)
+        tree = with_present_keys(node_of(sections, mark))
     except ValueError as error:
         raise ExperimentError([mark.message("", str(error))]) from None
     return _built(tree, folder / "experiment", None, False)
@@ -148,6 +148,8 @@ def build(
         return None, list(too_many.messages)
 
 
+# In one piece: the order in which sections are resolved, each from those before it, stands in one
+# place.
 def _build(
     root: Node, source: Path, name: str | None, planning: bool
 ) -> tuple[Experiment | None, list[Message]]:
@@ -214,7 +216,7 @@ def _build(
         positions=tuple(positions.values()),
         calibration=tuple(calibrations.values()),
         evaluation=evaluation,
-        target_accuracy=target_of(sections),
+        target_uncertainty=target_of(sections),
         sigma=sections.get("sigma"),
         expected_rank_deficiency=sections.get("expected_rank_deficiency"),
         seed=sections.get("seed"),

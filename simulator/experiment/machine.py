@@ -158,7 +158,7 @@ def _task(
         problems.add((*steps, "to"), "is where the length begins; give two points")
         return None
     return Task(
-        settings.name, frozen(points), probes, target_of(sections, settings.target_accuracy)
+        settings.name, frozen(points), probes, target_of(sections, settings.target_uncertainty)
     )
 
 
@@ -166,7 +166,7 @@ def target_of(sections: Sections, own: LengthFunction | None = None) -> Target |
     """What uncertainties are to be within: a length of its `own`, or else the file's, and which of
     them it is about.
     """
-    stated = own or sections.get("target_accuracy")
+    stated = own or sections.get("target_uncertainty")
     return None if stated is None else Target(stated, sections.get("coverage_factor"))
 
 

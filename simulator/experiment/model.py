@@ -251,7 +251,7 @@ class Experiment:
     """A complete experiment, or one variant of it.
 
     ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres.
-    ``layouts``: name of an artefact → its balls. ``target_accuracy`` and
+    ``layouts``: name of an artefact → its balls. ``target_uncertainty`` and
     ``expected_rank_deficiency`` are None where nothing was stated. ``coverage_factor`` times the
     standard uncertainty is what targets are meant for. ``offset_uncertainties``: standard
     uncertainties (d,) of the offsets that are estimated, by the probe's name, infinite where the
@@ -274,7 +274,7 @@ class Experiment:
     positions: tuple[Position, ...]
     calibration: tuple[Calibration, ...]
     evaluation: Evaluation
-    target_accuracy: Target | None
+    target_uncertainty: Target | None
     sigma: Literal["estimated", "given"]
     expected_rank_deficiency: int | None
     seed: int

@@ -43,7 +43,7 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .references import References, Tally, frozen
+from .references import ReadingCount, References, frozen
 from .structure import Sections
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
@@ -91,6 +91,7 @@ class Candidates:
         return tuple(one.item for one in self.found if isinstance(one.item, Position))
 
 
+# In one piece: candidates are counted, completed and refused in the order of the file.
 def resolve_candidates(
     sections: Sections,
     positions: AnyMapping[int, Position],
@@ -109,7 +110,7 @@ def resolve_candidates(
         result.complete = node is None
         return result
     # The candidates have a limit of their own.
-    references = replace(references, tally=Tally())
+    references = replace(references, tally=ReadingCount())
     # Candidates may be what a key that is misspelt or no list was meant to be.
     is_known = isinstance(node, Mapping) and set(node.items) <= set(PoolSettings.model_fields)
     is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)
@@ -394,11 +395,14 @@ def _beyond(points: Floats, ends: Floats) -> str:
 
 
 def _limits(
-    limits: LimitsSettings, found: AnySequence[Candidate], complete: bool, references: References
+    limits: LimitsSettings,
+    candidates: AnySequence[Candidate],
+    complete: bool,
+    references: References,
 ) -> tuple[tuple[int, ...], list[AtMost]]:
     """Indices of what has to be chosen, and limits on numbers."""
     problems, place = references.problems, ("pool", "limits")
-    index = {one.name: i for i, one in enumerate(found)}
+    index = {one.name: i for i, one in enumerate(candidates)}
     before = len(problems.messages)
 
     def of_names(names: Iterable[str], steps: Steps) -> list[int]:
@@ -409,7 +413,7 @@ def _limits(
         return [index[name] for name in dict.fromkeys(names) if name in index]
 
     if limits.keep == "all":
-        must = [i for i, one in enumerate(found) if one.drawn]
+        must = [i for i, one in enumerate(candidates) if one.drawn]
     else:
         must = of_names(limits.keep, (*place, "keep"))
     at_most = []
@@ -418,11 +422,13 @@ def _limits(
         if len(members) > 1:
             at_most.append((AtMost(tuple(members), 1), (*place, "never_together", k)))
     for k, limit in enumerate(limits.at_most):
-        members = _selected(limit.of, found, complete, (*place, "at_most", k, "of"), references)
+        members = _selected(
+            limit.of, candidates, complete, (*place, "at_most", k, "of"), references
+        )
         if members:
             at_most.append((AtMost(tuple(members), limit.count), (*place, "at_most", k)))
     for one, steps in at_most:
-        kept = [found[i].name for i in sorted(set(must) & set(one.members))]
+        kept = [candidates[i].name for i in sorted(set(must) & set(one.members))]
         if len(kept) > one.count and len(problems.messages) == before:
             text = (
                 f"at most {one.count} of these are allowed, but {listing(kept)} are to be kept;"
@@ -434,14 +440,14 @@ def _limits(
 
 def _selected(
     of: SelectorSettings,
-    found: AnySequence[Candidate],
+    candidates: AnySequence[Candidate],
     complete: bool,
     steps: Steps,
     references: References,
 ) -> list[int]:
     """Indices of the candidates to which everything applies that a selector states."""
     root = references.problems.root
-    groups = {one.group for one in found if one.group} | set(_group_names(root))
+    groups = {one.group for one in candidates if one.group} | set(_group_names(root))
     known: dict[str, Any] = {
         "group": groups,
         "artefact": references.artefact_names,
@@ -457,7 +463,7 @@ def _selected(
     if of.name is not None:
         pattern = of.name
         tests.append(lambda one: fnmatchcase(one.name, pattern))
-        if complete and not any(fnmatchcase(one.name, pattern) for one in found):
+        if complete and not any(fnmatchcase(one.name, pattern) for one in candidates):
             references.problems.add(
                 (*steps, "name"), f'no candidate has a name such as "{pattern}"; correct it'
             )
@@ -469,7 +475,7 @@ def _selected(
         tests.append(lambda one: one.item.artefact == of.artefact)
     if of.probe is not None:
         tests.append(lambda one: of.probe in _probes_of(one))
-    return [i for i, one in enumerate(found) if all(test(one) for test in tests)]
+    return [i for i, one in enumerate(candidates) if all(test(one) for test in tests)]
 
 
 def _group_names(root: Any) -> list[str]:

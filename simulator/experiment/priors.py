@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimation.parameters import AXIS_NAMES, pose_parameter_names
 from ..geometry.artefacts import BryanGaugeSettings
+from ..geometry.motions import AXIS_NAMES, pose_parameter_names
 from ..inputs.messages import Steps, format_path
 from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, shorten

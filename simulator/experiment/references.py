@@ -37,7 +37,7 @@ MOST_READINGS = 2_000_000
 
 
 @dataclass
-class Tally:
+class ReadingCount:
     """What has been counted so far."""
 
     readings: int = 0
@@ -59,7 +59,7 @@ class References:
     artefact_names: tuple[str, ...]
     artefacts: dict[str, ArtefactSettings]
     layouts: dict[str, BallLayout]
-    tally: Tally = field(default_factory=Tally)
+    tally: ReadingCount = field(default_factory=ReadingCount)
 
     def count_readings(self, count: int, steps: Steps) -> bool:
         """Count further readings; tell whether there is room for them, after saying once that there

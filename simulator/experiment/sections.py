@@ -123,9 +123,11 @@ class TaskSettings(Settings):
     probes: tuple[Name, Name] | None = Field(
         None, description="probes of the two ends, instead of probe"
     )
-    target_accuracy: LengthFunction | None = Field(
+    target_uncertainty: LengthFunction | None = Field(
         None,
-        description="what is to be reached, as target_accuracy of the file, which is the default",
+        description=(
+            "what is to be reached, as target_uncertainty of the file, which is the default"
+        ),
     )
 
 
@@ -200,7 +202,7 @@ class ExperimentSettings(Settings):
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"
     )
-    target_accuracy: LengthFunction | None = Field(
+    target_uncertainty: LengthFunction | None = Field(
         None,
         description=(
             "what standard uncertainties, or coverage_factor times these, are to be within, such as"
@@ -211,8 +213,8 @@ class ExperimentSettings(Settings):
     coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
         1.0,
         description=(
-            "k of the expanded uncertainty U = k u that is compared with target_accuracy; default"
-            " 1: the standard uncertainty u is"
+            "k of the expanded uncertainty U = k u that is compared with target_uncertainty;"
+            " default 1: the standard uncertainty u is"
         ),
     )
     sigma: Literal["estimated", "given"] = Field(

@@ -20,6 +20,7 @@ from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import CalibrationSettings, PositionSettings
 from .sections import AnyProbe, ExperimentSettings, PriorSettings
+from .variants import ALIASES
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
 ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
@@ -78,7 +79,10 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
     misspelt = set()
     for key in root.items:
         if key not in fields:
-            problems.add((key,), f"unknown key; {hint(key, absent)}", True)
+            text = f"unknown key; {hint(key, absent)}"
+            if key in ALIASES:
+                text = f"this is the earlier name of {ALIASES[key]}, which is there too; remove one"
+            problems.add((key,), text, True)
             misspelt.add(nearest(key, absent))
     for key, field in fields.items():
         node_or_none = root.items.get(key)

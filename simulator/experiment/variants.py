@@ -18,7 +18,32 @@ MOST_VARIANTS = 1000
 # Balls, balls read, calibrated values, priors and evaluation points of all variants of a file,
 # which are loaded together.
 MOST_OF_ALL = 2_000_000
+# Keys of earlier versions: files and paths that have them mean the key of today.
+ALIASES = {"target_accuracy": "target_uncertainty"}  # earlier name first
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
+
+
+def with_present_keys(node: Node) -> Node:
+    """The same tree with the keys of today; a key that stands beside its earlier name stays, so
+    that the earlier one is refused as unknown.
+    """
+    if isinstance(node, Scalar):
+        return node
+    if isinstance(node, Sequence):
+        items = tuple(map(with_present_keys, node.items))
+        changed = any(new is not old for new, old in zip(items, node.items, strict=True))
+        return replace(node, items=items) if changed else node
+    keys = {key: _present(key, node) for key in node.items}
+    below = {keys[key]: with_present_keys(item) for key, item in node.items.items()}
+    if all(below.get(key) is item for key, item in node.items.items()):
+        return node
+    marks = {keys[key]: mark for key, mark in node.key_marks.items()}
+    return replace(node, items=below, key_marks=marks)
+
+
+def _present(key: str, node: Mapping) -> str:
+    present = ALIASES.get(key, key)
+    return key if present in node.items else present
 
 
 def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
@@ -97,7 +122,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     ):
         known = [key for key in ExperimentSettings.model_fields if key != "variants"]
         raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
-    return _replaced(root, steps, value, mark, ())
+    return _replaced(root, steps, with_present_keys(value), mark, ())
 
 
 def removed(root: Node, path: str) -> Node:
@@ -132,7 +157,7 @@ def _steps(path: str) -> list[str]:
         raise ValueError(
             f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size'
         )
-    return steps
+    return [ALIASES.get(step, step) for step in steps]
 
 
 def _place(root: Node, path: str) -> tuple[str, ...]:
@@ -170,9 +195,9 @@ def _replaced(
         i = _index(node, step, above)
         below = _replaced(node.items[i], rest, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
+    named = format_path(above) or "the experiment"
     raise ValueError(
-        f"{format_path(above) or 'the experiment'} is {describe(node.value)} and has nothing below it; replace it as a"
-        " whole"
+        f"{named} is {describe(node.value)} and has nothing below it; replace it as a whole"
     )
 
 

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+AXIS_NAMES = ("x", "y", "z")
+
 
 def rotation_from_vector(vector: Array) -> Array:
     """Rotation matrices (m, d, d) that turn by `vector`: (m, 3) about an axis in space, (m, 1) in
@@ -103,3 +105,19 @@ def without_rigid_motion(places: Array, errors: Array) -> Array:
     for _ in range(2):
         flat = flat - basis @ (basis.T @ flat)
     return flat.reshape(errors.shape)
+
+
+def pose_size(dimension: int) -> int:
+    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
+    return dimension * (dimension + 1) // 2
+
+
+def pose_parameter_names(dimension: int) -> tuple[str, ...]:
+    """Names of a pose's parameters in order.
+
+    >>> pose_parameter_names(2)
+    ('origin x', 'origin y', 'rotation z')
+    """
+    axes = AXIS_NAMES[:dimension]
+    turns = axes if dimension == 3 else ("z",)
+    return tuple(f"origin {axis}" for axis in axes) + tuple(f"rotation {axis}" for axis in turns)

@@ -13,7 +13,7 @@ Steps = tuple[Step, ...]
 
 # Errors of a file that are told; beyond, some slip repeats itself.
 MOST_MESSAGES = 1000
-ENOUGH = f"more than {MOST_MESSAGES} errors; mend these first"
+MORE_ERRORS = f"more than {MOST_MESSAGES} errors; mend these first"
 
 # Names of a file may hold what would break a line in two or reach the terminal as a command.
 UNPRINTABLE = re.compile(

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
+from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
 from .yamltree import Mapping, Mark, Node, Sequence, mark_of, to_python, written
 
 
@@ -38,7 +38,7 @@ class Problems:
         if message in self._known:
             return
         if len(self.messages) >= MOST_MESSAGES:
-            raise ExperimentError([*self.messages, mark.message("", ENOUGH)])
+            raise ExperimentError([*self.messages, mark.message("", MORE_ERRORS)])
         self._known.add(message)
         self.messages.append(message)
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
 
-from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from .quantities import LENGTH_UNITS, QuantityError, metres_or_radians, plain_number, power_of_ten
 from .settings import hint, listing, shorten
 from .spreadsheets import text_of_cell
@@ -24,7 +24,7 @@ MOST_KNOWN = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class FileRow:
     """A line of a table: texts of its named columns and lengths, in metres, of its length
     columns.
     """
@@ -52,7 +52,7 @@ def read_table(
     lengths: Sequence[str],
     optional: Sequence[str] = (),
     problems: list[Message] | None = None,
-) -> tuple[Row, ...]:
+) -> tuple[FileRow, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
@@ -79,7 +79,7 @@ def read_table(
     for number, line in islice(lines, 1, MOST_ROWS + 1):
         mark = Mark(file, number, 1)
         if len(messages) >= MOST_MESSAGES:
-            messages.append(mark.message("", ENOUGH))
+            messages.append(mark.message("", MORE_ERRORS))
             break
         row = plain.row(mark, line)
         if row is not None:
@@ -106,7 +106,9 @@ def read_table(
                     Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name")
                 )
         rows.append(
-            Row(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths))
+            FileRow(
+                mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths)
+            )
         )
     if len(lines) == 1:
         messages.append(
@@ -152,7 +154,7 @@ class _PlainRows:
         ]
         return cls(len(places), tuple(by_name[name] for name in texts), tuple(powers), {})
 
-    def row(self, mark: Mark, line: str) -> Row | None:
+    def row(self, mark: Mark, line: str) -> FileRow | None:
         """The row of a line; None where it has to be looked at more closely."""
         if '"' in line:
             return None
@@ -173,7 +175,7 @@ class _PlainRows:
             texts = tuple(map(text_of_cell, own))
             if len(self.known) < MOST_KNOWN:
                 self.known[own] = texts
-        return Row(mark, texts, tuple(lengths))
+        return FileRow(mark, texts, tuple(lengths))
 
 
 def refuse_columns(mark: Mark, header: str, example: str) -> None:

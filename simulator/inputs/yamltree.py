@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps
+from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps
 from .settings import listing, shorten
 
 DEEPEST = 50
@@ -316,7 +316,7 @@ class _Builder:
 
     def refuse(self, mark: Mark, text: str) -> None:
         if len(self.messages) >= MOST_MESSAGES:
-            raise ExperimentError([*sorted(self.messages), mark.message("", ENOUGH)])
+            raise ExperimentError([*sorted(self.messages), mark.message("", MORE_ERRORS)])
         self.messages.append(mark.message("", text))
 
     def stop(self, mark: Mark, text: str) -> None:

@@ -151,6 +151,7 @@ def _attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resu
         raise CustomModelError(f"{what}: {told}{at}", key) from error
 
 
+# In one piece: each check of a model relies on those before it.
 def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
     """Raise what is wrong with a model, the first thing that is."""
     missing = [

@@ -338,7 +338,7 @@ def _droop(machine: MachineDescription) -> list[tuple[Field, float]]:
 
 
 def _at_reference(
-    one: Squareness, machine: MachineDescription, model: VolumetricModel, values: list[float]
+    squareness: Squareness, machine: MachineDescription, model: VolumetricModel, values: list[float]
 ) -> float:
     """The squareness error between lines through the reference point.
 
@@ -347,20 +347,20 @@ def _at_reference(
     -alpha*, plus the tilts. Displacements tilt nothing, as straightness errors have lost their
     straight line.
     """
-    if one.at is None:
-        return one.value
-    first, second = {"EC0Y": (0, 1), "EB0Z": (0, 2), "EA0Z": (1, 2)}[one.name]
-    sign = -1.0 if one.name == "EB0Z" else 1.0
+    if squareness.at is None:
+        return squareness.value
+    first, second = {"EC0Y": (0, 1), "EB0Z": (0, 2), "EA0Z": (1, 2)}[squareness.name]
+    sign = -1.0 if squareness.name == "EB0Z" else 1.0
     a = np.array([float(f.rotation) for f in model.chain.functions] + values)
     a[len(model.chain.functions) :] *= [not f.name.startswith("thermal") for f in model.fields]
     tilt = 0.0
     for along, across in ((first, second), (second, first)):
         t = np.linspace(0.0, 1.0, REDUCTION_POINTS)
-        x = np.tile(np.asarray(one.at), (len(t), 1))
+        x = np.tile(np.asarray(squareness.at), (len(t), 1))
         x[:, along] = machine.lower[along] + t * (machine.upper[along] - machine.lower[along])
         tilted = model.error(x, a, np.zeros_like(x))[:, across]
         tilt += reference_line(x[:, along], tilted, machine.criterion)[1]
-    return one.value + sign * tilt
+    return squareness.value + sign * tilt
 
 
 def fitted_volumetric(

@@ -32,7 +32,7 @@ from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_pa
 from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
-from ..inputs.tables import Row, read_table
+from ..inputs.tables import FileRow, read_table
 from ..machines.protocol import Array, ErrorModel, Unit
 from .generate import true_priors
 
@@ -215,7 +215,7 @@ def read_certificate(path: Path, experiment: Experiment) -> Experiment:
         raise ExperimentError([Message(str(path), 0, 0, "", text)])
     place = {one.key: k for k, one in enumerate(known)}
     pairs = {one.item for one in known if one.is_pair}
-    values, lines = np.full(len(known), np.nan), dict[int, Row]()
+    values, lines = np.full(len(known), np.nan), dict[int, FileRow]()
     for row in rows[:MOST_MESSAGES] if problems else rows:
         item, first, second, text = row.texts
         names = sorted((first, second)) if item in pairs else [first, second]
@@ -258,7 +258,7 @@ def read_certificate(path: Path, experiment: Experiment) -> Experiment:
     return found
 
 
-def _unknown(row: Row, known: list[CertifiedValue]) -> str:
+def _unknown(row: FileRow, known: list[CertifiedValue]) -> str:
     item, first, second, _ = row.texts
     own = [one for one in known if one.item == item]
     if not own:

@@ -75,6 +75,7 @@ def noisy_readings(
     )
 
 
+# In one piece: random numbers are drawn in an order on which what a seed gives depends.
 def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its
     uncertainty.

@@ -13,19 +13,19 @@ from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
-from .gross_errors import WrongPosition, WrongReading, find_misreadings
+from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 
 
-def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
+def refuse_gross_errors(design: Design, x: Array, marks: Sequence[Mark]) -> None:
     """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they
     are said to be of.
 
     `marks` tell where each of the design's readings stands. The rules are those of
-    `estimation.misreadings` and `estimation.length_ratios`.
+    `readings.gross_errors` and `estimation.length_ratios`.
 
     :raises ExperimentError: some readings are wrong; names all of them.
     """
-    positions, readings = find_misreadings(design, x)
+    positions, readings = find_gross_errors(design, x)
     messages = [_of_position(design, wrong, marks) for wrong in positions]
     told: set[int] = set()
     for wrong in readings:

@@ -81,7 +81,7 @@ class _Motions:
     agreeing: NDArray[np.bool_]
 
 
-def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
+def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     """Positions and readings that cannot be right, from scale readings x (readings, d).
 
     Readings of Bryan gauges pass: their directions need not be those of the drawing.
@@ -93,16 +93,16 @@ def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], lis
             readings=design.readings.select(compared),
             lengths=design.lengths.select(np.zeros(0, np.int64)),
         )
-        positions, found = _misreadings(of_others, x[compared]) if len(compared) else ([], [])
+        positions, found = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
         back = np.append(compared, -1)
         return positions, [
             replace(one, reading=int(back[one.reading]), partner=int(back[one.partner]))
             for one in found
         ]
-    return _misreadings(design, x)
+    return _gross_errors(design, x)
 
 
-def _misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
+def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
     seen = x + design.probes[readings.probe]
     pitch = _pitches(design)
@@ -185,10 +185,10 @@ def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: A
     return f"by {round(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))) % 360} degrees"
 
 
-def _in_frame(found: _Motions, position: Integers, seen: Array) -> Array:
+def _in_frame(motions: _Motions, position: Integers, seen: Array) -> Array:
     """Places seen (m, d) in the frames of the artefacts."""
     return np.asarray(
-        np.einsum("mji,mj->mi", found.rotations[position], seen - found.origins[position])
+        np.einsum("mji,mj->mi", motions.rotations[position], seen - motions.origins[position])
     )
 
 
@@ -293,7 +293,7 @@ def _worst_of_each_ball(
 
 
 def _explained(
-    design: Design, seen: Array, pitch: Array, found: _Motions, shape: Array, wrong: Integers
+    design: Design, seen: Array, pitch: Array, motions: _Motions, shape: Array, wrong: Integers
 ) -> list[WrongReading]:
     """What the wrong readings probably are: of another ball, with another probe, or simply
     wrong.
@@ -302,7 +302,7 @@ def _explained(
 
     readings = design.readings
     named: list[WrongReading] = []
-    local = _in_frame(found, readings.position, seen)
+    local = _in_frame(motions, readings.position, seen)
     other_ball = np.full(len(readings), -1)
     for artefact in np.unique(design.ball_artefact[readings.ball[wrong]]):
         own = np.flatnonzero(design.ball_artefact == artefact)
@@ -326,7 +326,7 @@ def _explained(
             int(readings.probe[i]),
             int(readings.ball[i]),
         )
-        should = found.rotations[position] @ shape[ball_of] + found.origins[position]
+        should = motions.rotations[position] @ shape[ball_of] + motions.origins[position]
         misfit_of = seen[i] - should
         size = float(np.sqrt(misfit_of @ misfit_of))
         with_probe = np.sqrt(((misfit_of + design.probes - design.probes[probe]) ** 2).sum(axis=1))

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from ..design.arrays import Design
 from ..design.observations import Lengths, Readings
 from ..estimation.spheres import fit_sphere
-from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
-from ..inputs.tables import Row, column_names, read_table
+from ..inputs.tables import FileRow, column_names, read_table
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .gross_error_messages import refuse_misreadings
+from .gross_error_messages import refuse_gross_errors
 
 AXES = ("x", "y", "z")
 
@@ -71,7 +71,7 @@ def read_readings(
     one that is not planned, once. Unless `every_ball` has to be read, some may be missing.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
-        cannot be of the ball they name (`estimation.misreadings`); all of a kind at once.
+        cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
     """
     texts = ["position", "ball", "probe"]
     columns, d = column_names(path), design.dimension
@@ -109,12 +109,12 @@ def read_readings(
         )
     marks = tuple(row.mark for row in rows)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
-    refuse_misreadings(observed.design, observed.x, observed.marks)
+    refuse_gross_errors(observed.design, observed.x, observed.marks)
     _refuse_repeated(rows, readings, design)
     return observed
 
 
-def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Message]]:
+def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[Message]]:
     """Indices (rows, 3) of ball, position and probe, and the messages about names unknown."""
     positions = {name: k for k, name in enumerate(design.position_names)}
     probes = {name: k for k, name in enumerate(design.probe_names)}
@@ -126,10 +126,10 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
     places: dict[tuple[str, ...], tuple[int, int, int]] = {}
     wrong: dict[tuple[str, ...], list[str]] = {}
     index: list[tuple[int, int, int]] = []
-    unknown: dict[str, list[Row]] = {}
+    unknown: dict[str, list[FileRow]] = {}
     for row in rows:
         if len(unknown) >= MOST_MESSAGES:
-            unknown.setdefault(ENOUGH, []).append(row)
+            unknown.setdefault(MORE_ERRORS, []).append(row)
             break
         if row.texts not in places:
             position, ball, probe = (*row.texts, design.probe_names[0])[:3]
@@ -166,12 +166,12 @@ def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
     return np.asarray((x < design.lower - size) | (x > design.upper + size))
 
 
-def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
+def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> None:
     """Refuse readings far outside the volume: their unit is not what it says."""
     messages: list[Message] = []
     for i, axis in np.argwhere(far_outside(x, design)).tolist():
         if len(messages) >= MOST_MESSAGES:
-            messages.append(rows[i].mark.message("", ENOUGH))
+            messages.append(rows[i].mark.message("", MORE_ERRORS))
             break
         text = (
             f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the"
@@ -182,12 +182,12 @@ def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None
         raise ExperimentError(messages)
 
 
-def _refuse_repeated(rows: tuple[Row, ...], readings: Readings, design: Design) -> None:
+def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Design) -> None:
     """Refuse readings that stand in the file more often than planned: a copied line counts as
     knowledge otherwise.
     """
     planned = Counter(_key(design.readings.expanded()))
-    places: dict[tuple[int, int, int], list[Row]] = {}
+    places: dict[tuple[int, int, int], list[FileRow]] = {}
     for key, row in zip(_key(readings), rows, strict=True):
         places.setdefault(key, []).append(row)
     messages = []

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from .fit import SplineFit
 from .space import Array
+from .spline_fit import SplineFit
 
 Powers = Literal["local", "global"]
 """Of x less the start of the piece, or of x itself."""
@@ -64,9 +64,12 @@ def pieces(fitted: SplineFit, powers: Powers = "local") -> Pieces:
     return Pieces(space.breaks, shifted, powers)
 
 
-def _absolute(found: Pieces, x: Array) -> Array:
-    piece = np.clip(np.searchsorted(found.breaks, x, "right") - 1, 0, len(found.coefficients) - 1)
-    u = np.abs(x - found.breaks[piece] if found.powers == "local" else x)
+def _absolute(pieces: Pieces, x: Array) -> Array:
+    piece = np.clip(np.searchsorted(pieces.breaks, x, "right") - 1, 0, len(pieces.coefficients) - 1)
+    u = np.abs(x - pieces.breaks[piece] if pieces.powers == "local" else x)
     return np.asarray(
-        sum(np.abs(found.coefficients[piece, k]) * u**k for k in range(found.coefficients.shape[1]))
+        sum(
+            np.abs(pieces.coefficients[piece, k]) * u**k
+            for k in range(pieces.coefficients.shape[1])
+        )
     )

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from ..inputs.quantities import (
     ANGLE_UNITS,
     LENGTH_UNITS,
@@ -59,7 +59,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Points:
+class CurvePoints:
     """Points in the order of the file, in metres and radians.
 
     `x` (m,) is not there where the abscissa is the arc length along the profile; `places` (m, 2),
@@ -77,10 +77,10 @@ class Points:
     places: Array | None = field(repr=False)
     normals: Array | None = field(default=None, repr=False)
 
-    def chosen(self, indices: Sequence[int]) -> Points:
+    def chosen(self, indices: Sequence[int]) -> CurvePoints:
         """Those of some indices."""
         index = list(indices)
-        return Points(
+        return CurvePoints(
             tuple(self.names[k] for k in index),
             tuple(self.features[k] for k in index),
             self.x_column,
@@ -93,7 +93,8 @@ class Points:
         )
 
 
-def read_points(path: Path, x: str | None = None, y: str | None = None) -> Points:
+# In one piece: one pass over the lines collects all points and all that is wrong with them.
+def read_points(path: Path, x: str | None = None, y: str | None = None) -> CurvePoints:
     """Read points from a file whose first line names the columns, each with its unit, such as
     position_mm,error_um.
 
@@ -171,7 +172,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
         names.append(name)
         features.append(cells[header.texts[FEATURE]][1] if FEATURE in header.texts else "")
     if len(messages) >= MOST_MESSAGES:
-        messages.append(Message(file, lines[0][0], 1, "", ENOUGH))
+        messages.append(Message(file, lines[0][0], 1, "", MORE_ERRORS))
     if len(lines) == 1:
         messages.append(
             Message(
@@ -186,7 +187,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
         raise ExperimentError(messages)
     table = np.array(values)
     by_name = {column.name: table[:, k] for k, column in enumerate(wanted)}
-    return Points(
+    return CurvePoints(
         tuple(names),
         tuple(features),
         x_column or Column(ARC_LENGTH, profile[0].unit, profile[0].factor, "length"),
@@ -213,7 +214,7 @@ def _direction(cells: Sequence[str]) -> list[float]:
     return [part / length for part in parts]
 
 
-def choose_points(points: Points, text: str, file: str) -> list[int]:
+def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
     """Indices of the points that a text such as 12-32, 40 names.
 
     :raises ExperimentError: names that the file does not have.

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .problems import Problem, SplineError
+from .spline_problems import SplineError, SplineProblem
 
 Array = NDArray[np.float64]
 Side = Literal["above", "below"]
@@ -41,17 +41,17 @@ class SplineSpace:
     def __post_init__(self) -> None:
         found = []
         if self.order < 2:
-            found.append(Problem("a spline's order is 2 (broken lines) at least"))
+            found.append(SplineProblem("a spline's order is 2 (broken lines) at least"))
         if not self.lower < self.upper:
             found.append(
-                Problem(
+                SplineProblem(
                     "the curve ends at {0}, not above its start at {1}", (self.upper, self.lower)
                 )
             )
         outside = [knot for knot in self.knots if not self.lower < knot < self.upper]
         for knot in dict.fromkeys(outside):
             found.append(
-                Problem(
+                SplineProblem(
                     "the knot at {0} is not between the ends, {1} and {2}; leave it out",
                     (knot, self.lower, self.upper),
                 )
@@ -59,14 +59,14 @@ class SplineSpace:
         for knot, times in Counter(self.knots).items():
             if times >= self.order:
                 found.append(
-                    Problem(
+                    SplineProblem(
                         f"the knot at {{0}} stands {times} times; give it {self.order - 1} times at"
                         " most",
                         (knot,),
                     )
                 )
         if list(self.knots) != sorted(self.knots):
-            found.append(Problem("the knots are out of order; give them in ascending order"))
+            found.append(SplineProblem("the knots are out of order; give them in ascending order"))
         if found:
             raise SplineError(found)
 
@@ -117,7 +117,7 @@ class SplineSpace:
         outside = np.unique(x[~((x >= self.lower) & (x <= self.upper))])
         if len(outside):
             raise SplineError(
-                Problem(
+                SplineProblem(
                     "{0} is outside the curve, from {1} to {2}; it is not extrapolated",
                     (u, self.lower, self.upper),
                 )

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.length_map.length_map import (
-    Groups,
-    Settings,
+from ballplate.error_maps.length_map import (
+    LengthGroups,
+    LengthMapSettings,
     class_edges,
     direction_classes,
     direction_names,
@@ -58,8 +58,8 @@ def experiment(tmp_path: Path) -> Experiment:
     return experiment_of(tmp_path, text)
 
 
-def settings(**changes: object) -> Settings:
-    return replace(Settings(GRID, "down", TARGET), **changes)  # type: ignore[arg-type]
+def settings(**changes: object) -> LengthMapSettings:
+    return replace(LengthMapSettings(GRID, "down", TARGET), **changes)  # type: ignore[arg-type]
 
 
 def test_the_whole_is_what_run_tells_of_the_same_points(experiment: Experiment) -> None:
@@ -109,7 +109,9 @@ def test_the_scatter_of_readings_is_that_along_the_length(tmp_path: Path) -> Non
         assert with_it[row] ** 2 - without[row] ** 2 == pytest.approx(added, rel=1e-9)
 
 
-def check_group(groups: Groups, k: int, u: np.ndarray, ratio: np.ndarray, coverage: float) -> None:
+def check_group(
+    groups: LengthGroups, k: int, u: np.ndarray, ratio: np.ndarray, coverage: float
+) -> None:
     assert groups.count[k] == len(u)
     known = ~np.isnan(u)
     assert groups.undetermined[k] == (~known).sum()
@@ -245,10 +247,10 @@ def test_a_deficient_design_is_told_and_named(
 
 
 def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    experiment_of(tmp_path, TEXT.replace("target_accuracy: 0.5 um + L/1000000\n", ""))
+    experiment_of(tmp_path, TEXT.replace("target_uncertainty: 0.5 um + L/1000000\n", ""))
     file = str(tmp_path / "design.yaml")
     for options, told in (
-        ([], "the file states no target_accuracy"),
+        ([], "the file states no target_uncertainty"),
         (["--target", "3"], '--target: "3" has no unit'),
         (
             ["--target", "1 um", "--grid", "3,3"],

@@ -26,7 +26,7 @@ ENTRY = """\
         "lengths of the body diagonals",
         lambda design, layout: (
             Distances(
-                Points(
+                MeasuredPoints(
                     np.stack(np.meshgrid(*zip(design.lower, design.upper)), axis=-1).reshape(-1, design.dimension),
                     np.full(2**design.dimension, design.point_probe),
                 ),
@@ -55,7 +55,7 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.cli import main
-from ballplate.requirements.goals import SYMBOLS
+from ballplate.planning.requirements.goals import SYMBOLS
 from ballplate.planning.criteria import NAMES
 
 def said(*arguments):

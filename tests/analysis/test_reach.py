@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.requirements.answers import Answer
-from ballplate.requirements.goals import Goal, GoalError, parse_goal
-from ballplate.requirements.search import reach
-from ballplate.requirements.steps import at_step, round_down, round_up, step_of
-from ballplate.requirements.unknowns import NotVariableError
+from ballplate.planning.requirements.answers import Answer
+from ballplate.planning.requirements.goals import Goal, GoalError, parse_goal
+from ballplate.planning.requirements.root_search import reach
+from ballplate.planning.requirements.steps import at_step, round_down, round_up, step_of
+from ballplate.planning.requirements.unknowns import NotVariableError
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
@@ -247,9 +247,9 @@ def test_goals_that_are_none(text: str, message: str) -> None:
 
 
 def test_what_the_file_does_not_have(tmp_path: Path) -> None:
-    file = written(tmp_path, UNCALIBRATED.replace("target_accuracy: 0.5 um + L/1000000\n", ""))
+    file = written(tmp_path, UNCALIBRATED.replace("target_uncertainty: 0.5 um + L/1000000\n", ""))
     experiment = load(file)[0]
-    with pytest.raises(GoalError, match="states no target_accuracy"):
+    with pytest.raises(GoalError, match="states no target_uncertainty"):
         reach(experiment, Goal())
     with pytest.raises(GoalError, match="the file has no tasks"):
         reach(experiment, Goal("tasks"))

@@ -10,8 +10,8 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.presentation.result import Result
 from ballplate.results.prediction import Prediction
-from ballplate.results.result import Result
 
 from tests.reference.tables import read_table
 

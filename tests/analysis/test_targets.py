@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.length_map.length_map import Settings, length_map
+from ballplate.error_maps.length_map import LengthMapSettings, length_map
+from ballplate.presentation.formatting import percent
 from ballplate.rank.verdict import Verdict, weak_limit
-from ballplate.results.formatting import percent
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.layout import lay_out
@@ -27,7 +27,7 @@ from ballplate.simulator.experiment.model import Experiment
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 TASKS = """\
-    - {name: short, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_accuracy: 0.3 um}
+    - {name: short, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_uncertainty: 0.3 um}
     - {name: long, from: [0 mm, 0 mm, 0 mm], to: [1 m, 1 m, 1 m]}
 """
 SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace(
@@ -36,7 +36,7 @@ SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace(
 SMALL = SMALL.replace("random: 200", "random: 30").replace(
     "  probe: down\n", f"  probe: down\n  tasks:\n{TASKS}"
 )
-TARGET = "target_accuracy: 0.5 um + L/1000000"
+TARGET = "target_uncertainty: 0.5 um + L/1000000"
 
 
 def written(folder: Path, text: str, name: str = "design.yaml") -> Path:
@@ -50,21 +50,21 @@ def experiment_of(folder: Path, text: str) -> Experiment:
 
 
 def with_target(target: str, factor: float = 1.0, text: str = SMALL) -> str:
-    return text.replace(TARGET, f"target_accuracy: {target}\ncoverage_factor: {factor:g}")
+    return text.replace(TARGET, f"target_uncertainty: {target}\ncoverage_factor: {factor:g}")
 
 
 def verdicts(experiment: Experiment) -> list[object]:
     """Everything that compares with the target."""
     found = predict(experiment)
     verdict: Verdict = check(experiment).verdict
-    mapped = length_map(experiment, Settings((3, 2, 3), "down", experiment.target_accuracy.stated,  # type: ignore[union-attr]
+    mapped = length_map(experiment, LengthMapSettings((3, 2, 3), "down", experiment.target_uncertainty.stated,  # type: ignore[union-attr]
                                              2.0, False, experiment.coverage_factor))  # fmt: skip
     return [
         found.quantities["U6"].within_target,
         found.quantities["tasks"].within_target,
         *(task.is_within for task in found.tasks),
         len(verdict.weak),
-        weak_limit(found.design, experiment.target_accuracy),
+        weak_limit(found.design, experiment.target_uncertainty),
         mapped.is_met,
         int(mapped.whole.within_target[0]),
     ]
@@ -162,7 +162,7 @@ def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str
         Path(file)
         .read_text(encoding="utf-8")
         .splitlines()[number - 1]
-        .startswith("target_accuracy")
+        .startswith("target_uncertainty")
     )
     assert main(["check", file, "--goal", not_quite, "--format", "junit"]) == 1
     failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
@@ -188,7 +188,7 @@ def test_goals_that_are_none_and_goals_that_cannot_be_judged(
     assert main(["check", file, "--share", "95%"]) == 2
     capsys.readouterr()
     assert main(["check", file, "--goal", "lengths"]) == 1
-    assert "the file states no target_accuracy" in capsys.readouterr().out
+    assert "the file states no target_uncertainty" in capsys.readouterr().out
 
 
 def test_weak_directions_fail_where_they_shall_not_be(tmp_path: Path) -> None:
@@ -207,7 +207,8 @@ def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
         assert main(["lengths", file, "--grid", "2"]) == 0
         mapped = length_map(
-            load(file)[0], Settings((2, 2, 2), "down", load(file)[0].target_accuracy.stated)
+            load(file)[0],
+            LengthMapSettings((2, 2, 2), "down", load(file)[0].target_uncertainty.stated),
         )  # type: ignore[union-attr]
         of_corners = factor * float(mapped.whole.maximum_ratio[0]) > 1
         assert main(["lengths", file, "--grid", "2", "--fail"]) == int(of_corners)

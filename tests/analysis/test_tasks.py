@@ -28,7 +28,7 @@ TASKS = """\
 evaluation:
   probe: down
   tasks:
-    - {name: bore distance, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_accuracy: 0.1 um}
+    - {name: bore distance, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_uncertainty: 0.1 um}
     - {name: from side to side, from: [0 mm, 300 mm, 400 mm], to: [900 mm, 400 mm, 450 mm], probes: [right, left]}
     - {name: height, from: [0 mm, 0 mm, 0 mm], to: [0 mm, 0 mm, 1 m], probe: front}
 """

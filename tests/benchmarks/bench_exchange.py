@@ -13,12 +13,18 @@ import pytest
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import criterion
 from ballplate.planning.information import Information, pool_information
-from ballplate.planning.search import Losses, Problem, best_addition, counted_root, full_root
+from ballplate.planning.search import (
+    Losses,
+    SelectionProblem,
+    best_addition,
+    counted_root,
+    full_root,
+)
 from ballplate.results.study import predict
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.threads import single_threaded
 
 POOL = Path("designs/planning/plate-pool.yaml")
 ROUNDS = 5
@@ -33,7 +39,7 @@ def seconds(function: Callable[[], object]) -> float:
     return time.perf_counter() - before
 
 
-def pool_of(folder: Path, balls: int) -> Problem:
+def pool_of(folder: Path, balls: int) -> SelectionProblem:
     text = POOL.read_text().replace("balls: [7, 7]", f"balls: [{balls}, {balls}]")
     path = folder / "pool.yaml"
     path.write_text(text)
@@ -43,10 +49,10 @@ def pool_of(folder: Path, balls: int) -> Problem:
     candidates = experiment.pool.candidates[:6] + experiment.pool.candidates[6::3]
     information = pool_information(experiment, candidates)
     limits = constraints(candidates, experiment.pool.changes, Budget(positions=6))
-    return Problem(information, criterion(information, experiment, "U6"), limits)
+    return SelectionProblem(information, criterion(information, experiment, "U6"), limits)
 
 
-def by_update(problem: Problem, left: Array, rows: Array) -> float:
+def by_update(problem: SelectionProblem, left: Array, rows: Array) -> float:
     """The criterion by an update of the covariance with the candidate's own rows (Woodbury), of
     full rank or not.
     """

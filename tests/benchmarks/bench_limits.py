@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.sweeps.task import Row
+from ballplate.sweeps.task import CellResult
 
 from tests.report.stores import axis, done, made_up
 
@@ -115,7 +115,7 @@ def many_cells(folder: Path) -> Path:
     """A store with made-up figures of a million cells."""
     count = 1000
 
-    def rows() -> Iterator[Row]:
+    def rows() -> Iterator[CellResult]:
         for k in range(count**2):
             figures = {
                 "parameters": 100.0,

@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.expansion import Expansion
+from ballplate.montecarlo.reference import Reference, Truth, reference
+from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.trials import run_trials
 from ballplate.simulator.design.arrays import State, nominal_state
 from ballplate.simulator.estimation.observations import distance_rows, reading_blocks
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.montecarlo.expansion import Expansion
-from ballplate.simulator.montecarlo.reference import Reference, Truth, reference
-from ballplate.simulator.montecarlo.replicates import BATCH, draw, estimate_batch
 from joblib import Parallel, delayed
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits

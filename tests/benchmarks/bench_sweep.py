@@ -23,7 +23,7 @@ from ballplate.sweeps.bundle import bundle_of, definition
 from ballplate.sweeps.frame import frame
 from ballplate.sweeps.load import load_sweep
 from ballplate.sweeps.store import add_rows, add_sweep, open_store
-from ballplate.sweeps.task import Task, compute
+from ballplate.sweeps.task import CellTask, compute
 
 ROOT = Path(__file__).parents[2]
 SWEEP = """\
@@ -65,7 +65,7 @@ def test_share_of_computation(tmp_path: Path, workers: int) -> None:
 def test_a_large_store(tmp_path: Path) -> None:
     path = written(tmp_path, 50_000)
     sweep = load_sweep(path)
-    row = compute(sweep, Task(0))
+    row = compute(sweep, CellTask(0))
     begun = time.perf_counter()
     store = open_store(tmp_path / "large.sqlite", create=True)
     number = add_sweep(store, definition(sweep, bundle_of(sweep)), ())

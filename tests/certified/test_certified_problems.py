@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ballplate.certified.answers import answers
-from ballplate.certified.problems import certified_problems
-from ballplate.certified.score import Score, scores
 from ballplate.cli import main
+from ballplate.reproduction.certified_answers import answers
+from ballplate.reproduction.certified_problems import certified_problems
+from ballplate.reproduction.score import Score, scores
 
 from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made

@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 from ballplate.cli import main
 from ballplate.cli.interruption import interruptions
-from ballplate.running import processes
-from ballplate.running.processes import in_processes
+from ballplate.simulator.computing import processes
+from ballplate.simulator.computing.processes import in_processes
 from ballplate.sweeps import execute
 
 from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored

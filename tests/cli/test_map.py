@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.error_maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.volumetric.volumetric_errors import Volumetric
 
 MACHINES = Path("designs/park/machines")
 ARM, BRIDGE, MEASURED = (
@@ -230,7 +230,7 @@ def test_a_picture_for_other_programs(scales: Path, tmp_path: Path) -> None:
 
 
 def test_magnification_is_round() -> None:
-    from ballplate.report.volumetric import magnification_of
+    from ballplate.report.volumetric_plots import magnification_of
 
     built = Volumetric(load_machine(ARM))
     found = built.errors(built.grid((3, 3, 3)))

@@ -18,7 +18,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.cli.memory import SMALLER, no_memory
 from ballplate.cli.run import run
-from ballplate.running.processes import in_processes
+from ballplate.simulator.computing.processes import in_processes
 
 QUICKSTART = "designs/quickstart.yaml"
 

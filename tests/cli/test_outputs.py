@@ -41,7 +41,7 @@ positions:
   - {name: turned, artefact: plate, pose: {origin: [450 mm, 50 mm], rotation: 90 deg}}
 calibration:
   - {kind: distances, artefact: plate, pairs: [[a, b]], standard_uncertainty: 0.5 um}
-target_accuracy: 2 um
+target_uncertainty: 2 um
 evaluation: {points: {random: 10, seed: 1}}
 seed: 1
 """

@@ -15,7 +15,7 @@ from ballplate.estimators.distances import (
     count_terms,
 )
 from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.rivals import RivalName
+from ballplate.simulator.estimation.alternative_estimators import AlternativeName
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -158,7 +158,10 @@ def _terms(experiment: Experiment, pair_set: Integers, estimator: str, across_pr
 @pytest.mark.parametrize("estimator", ["distances", "cresto", "kruth"])
 @pytest.mark.parametrize("pair_set", ["braced", "all", None])
 def test_more_terms_than_there_is_memory_for(
-    monkeypatch: pytest.MonkeyPatch, estimator: RivalName, pair_set: str | None, across_probes: bool
+    monkeypatch: pytest.MonkeyPatch,
+    estimator: AlternativeName,
+    pair_set: str | None,
+    across_probes: bool,
 ) -> None:
     """Refused is one term more than possible; what is counted are the terms that the estimators
     have.

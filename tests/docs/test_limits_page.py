@@ -8,17 +8,17 @@ from pathlib import Path
 import pytest
 from ballplate.cli import lengths as lengths_command
 from ballplate.cli import spline
-from ballplate.error_curve import error_curve as curve
+from ballplate.error_maps import error_curve as curve
+from ballplate.error_maps import length_map as lengths
+from ballplate.error_maps import volumetric_errors as volumetric
 from ballplate.estimators import distances as estimators
 from ballplate.gross_errors import leftover
-from ballplate.length_map import length_map as lengths
 from ballplate.montecarlo import trials
 from ballplate.planning import criteria, information
-from ballplate.requirements import search
+from ballplate.planning.requirements import root_search as search
 from ballplate.simulator.experiment import (
     calibrations,
     checks,
-    curves,
     machine_sections,
     pool_groups,
     priors,
@@ -26,11 +26,14 @@ from ballplate.simulator.experiment import (
     sections,
     variants,
 )
+from ballplate.simulator.experiment import (
+    curve_files as curves,
+)
 from ballplate.simulator.geometry import artefacts, directions
 from ballplate.simulator.inputs import messages, tables, yamltree
 from ballplate.simulator.splines import read
-from ballplate.sweeps import axes, bundle, load, settings
-from ballplate.volumetric import volumetric_errors as volumetric
+from ballplate.sweeps import axes, bundle, load
+from ballplate.sweeps import sweep_settings as settings
 
 PAGE = Path("docs/reference/limits.md")
 

@@ -18,13 +18,16 @@ from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.estimation.alternative_estimators import (
+    AlternativeName,
+    alternative_estimate,
+)
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
 from ballplate.simulator.estimation.length_equations import length_estimate
 from ballplate.simulator.estimation.observations import expected_readings
 from ballplate.simulator.estimation.parameters import shared_layout
-from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -345,9 +348,9 @@ TRUE_METRIC = {
 }
 
 
-@pytest.mark.parametrize("estimator", get_args(RivalName))
+@pytest.mark.parametrize("estimator", get_args(AlternativeName))
 def test_estimators_of_distances_take_the_same_lengths(
-    estimator: RivalName, tmp_path: Path
+    estimator: AlternativeName, tmp_path: Path
 ) -> None:
     """Without a plate the lengths are all there is, and every estimator is the weighted one of the
     dense covariance.
@@ -355,7 +358,7 @@ def test_estimators_of_distances_take_the_same_lengths(
     made = experiment(tmp_path, flat(3), GROWING, **COARSE, **TRUE_METRIC)
     design, x, _, _ = physical(made, np.random.default_rng(8))
     alone = without_plate(design)
-    found = rival_estimate(alone, x, np.zeros((0, 2), np.int64), estimator)
+    found = alternative_estimate(alone, x, np.zeros((0, 2), np.int64), estimator)
     expected, spread = weighted(alone, x)
     assert found.status == "converged" and found.observations == np.linalg.matrix_rank(
         dense.length_covariance(alone), 1e-21

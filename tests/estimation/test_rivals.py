@@ -1,4 +1,4 @@
-"""Rival estimators against their objectives written out, and on exact data."""
+"""Alternative estimators against their objectives written out, and on exact data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import get_args
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
+from ballplate.simulator.estimation.alternative_estimators import (
+    AlternativeName,
+    alternative_estimate,
+)
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
@@ -38,11 +41,11 @@ def observed(design: Design, exact: bool = False) -> tuple[Design, np.ndarray]:
 
 
 @pytest.mark.parametrize("across", [False, True])
-@pytest.mark.parametrize("estimator", get_args(RivalName))
-def test_exact_readings_give_the_truth_back(estimator: RivalName, across: bool) -> None:
+@pytest.mark.parametrize("estimator", get_args(AlternativeName))
+def test_exact_readings_give_the_truth_back(estimator: AlternativeName, across: bool) -> None:
     design, x = observed(small(), exact=True)
     truth = truth_of(small(), errors=3e-6)
-    found = rival_estimate(design, x, ALL, estimator, across)
+    found = alternative_estimate(design, x, ALL, estimator, across)
     assert found.status == "converged" and found.deficiency == 0 and len(found.iterations) <= 6
     np.testing.assert_allclose(found.a, truth.a, rtol=0, atol=1e-12)
 
@@ -109,15 +112,15 @@ def objective(
 
 
 @pytest.mark.parametrize("across", [False, True])
-@pytest.mark.parametrize("estimator", get_args(RivalName))
+@pytest.mark.parametrize("estimator", get_args(AlternativeName))
 def test_the_objective_is_the_one_stated_and_at_its_minimum(
-    estimator: RivalName, across: bool
+    estimator: AlternativeName, across: bool
 ) -> None:
     design, x = observed(small())
     seen = design.readings.ball % 7 != design.readings.position
     design, x = replace(design, readings=design.readings.select(seen)), x[seen]
     chosen = np.array(neighbours(grid(4)))
-    found = rival_estimate(design, x, chosen, estimator, across)
+    found = alternative_estimate(design, x, chosen, estimator, across)
     least = objective(design, x, estimator, found.a, chosen, across)
     assert found.iterations[-1].sum_of_squares == pytest.approx(least, rel=1e-7)
     for k in range(0, len(found.a), 4):
@@ -130,15 +133,15 @@ def test_the_objective_is_the_one_stated_and_at_its_minimum(
         assert above > 0 and below > 0 and above == pytest.approx(below, rel=0.02)
 
 
-@pytest.mark.parametrize("estimator", get_args(RivalName))
-def test_without_a_calibrated_distance_the_scale_is_open(estimator: RivalName) -> None:
+@pytest.mark.parametrize("estimator", get_args(AlternativeName))
+def test_without_a_calibrated_distance_the_scale_is_open(estimator: AlternativeName) -> None:
     design = small()
     design = replace(
         design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
     )
     truth = replace(truth_of(design), a=np.zeros(len(design.model.parameters)), balls=design.balls)
     readings, x = exact_readings(design, truth)
-    found = rival_estimate(replace(design, readings=readings), x, ALL, estimator)
+    found = alternative_estimate(replace(design, readings=readings), x, ALL, estimator)
     assert found.deficiency == 1
     largest = np.argsort(-np.abs(found.null[:, 0]))[:3]
     assert {design.model.parameters[k].function for k in largest} == {"EXX", "EYY", "EZZ"}
@@ -148,7 +151,10 @@ def test_repeated_readings_are_combined() -> None:
     design, x = observed(small())
     twice = replace(design, readings=design.readings.select(np.repeat(np.arange(len(x)), 2)))
     smaller = replace(design, repeatability=design.repeatability / np.sqrt(2))
-    a, b = rival_estimate(twice, np.repeat(x, 2, axis=0), ALL), rival_estimate(smaller, x, ALL)
+    a, b = (
+        alternative_estimate(twice, np.repeat(x, 2, axis=0), ALL),
+        alternative_estimate(smaller, x, ALL),
+    )
     np.testing.assert_allclose(a.a, b.a, rtol=0, atol=1e-14)
     assert a.iterations[-1].sum_of_squares == pytest.approx(
         b.iterations[-1].sum_of_squares, rel=1e-9

@@ -11,7 +11,11 @@ import mpmath
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import Coordinates, Distances, Priors
+from ballplate.simulator.design.observations import (
+    CalibratedCoordinates,
+    CalibratedDistances,
+    Priors,
+)
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.uncertainty.summaries import point_pairs
 from hypothesis import given, settings
@@ -87,7 +91,7 @@ def with_known(design: Design, known: Known) -> Design:
         value = np.sqrt(((design.balls[first] - design.balls[second]) ** 2).sum())
         return replace(
             design,
-            distances=Distances(
+            distances=CalibratedDistances(
                 np.append(old.first, first),
                 np.append(old.second, second),
                 np.append(old.dimensions, 3),
@@ -99,7 +103,7 @@ def with_known(design: Design, known: Known) -> Design:
     given = design.coordinates
     return replace(
         design,
-        coordinates=Coordinates(
+        coordinates=CalibratedCoordinates(
             np.append(given.ball, ball),
             np.append(given.axis, axis),
             np.append(given.value, design.balls[ball, axis]),

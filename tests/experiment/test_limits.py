@@ -231,9 +231,9 @@ def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
 
 
 def test_the_slope_of_an_uncertainty_that_nothing_has(tmp_path: Path) -> None:
-    (line,) = refusals(tmp_path, f"{GOOD}target_accuracy: 0.2 um + L/1e-3\n")
+    (line,) = refusals(tmp_path, f"{GOOD}target_uncertainty: 0.2 um + L/1e-3\n")
     assert '"0.2 um + L/1e-3" grows by 1000 m per metre of length' in line
-    (line,) = refusals(tmp_path, f"{GOOD}target_accuracy: 0.2 um + L/1e19\n")
+    (line,) = refusals(tmp_path, f"{GOOD}target_uncertainty: 0.2 um + L/1e19\n")
     assert line.endswith("grows too slowly; leave out what it grows by, or give 1e-18 m/m or more")
 
 

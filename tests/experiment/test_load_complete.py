@@ -84,7 +84,7 @@ priors:
 evaluation:
   points: {random: 200, seed: 1}
   probe: side
-target_accuracy: 0.5 um + L/1000000
+target_uncertainty: 0.5 um + L/1000000
 coverage_factor: 2
 sigma: given
 expected_rank_deficiency: 0
@@ -161,7 +161,7 @@ def test_heading(complete: Experiment) -> None:
         7,
         "given",
     )
-    assert complete.target_accuracy == Target(LengthFunction(5e-7, 1e-6), 2.0)
+    assert complete.target_uncertainty == Target(LengthFunction(5e-7, 1e-6), 2.0)
     assert complete.expected_rank_deficiency == 0
     assert (complete.error_model.kind, complete.true_machine.kind) == ("kinematic", "zero")
 
@@ -254,7 +254,7 @@ def test_plane_experiment_with_defaults(plane: Experiment) -> None:
     np.testing.assert_array_equal(plane.probes["probe"], [0.0, 0.0])
     assert plane.evaluation.points.shape == (0, 2) and plane.evaluation.probe == "probe"
     assert (plane.description, plane.sigma, plane.seed) == ("", "estimated", 1)
-    assert plane.target_accuracy is None and plane.expected_rank_deficiency is None
+    assert plane.target_uncertainty is None and plane.expected_rank_deficiency is None
     assert plane.true_machine.kind == "zero"
     first, second, third = plane.positions
     assert first.readings[0].probes == ("probe",) and first.readings[0].repeats == 1

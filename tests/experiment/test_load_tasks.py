@@ -16,12 +16,12 @@ probes: {down: [0 mm, 0 mm, -50 mm], side: [50 mm, 0 mm, 0 mm]}
 artefacts: {plate: {kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}}
 positions:
   - {name: low, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}
-target_accuracy: 1 um
+target_uncertainty: 1 um
 evaluation:
   probe: side
   tasks:
     - {name: a, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}
-    - {name: b, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm], probe: down, target_accuracy: 0.2 um + L/1000000}
+    - {name: b, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm], probe: down, target_uncertainty: 0.2 um + L/1000000}
     - {name: c, from: [0 mm, 0 mm, 0 mm], to: [0 mm, 0 mm, 0 mm], probes: [down, side]}
 """
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.error_maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment import ExperimentError, load
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.curves import Points
@@ -18,7 +19,6 @@ from ballplate.simulator.machines.description import (
     Squareness,
     random_part,
 )
-from ballplate.volumetric.volumetric_errors import Volumetric
 
 MACHINE = """\
 title: moving horizontal arm
@@ -383,7 +383,7 @@ def test_reversed_ends_are_told_with_everything_else(tmp_path: Path) -> None:
 
 
 def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ballplate.simulator.experiment.curves.MOST_POINTS", 2)
+    monkeypatch.setattr("ballplate.simulator.experiment.curve_files.MOST_POINTS", 2)
     (line,) = told(written(tmp_path))
     assert line.startswith("eyx.csv:5:1: 3 points are too many; at most 2 are possible")
 

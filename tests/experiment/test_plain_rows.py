@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.quantities import LENGTH_UNITS, plain_number, power_of_ten
-from ballplate.simulator.inputs.tables import Row, read_table
+from ballplate.simulator.inputs.tables import FileRow, read_table
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -53,7 +53,7 @@ def test_plain_numbers_are_the_nearest_ones(number: str, unit: str) -> None:
         )
 
 
-def _read(path: Path, unit: str, lines: list[str]) -> tuple[tuple[Row, ...], list[Message]]:
+def _read(path: Path, unit: str, lines: list[str]) -> tuple[tuple[FileRow, ...], list[Message]]:
     path.write_text("\n".join([f"ball,x_{unit},y_{unit}", *lines]) + "\n", encoding="utf-8")
     problems: list[Message] = []
     try:

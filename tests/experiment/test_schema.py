@@ -53,7 +53,7 @@ DOCUMENTED = [
     "random",
     "seed",
     "probe",
-    "target_accuracy",
+    "target_uncertainty",
     "sigma",
     "expected_rank_deficiency",
     "pool",

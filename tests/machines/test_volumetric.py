@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.error_maps.volumetric_errors import Volumetric, between
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.curves import Points
@@ -24,7 +25,6 @@ from ballplate.simulator.machines.description import (
 from ballplate.simulator.machines.straightness import Criterion
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import true_parameters
-from ballplate.volumetric.volumetric_errors import Volumetric, between
 
 from tests.published.rigid_body import tip_error
 

@@ -11,11 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
+from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines, with_error
 from ballplate.montecarlo.experiments import trials, true_experiment
-from ballplate.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
-from ballplate.montecarlo.tally import tally
-from ballplate.montecarlo.targets import Target, sample_of_pairs, targets
+from ballplate.montecarlo.figures import (
+    MonteCarloComparison,
+    MonteCarloEstimate,
+    MonteCarloOutcome,
+    outcome,
+    power_of_misfit,
+)
+from ballplate.montecarlo.reference import Reference, reference
+from ballplate.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, targets
 from ballplate.montecarlo.trials import run_trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
@@ -27,8 +35,6 @@ from ballplate.simulator.estimation.observations import (
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.montecarlo.reference import Reference, reference
-from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:
@@ -41,7 +47,7 @@ def quickstart() -> Reference:
 
 
 @cache
-def two_thousand() -> Outcome:
+def two_thousand() -> MonteCarloOutcome:
     """6.2.1 at n = 5, sigma 0.2 um, NDEL = NEPS = 5, on a machine with errors."""
     return run_trials(quickstart(), 1, 2048)
 
@@ -91,12 +97,14 @@ def test_standard_errors_are_the_scatter_of_repeated_runs() -> None:
     # On a machine with a bias, which has a scatter of its own.
     aims = tuple(replace(aim, base=aim.base + 0.7 * aim.uncertainty) for aim in targets(shared))
     runs = [
-        outcome(shared, aims, tally(shared, aims, estimate_batch(shared, 7, k), BATCH))
+        outcome(shared, aims, accumulate(shared, aims, estimate_batch(shared, 7, k), BATCH))
         for k in range(32)
     ]
     for symbol in ("U1", "U4", "U6"):
         for name in ("spread", "actual", "bias", "known", "estimated"):
-            figures: list[Figure] = [getattr(run.comparisons[symbol], name) for run in runs]
+            figures: list[MonteCarloEstimate] = [
+                getattr(run.comparisons[symbol], name) for run in runs
+            ]
             scatter = float(np.std([figure.value for figure in figures], ddof=1))
             stated = float(np.sqrt(np.mean([figure.error**2 for figure in figures])))
             # The scatter of 32 is itself known to 13 %.
@@ -109,8 +117,8 @@ def test_bias_is_found_where_there_is_one_and_only_there() -> None:
     shifted = tuple(replace(aim, base=aim.base + 0.5 * aim.uncertainty) for aim in aims)
     parts = [estimate_batch(shared, 1, k) for k in range(6)]
 
-    def found(followed: tuple[Target, ...]) -> Comparison:
-        first, *rest = (tally(shared, followed, part, BATCH) for part in parts)
+    def found(followed: tuple[MonteCarloQuantity, ...]) -> MonteCarloComparison:
+        first, *rest = (accumulate(shared, followed, part, BATCH) for part in parts)
         return outcome(shared, followed, sum(rest, first)).comparisons["U5"]
 
     with_bias, without = found(shifted), found(aims)
@@ -133,7 +141,7 @@ def test_actual_errors_are_compared_as_root_mean_squares() -> None:
     ][0]
     tiny.uncertainty[0] *= 1e-3
     for aim in (of_angles, tiny):
-        first, second = (tally(shared, (aim,), part, BATCH) for part in parts)
+        first, second = (accumulate(shared, (aim,), part, BATCH) for part in parts)
         found = outcome(shared, (aim,), first + second).comparisons[aim.symbol].actual
         errors = np.concatenate([aim.change(part.found) + aim.base for part in parts])
         of_units = []
@@ -178,11 +186,13 @@ def test_a_replicate_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyP
     aims = targets(shared)
     found = estimate_batch(shared, 1, 2)
     failed = replace(found, converged=found.converged & (np.arange(BATCH) != 5))
-    total = tally(shared, aims, failed, 60)
+    total = accumulate(shared, aims, failed, 60)
     assert (total.count, total.failed) == (59, (2 * BATCH + 5,))
-    assert tally(shared, aims, failed, 4).failed == ()
+    assert accumulate(shared, aims, failed, 4).failed == ()
     none = outcome(
-        shared, aims, tally(shared, aims, replace(found, converged=found.converged & False), 60)
+        shared,
+        aims,
+        accumulate(shared, aims, replace(found, converged=found.converged & False), 60),
     )
     assert none.comparisons == {} and len(none.failed) == 60
 
@@ -202,9 +212,9 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
     assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
     # A misfit that does no harm.
     for ratio, harm in (
-        (Figure(1.03, 0.01), False),
-        (Figure(1.05, 0.01), True),
-        (Figure(0.9, 0.01), False),
+        (MonteCarloEstimate(1.03, 0.01), False),
+        (MonteCarloEstimate(1.05, 0.01), True),
+        (MonteCarloEstimate(0.9, 0.01), False),
     ):
         one = replace(done.outcome.comparisons["U4"], actual=ratio)
         harmless = replace(done, outcome=replace(done.outcome, comparisons={"U4": one}))
@@ -314,11 +324,11 @@ def test_a_sample_of_pairs_has_each_pair_once() -> None:
 @pytest.mark.parametrize(
     ("figure", "text"),
     [
-        (Figure(0.95, 0.0), "0.95"),
-        (Figure(1.0, 0.0996), "1.0(1)"),
-        (Figure(1234.0, 56.0), "1234(56)"),
-        (Figure(float("nan"), 1.0), "-"),
+        (MonteCarloEstimate(0.95, 0.0), "0.95"),
+        (MonteCarloEstimate(1.0, 0.0996), "1.0(1)"),
+        (MonteCarloEstimate(1234.0, 56.0), "1234(56)"),
+        (MonteCarloEstimate(float("nan"), 1.0), "-"),
     ],
 )
-def test_figures_with_their_error(figure: Figure, text: str) -> None:
+def test_figures_with_their_error(figure: MonteCarloEstimate, text: str) -> None:
     assert with_error(figure) == text

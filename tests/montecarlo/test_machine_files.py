@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import true_experiment
+from ballplate.montecarlo.reference import reference
 from ballplate.montecarlo.targets import targets
 from ballplate.simulator.experiment import load
-from ballplate.simulator.montecarlo.reference import reference
 
 SHIPPED = Path("designs/park")
 KEYS = {

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.expansion import Direct, Expansion
+from ballplate.montecarlo.reference import RankDeficientError, Reference, Truth, reference
+from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations import Coordinates, Lengths, Priors, Readings
+from ballplate.simulator.design.observations import CalibratedCoordinates, Lengths, Priors, Readings
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
-from ballplate.simulator.montecarlo.expansion import Direct, Expansion
-from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
-from ballplate.simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
@@ -152,7 +152,9 @@ def plane() -> Design:
         held=np.zeros((3, 3), bool),
         readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
         distances=small(pairs=False).distances,
-        coordinates=Coordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
+        coordinates=CalibratedCoordinates(
+            certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)
+        ),
         points=np.zeros((0, 2)),
     )
 
@@ -277,5 +279,5 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
 def test_a_deficient_design_has_no_replicates() -> None:
     design = replace(small(), distances=small(pairs=False).distances)
     design = replace(design, probes=np.zeros_like(design.probes))
-    with pytest.raises(NoReferenceError, match="deficient"):
+    with pytest.raises(RankDeficientError, match="deficient"):
         reference(design, truth(design))

@@ -15,7 +15,7 @@ artefacts:
   bar: {kind: two_spheres, length: 350 mm, role: length_standard}
 calibration:
   - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.5 um}
-target_accuracy: 2 um + L/300000
+target_uncertainty: 2 um + L/300000
 evaluation:
   points: {random: 20, seed: 1}
   probe: down

@@ -18,9 +18,9 @@ from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.done import done_candidates
 from ballplate.planning.earlier import earlier_choice
 from ballplate.planning.offer import offer
-from ballplate.planning.search import Problem
+from ballplate.planning.search import SelectionProblem
 from ballplate.results.study import predict
-from ballplate.running.internal_error import InternalError
+from ballplate.simulator.computing.internal_error import InternalError
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
@@ -298,7 +298,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
 
     right = planning.bound
 
-    def wrong(problem: Problem) -> Bound | None:
+    def wrong(problem: SelectionProblem) -> Bound | None:
         found = right(problem)
         is_wrong = problem.constraints.budget.positions == positions
         return replace(found, value=10 * found.value) if found is not None and is_wrong else found

@@ -12,7 +12,7 @@ from ballplate.planning.campaign import Request, campaign
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
-from ballplate.planning.search import Losses, Problem, value
+from ballplate.planning.search import Losses, SelectionProblem, value
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
@@ -46,12 +46,12 @@ pool:
 """
 
 
-def problem_of(experiment: Experiment, name: CriterionName) -> Problem:
+def problem_of(experiment: Experiment, name: CriterionName) -> SelectionProblem:
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
     information = pool_information(experiment, candidates, is_about_balls(name))
     limits = constraints(candidates, experiment.pool.changes, Budget())
-    return Problem(information, criterion(information, experiment, name), limits)
+    return SelectionProblem(information, criterion(information, experiment, name), limits)
 
 
 def in_full(found: Prediction, name: CriterionName) -> float:
@@ -148,7 +148,7 @@ def test_combinations_of_balls_change_nothing() -> None:
     chosen = [0, 1, 8, 17, 30, 40, 50]
     limits = constraints(experiment.pool.candidates, experiment.pool.changes, Budget())
     found = [
-        value(Problem(one, criterion(one, experiment, "U6"), limits), chosen)
+        value(SelectionProblem(one, criterion(one, experiment, "U6"), limits), chosen)
         for one in (some, every)
     ]
     assert found[0] == pytest.approx(found[1], rel=1e-12)
@@ -275,8 +275,8 @@ def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
 # that are coarse.
 TIGHT = {
     "a prior": (
-        "target_accuracy",
-        "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_accuracy",
+        "target_uncertainty",
+        "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_uncertainty",
     ),
     "coarse readings": ("repeatability: 1 um", "repeatability: 10 mm"),
     "an item on offer": (

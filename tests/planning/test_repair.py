@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.checking.check_files import Wanted, check_files
-from ballplate.planning.repair.changes import Kind, apply_all
+from ballplate.cli.check_files import Wanted, check_files
+from ballplate.planning.repair.changes import ChangeKind, apply_all
 from ballplate.planning.repair.judging import examine, judge
 from ballplate.planning.repair.offers import offers
+from ballplate.planning.repair.repair_search import Repair, Repairs, repairs
 from ballplate.planning.repair.repair_tables import repair_lines
 from ballplate.planning.repair.screening import rank_of, seen_by
-from ballplate.planning.repair.search import Repair, Repairs, repairs
 from ballplate.results.study import check
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -172,7 +172,7 @@ def test_words_name_errors_and_positions() -> None:
         "repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: "
     )
     kinds = [one.changes[0].kind for one in repaired("npl/6.1.1", "B").complete]
-    assert kinds == [Kind.MOVE, Kind.READ_MORE, Kind.CERTIFICATE]
+    assert kinds == [ChangeKind.MOVE, ChangeKind.READ_MORE, ChangeKind.CERTIFICATE]
 
 
 @pytest.mark.parametrize("file, variant", DEFICIENT[:3])
@@ -370,7 +370,10 @@ def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
     found = repairs(replace(experiment, pool=pool), most=1)
     assert found is not None
     return [
-        change.words for one in found.complete for change in one.changes if change.kind == Kind.POOL
+        change.words
+        for one in found.complete
+        for change in one.changes
+        if change.kind == ChangeKind.POOL
     ]
 
 
@@ -390,8 +393,8 @@ def test_what_costs_nothing_is_told_before_what_the_pool_has_a_price_for() -> No
     found = repairs(replace(experiment, pool=pool_of(experiment, [60.0, 5400.0, 1800.0])), most=2)
     assert found is not None and not any(one.weak or one.is_faint for one in found.complete)
     assert [[change.kind for change in one.changes] for one in found.complete] == [
-        [Kind.MOVE],
-        [Kind.POOL],
+        [ChangeKind.MOVE],
+        [ChangeKind.POOL],
     ]
 
 
@@ -404,7 +407,7 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     (one,) = checked.designs
     assert one.repairs is not None and one.plan.verdict.deficiency
     first = one.repairs.complete[0]
-    assert [change.kind for change in first.changes] == [Kind.POOL]
+    assert [change.kind for change in first.changes] == [ChangeKind.POOL]
     after = check(written_out(said, first, tmp_path)).verdict
     assert not after.deficiency and not after.weak
 
@@ -412,14 +415,14 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
 def test_other_additions_than_the_pools_are_not_told() -> None:
     experiment = design("npl/6.1.1", "B")
     found = offers(replace(experiment, pool=pool_of(experiment, [1.0, 2.0, 3.0])))
-    assert Kind.ADD_POSITION not in found and Kind.CERTIFICATE not in found
-    assert [one.cost for one in found[Kind.POOL]] == [1.0, 2.0, 3.0]
+    assert ChangeKind.ADD_POSITION not in found and ChangeKind.CERTIFICATE not in found
+    assert [one.cost for one in found[ChangeKind.POOL]] == [1.0, 2.0, 3.0]
 
 
 def test_a_set_of_a_pool_is_minimal() -> None:
     """Distances of one line each, of which two are needed."""
     experiment = design("npl/6.1.1", "B")
-    single = [one for one in offers(experiment)[Kind.CERTIFICATE] if one.cost == 1.0]
+    single = [one for one in offers(experiment)[ChangeKind.CERTIFICATE] if one.cost == 1.0]
     drawn = [Candidate(one.name, one, 600.0, "", "", True, {}) for one in experiment.positions]
     more = [
         Candidate(one.words, one.adds, 60.0 * (k + 1), "", "", False, {})
@@ -430,7 +433,7 @@ def test_a_set_of_a_pool_is_minimal() -> None:
     found = repairs(replace(experiment, pool=pool), most=1)
     assert found is not None
     chosen = found.complete[0].changes
-    assert [one.kind for one in chosen] == [Kind.POOL, Kind.POOL]
+    assert [one.kind for one in chosen] == [ChangeKind.POOL, ChangeKind.POOL]
     base = examine(experiment)
     costs = {frozenset((a, b)): a.cost + b.cost for a in chosen for b in chosen if a is not b}
     seen = seen_by(base, single)

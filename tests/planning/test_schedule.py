@@ -9,7 +9,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from ballplate.planning.changeover import MOST_EXACT, Kind, changeover, cheapest
+from ballplate.planning.changeover import MOST_EXACT, Setup, changeover, cheapest
 from ballplate.planning.schedule import ordered, run_sheet
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 CHANGES = ChangeTimes(probe=120.0, plane=1800.0)
 
 kinds = st.builds(
-    Kind,
+    Setup,
     st.sampled_from(["plate", "bar"]),
     st.sampled_from("xyz"),
     st.frozensets(st.sampled_from(["down", "left", "right"]), min_size=1),
@@ -30,7 +30,7 @@ change_times = st.builds(
 )
 
 
-def position(kind: Kind, name: str, seconds: float = 600.0) -> Candidate:
+def position(kind: Setup, name: str, seconds: float = 600.0) -> Candidate:
     balls = np.arange(1)
     group = ReadingGroup(tuple(sorted(kind.probes)), ("1",), balls, 1)
     item = Position(name, kind.artefact, Pose(np.eye(3), np.zeros(3)), (group,))
@@ -53,7 +53,7 @@ def cost(sequence: Sequence[tuple[Candidate, Sequence[str]]], changes: ChangeTim
     return total
 
 
-def every_order(members: Sequence[Kind]) -> Iterator[list[tuple[Kind, tuple[str, ...]]]]:
+def every_order(members: Sequence[Setup]) -> Iterator[list[tuple[Setup, tuple[str, ...]]]]:
     """Every order of positions and of probes within them, positions of equal kind together."""
     for order in permutations(dict.fromkeys(members)):
         sequence = [kind for kind in order for _ in range(members.count(kind))]
@@ -61,7 +61,7 @@ def every_order(members: Sequence[Kind]) -> Iterator[list[tuple[Kind, tuple[str,
             yield list(zip(sequence, probes, strict=True))
 
 
-def least_of_all(members: Sequence[Kind], changes: ChangeTimes) -> float:
+def least_of_all(members: Sequence[Setup], changes: ChangeTimes) -> float:
     return min(
         cost([(position(kind, "p"), probes) for kind, probes in order], changes)
         for order in every_order(members)
@@ -70,7 +70,7 @@ def least_of_all(members: Sequence[Kind], changes: ChangeTimes) -> float:
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(kinds, min_size=1, max_size=4), change_times)
-def test_least_change_over_of_all_orders(members: list[Kind], changes: ChangeTimes) -> None:
+def test_least_change_over_of_all_orders(members: list[Setup], changes: ChangeTimes) -> None:
     least = least_of_all(members, changes)
     assert changeover(members, changes) == least
     sequence = ordered([position(kind, str(k)) for k, kind in enumerate(members)], changes)
@@ -85,7 +85,7 @@ def test_least_change_over_of_all_orders(members: list[Kind], changes: ChangeTim
 @settings(max_examples=25, deadline=None)
 @given(kinds, st.lists(kinds, min_size=1, max_size=3), change_times)
 def test_of_the_cheapest_orders_that_which_goes_on_from_what_is_done(
-    before: Kind, members: list[Kind], changes: ChangeTimes
+    before: Setup, members: list[Setup], changes: ChangeTimes
 ) -> None:
     done = position(before, "done")
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
@@ -106,7 +106,7 @@ def test_of_the_cheapest_orders_that_which_goes_on_from_what_is_done(
 @settings(max_examples=25, deadline=None)
 @given(kinds, st.lists(kinds, min_size=1, max_size=3), change_times)
 def test_going_on_from_what_still_stands_is_paid(
-    standing: Kind, members: list[Kind], changes: ChangeTimes
+    standing: Setup, members: list[Setup], changes: ChangeTimes
 ) -> None:
     rest = position(standing, "rest")
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
@@ -122,7 +122,9 @@ def test_going_on_from_what_still_stands_is_paid(
 
 def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
     some = [
-        Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])
+        Setup("plate", plane, frozenset(probes))
+        for plane in "xyz"
+        for probes in (["a"], ["a", "b"])
     ]
     assert (
         len(
@@ -140,7 +142,7 @@ def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
     # Six places with three kinds each that share probes: one change of place fewer than places is
     # least.
     many = [
-        Kind(artefact, plane, frozenset(probes))
+        Setup(artefact, plane, frozenset(probes))
         for artefact in ("a", "b")
         for plane in "xyz"
         for probes in (["l"], ["r", "l"], ["d", "l", "r"])
@@ -157,7 +159,9 @@ def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
 
 def test_six_kinds_take_a_moment() -> None:
     six = [
-        Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])
+        Setup("plate", plane, frozenset(probes))
+        for plane in "xyz"
+        for probes in (["a"], ["a", "b"])
     ]
     changeover(six, CHANGES)
     began = process_time()

@@ -16,7 +16,7 @@ from ballplate.planning.campaign import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget, Constraints, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
-from ballplate.planning.search import Losses, Problem, improve, starts, value
+from ballplate.planning.search import Losses, SelectionProblem, improve, starts, value
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import AtMost, Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -48,12 +48,12 @@ def small() -> Experiment:
 
 
 @cache
-def problem_of(name: CriterionName) -> Problem:
+def problem_of(name: CriterionName) -> SelectionProblem:
     pool = small().pool
     assert pool is not None and len(pool.candidates) == SIZE
     information = pool_information(small(), pool.candidates, is_about_balls(name))
     limits = constraints(pool.candidates, pool.changes, Budget())
-    return Problem(information, criterion(information, small(), name), limits)
+    return SelectionProblem(information, criterion(information, small(), name), limits)
 
 
 @cache

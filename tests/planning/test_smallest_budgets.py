@@ -16,7 +16,7 @@ from ballplate.planning.campaign import TINY_POOL, Request, campaign
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
-from ballplate.planning.search import LARGE, SMALL_POOL, Losses, Problem, full_root, value
+from ballplate.planning.search import LARGE, SMALL_POOL, Losses, SelectionProblem, full_root, value
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
@@ -126,7 +126,7 @@ def test_finite_where_the_dense_rank_is_full_and_nowhere_else(name: CriterionNam
     assert pool is not None
     information = pool_information(experiment, pool.candidates, is_about_balls(name))
     limits = constraints(pool.candidates, pool.changes, Budget(positions=2))
-    problem = Problem(information, criterion(information, experiment, name), limits)
+    problem = SelectionProblem(information, criterion(information, experiment, name), limits)
     losses = Losses(problem)
     for chosen, expected in averages().items():
         determined = is_determined(name, chosen)
@@ -167,7 +167,7 @@ def test_beside_a_certificate_that_is_as_good_as_exact() -> None:
     certificate = len(pool.candidates) - 1
     assert certificate >= SMALL_POOL
     kept = constraints(pool.candidates, pool.changes, Budget(positions=2), (certificate,))
-    problem = Problem(information, criterion(information, experiment, "U5"), kept)
+    problem = SelectionProblem(information, criterion(information, experiment, "U5"), kept)
     losses = Losses(problem)
     narrow, wide = (information.placing(name) for name in ("narrow", "wide"))
     of_names: dict[frozenset[str], float] = {}

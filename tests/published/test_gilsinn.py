@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.error_curve.error_curve import Curve, CurveSettings, Hold, fit_curve
+from ballplate.error_maps.error_curve import CurveSettings, ErrorCurve, Hold, fit_curve
 from ballplate.simulator.splines.pieces import pieces
 from ballplate.simulator.splines.read import choose_points, read_points
 
@@ -26,7 +26,7 @@ def columns(path: Path) -> dict[str, list[str]]:
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def dome(settings: CurveSettings, points: str = "12-32") -> Curve:
+def dome(settings: CurveSettings, points: str = "12-32") -> ErrorCurve:
     everything = read_points(OURS, y="semi_finish_error")
     return fit_curve(everything.chosen(choose_points(everything, points, str(OURS))), settings)
 

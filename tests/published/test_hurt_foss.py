@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import true_experiment
+from ballplate.montecarlo.reference import Truth, reference
+from ballplate.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
@@ -19,8 +21,6 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.directions import directions
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
-from ballplate.simulator.montecarlo.reference import Truth, reference
-from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings
 

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.reproduction.published import npl
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, kinematic_model
-from ballplate.simulator.numerics.threads import single_threaded
 from numpy.typing import NDArray
 
 Array = NDArray[Any]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.reproduction.quantities import tabulated_quantities
+from ballplate.reproduction.published_quantities import tabulated_quantities
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
 

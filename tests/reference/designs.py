@@ -9,7 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import Coordinates, Distances, Lengths, Readings
+from ballplate.simulator.design.observations import (
+    CalibratedCoordinates,
+    CalibratedDistances,
+    Lengths,
+    Readings,
+)
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from numpy.typing import NDArray
@@ -164,14 +169,14 @@ def plate_design(
         origins=np.array([pose.origin for pose in positions]),
         held=held,
         readings=Readings(ball, position, probe, np.ones(len(ball), np.int64)),
-        distances=Distances(
+        distances=CalibratedDistances(
             first,
             second,
             np.full(len(first), 3),
             np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
             np.full(len(first), SIGMA),
         ),
-        coordinates=Coordinates(
+        coordinates=CalibratedCoordinates(
             certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
         ),
         lengths=no_lengths(),

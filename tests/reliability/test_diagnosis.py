@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.gross_errors.search import diagnosis
+from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.suspects import Diagnosis, Suspect
 from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design

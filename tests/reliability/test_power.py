@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.leftover import Columns, leftover
 from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentrality
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
-from ballplate.gross_errors.search import diagnosis
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
@@ -271,7 +271,9 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
             for r in range(fits):
                 k = int(every[r % len(every)])
                 seed = 100_000 * number + 1000 * int(estimated) + r
-                observed, solution = world.fitted(seed, planned, k, float(planned.detectable[k]))
+                observed, solution = world.fitted(
+                    seed, planned, k, float(planned.minimal_detectable[k])
+                )
                 freedom = freedom_of(observed.design)
                 found = patterns(observed.design, solution.state, observed.x)
                 left = leftover(linearised_fit(observed.design, solution), observed.x, freedom)

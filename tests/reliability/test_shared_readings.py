@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.names import name
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import write_observations
-from ballplate.gross_errors.search import diagnosis
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit

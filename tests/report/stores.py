@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.sweeps.store import Store, add_rows, add_sweep, open_store
-from ballplate.sweeps.task import Row
+from ballplate.sweeps.task import CellResult
 
 VERSIONS = (("ballplate", "0.1.0"), ("python", "3.11"))
 VOID = {"meta", "link", "br", "hr", "img", "input", "col"}
@@ -33,7 +33,7 @@ def made_up(
     path: Path,
     title: str,
     axes: list[dict[str, Any]],
-    rows: Iterable[Row],
+    rows: Iterable[CellResult],
     trials: int | None = None,
 ) -> Store:
     """A store of a sweep over all combinations of the axes' values, without files."""
@@ -55,9 +55,9 @@ def made_up(
     return store
 
 
-def done(cell: int, figures: dict[str, float], **details: Any) -> Row:
+def done(cell: int, figures: dict[str, float], **details: Any) -> CellResult:
     """A row of a cell that is done."""
-    return Row(
+    return CellResult(
         cell,
         0,
         f"key {cell}",
@@ -69,9 +69,9 @@ def done(cell: int, figures: dict[str, float], **details: Any) -> Row:
     )
 
 
-def failed(cell: int, reason: str) -> Row:
+def failed(cell: int, reason: str) -> CellResult:
     """A row of a cell that has failed."""
-    return Row(cell, 0, f"key {cell}", "failed", reason, versions=VERSIONS)
+    return CellResult(cell, 0, f"key {cell}", "failed", reason, versions=VERSIONS)
 
 
 class Page(HTMLParser):

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.error_maps.volumetric_errors import Volumetric
 from ballplate.report import volumetric
 from ballplate.report.svg import save
 from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.volumetric.volumetric_errors import Volumetric
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox

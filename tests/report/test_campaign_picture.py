@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.planning.campaign_picture import draw_campaign, words
 from ballplate.planning.choice import CurvePoint, Gain
 from ballplate.planning.constraints import Budget, Spent
 from ballplate.planning.selection import Campaign
-from ballplate.report.campaign import draw_campaign, words
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.pool import with_chosen

@@ -16,11 +16,11 @@ from ballplate.report.cells import NoExperimentError, experiments
 from ballplate.report.page import page
 from ballplate.report.results import read_results
 from ballplate.report.verdicts import ranks
-from ballplate.report.volume import error_map
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
 from ballplate.sweeps.frame import frame
 from ballplate.sweeps.store import open_store
+from ballplate.uncertainty.error_map import error_map
 
 from tests.report.stores import Page, axis, done, failed, made_up
 

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
-from ballplate.report.svg import drawing, placed_axes, save
+from ballplate.presentation.svg import drawing, placed_axes, save
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.estimators.reversal_fits import fit_reversal
-from ballplate.report.vectors import LONGEST, Vectors, draw_vectors, magnification
+from ballplate.presentation.vectors import LONGEST, Vectors, draw_vectors, magnification
 from ballplate.results.study import fit
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.simulator.experiment.schema import schema
-from ballplate.sweeps.schema import schema as sweep_schema
+from ballplate.sweeps.sweep_schema import schema as sweep_schema
 
 from tests.robustness.mutations import vocabulary
 from tests.robustness.worker import complaint
@@ -74,7 +74,7 @@ WILD: dict[str, list[Any]] = {
         {"z": "1 um"},
         ["1 um", "1e300 m"],
     ],
-    "target_accuracy": [*SIZES, "1e-300 m + L/1e300"],
+    "target_uncertainty": [*SIZES, "1e-300 m + L/1e300"],
     "level": SIZES,
     "length": SIZES,
     "repeats": [10_000, 10_001, 10**12, 0],

@@ -39,7 +39,7 @@ evaluation:
   points: {random: 20, seed: 1}
   probe: down
   tasks: [{name: along x, from: [50 mm, 200 mm, 100 mm], to: [550 mm, 200 mm, 100 mm]}]
-target_accuracy: 2 um + L/1000000
+target_uncertainty: 2 um + L/1000000
 seed: 1
 """
 
@@ -63,7 +63,7 @@ artefacts:
   plate: {kind: grid, balls: [2, 2], size: [300 mm, 300 mm]}
 calibration:
   - {kind: distances, artefact: plate, pairs: all, standard_uncertainty: 0.5 um}
-target_accuracy: 2 um + L/300000
+target_uncertainty: 2 um + L/300000
 evaluation:
   points: {random: 8, seed: 1}
   probe: down

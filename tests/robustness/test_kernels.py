@@ -66,7 +66,7 @@ def designs(folder: Path) -> None:
     centred, count = re.subn(r"positions:\n(  - .*\n)+", CENTRED, quickstart)
     assert count == 1
     target, calibration = (
-        "target_accuracy: 0.5 um + L/1000000",
+        "target_uncertainty: 0.5 um + L/1000000",
         re.compile(r"calibration:.*?\n\n", re.DOTALL),
     )
     for text, one in (
@@ -82,7 +82,7 @@ def designs(folder: Path) -> None:
         # Only the scale of one plate, and hardly anything determined.
         "known": calibration.sub("", centred),
         "alone": re.sub(r"  - \{name: [xy],.*\n", "", centred),
-        "weak": quickstart.replace(target, "target_accuracy: 0.02 um"),
+        "weak": quickstart.replace(target, "target_uncertainty: 0.02 um"),
         "small": (
             centred.replace("_coefficients: 5", "_coefficients: 3").replace(
                 "balls: [5, 5]", "balls: [4, 4]"

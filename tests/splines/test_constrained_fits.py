@@ -6,11 +6,11 @@ import mpmath
 import numpy as np
 import pytest
 from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, rows, straight
-from ballplate.simulator.splines.fit import SplineFit, fit
 from ballplate.simulator.splines.knots import at_every, with_boundaries
 from ballplate.simulator.splines.pieces import pieces
-from ballplate.simulator.splines.problems import SplineError
 from ballplate.simulator.splines.space import SplineSpace
+from ballplate.simulator.splines.spline_fit import SplineFit, fit
+from ballplate.simulator.splines.spline_problems import SplineError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, make_lsq_spline

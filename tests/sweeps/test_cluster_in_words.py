@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from ballplate.sweeps import cluster
 from ballplate.sweeps.cluster import ClusterError, OtherVersionError, _on_worker, _refuse
-from ballplate.sweeps.task import Task
+from ballplate.sweeps.task import CellTask
 
 from .support import ROOT, command, small_sweep, stored
 
@@ -162,7 +162,7 @@ def test_no_worker(
 
 def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
     with pytest.raises(OtherVersionError):
-        _on_worker(cluster.Bundle("", "", ()), "other", Task(0))
+        _on_worker(cluster.Bundle("", "", ()), "other", CellTask(0))
 
 
 def test_all_workers_that_differ_are_counted() -> None:

@@ -19,7 +19,7 @@ from ballplate.cli import main
 from ballplate.sweeps import store_file
 from ballplate.sweeps.model import Sweep
 from ballplate.sweeps.store import Store, StoreError, add_rows, add_sweep, open_store, results
-from ballplate.sweeps.task import Row, Task, compute
+from ballplate.sweeps.task import CellResult, CellTask, compute
 
 from tests.reference.tables import read_table
 
@@ -179,7 +179,7 @@ def many(path: Path, count: int) -> Store:
     }  # fmt: skip
     store = open_store(path, create=True)
     made_up = (
-        Row(
+        CellResult(
             k,
             0,
             f"2 {k:040d}",
@@ -314,7 +314,7 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
     shutil.move(store, original)
     other = b"somebody else's"
 
-    def vanishing(loaded: Sweep, task: Task) -> Row:
+    def vanishing(loaded: Sweep, task: CellTask) -> CellResult:
         if task.number == 2:
             if what == "moved":
                 store.rename(store.with_name("elsewhere.sqlite"))

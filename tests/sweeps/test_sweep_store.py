@@ -20,7 +20,7 @@ from ballplate.sweeps.fingerprint import fingerprint
 from ballplate.sweeps.load import experiment_of, load_sweep
 from ballplate.sweeps.model import Sweep
 from ballplate.sweeps.store import definitions, files, keys, open_store, results
-from ballplate.sweeps.task import BLOCK, Row, Task, compute
+from ballplate.sweeps.task import BLOCK, CellResult, CellTask, compute
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep
 
@@ -132,7 +132,7 @@ def test_an_interrupted_run_leaves_no_rows_of_two_methods(
     right = rows(store)
     made_by_the_first_method(store)
 
-    def second_fails(loaded: Sweep, task: Task) -> Row:
+    def second_fails(loaded: Sweep, task: CellTask) -> CellResult:
         if task.block == 0 and task.number == 1:
             raise KeyboardInterrupt
         return compute(loaded, task)
@@ -195,7 +195,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
     path, base = small_sweep(tmp_path, 2), tmp_path / "quickstart.yaml"
     text = base.read_text(encoding="utf-8")
 
-    def changing(loaded: Sweep, task: Task) -> Row:
+    def changing(loaded: Sweep, task: CellTask) -> CellResult:
         if task.number == 1:
             base.write_text(
                 text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8"
@@ -223,7 +223,7 @@ def test_what_two_sweeps_share_is_computed_once(
     )
     done = []
 
-    def counted(loaded: Sweep, task: Task) -> Row:
+    def counted(loaded: Sweep, task: CellTask) -> CellResult:
         done.append(task)
         return compute(loaded, task)
 
@@ -495,7 +495,7 @@ def test_a_cell_that_finds_no_memory_says_so(
         raise MemoryError
 
     monkeypatch.setattr(f"ballplate.sweeps.task.{place}", finds_none)
-    row = compute(loaded, Task(0))
+    row = compute(loaded, CellTask(0))
     assert row.status == "failed"
     assert (
         row.reason

@@ -25,7 +25,7 @@ from ballplate.simulator.inputs.quantities import LengthFunction, format_length
 
 from .changes import (
     Change,
-    Kind,
+    ChangeKind,
     distances,
     pair_set,
     with_calibration,
@@ -45,7 +45,9 @@ def certificates(experiment: Experiment) -> Iterator[Change]:
                 radius = RadiusCalibration(name, settings.radius, u)
                 add = partial(with_calibration, item=radius)
                 words = f"calibrate the radius of {name} to {format_length(u)}"
-                yield Change(Kind.CERTIFICATE, words, 1.0, frozenset({f"length of {name}"}), add)
+                yield Change(
+                    ChangeKind.CERTIFICATE, words, 1.0, frozenset({f"length of {name}"}), add
+                )
             continue
         if settings.role != "plate" and not isinstance(settings, TwoSpheresSettings):
             continue
@@ -80,7 +82,7 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
             )
             apply = partial(_with_better, k=k, item=better)
             yield Change(
-                Kind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply
+                ChangeKind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply
             )
 
 
@@ -92,7 +94,7 @@ def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -
         f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist()
     )
     return Change(
-        Kind.CERTIFICATE,
+        ChangeKind.CERTIFICATE,
         told,
         float(len(item.pairs)),
         touched,

@@ -24,7 +24,7 @@ from ballplate.simulator.geometry.positions import Pose, ball_coordinates
 from ballplate.simulator.machines.protocol import Array
 
 
-class Kind(IntEnum):
+class ChangeKind(IntEnum):
     """What is changed, the cheapest first."""
 
     POOL = 0
@@ -37,16 +37,21 @@ class Kind(IntEnum):
 
 
 # What a calibrated distance, and setting up a position, take as many readings for.
-EFFORT = {Kind.CERTIFICATE: 25.0, Kind.READ_MORE: 1.0, Kind.ADD_POSITION: 1.5, Kind.POOL: 1.0}
+EFFORT = {
+    ChangeKind.CERTIFICATE: 25.0,
+    ChangeKind.READ_MORE: 1.0,
+    ChangeKind.ADD_POSITION: 1.5,
+    ChangeKind.POOL: 1.0,
+}
 
 KINDS = {
-    Kind.POOL: "candidates of the pool",
-    Kind.MOVE: "positions moved",
-    Kind.READ_MORE: "more readings in a position",
-    Kind.CERTIFICATE: "calibration",
-    Kind.ADD_POSITION: "more positions",
-    Kind.ARTEFACT: "more balls",
-    Kind.MODEL: "fewer coefficients",
+    ChangeKind.POOL: "candidates of the pool",
+    ChangeKind.MOVE: "positions moved",
+    ChangeKind.READ_MORE: "more readings in a position",
+    ChangeKind.CERTIFICATE: "calibration",
+    ChangeKind.ADD_POSITION: "more positions",
+    ChangeKind.ARTEFACT: "more balls",
+    ChangeKind.MODEL: "fewer coefficients",
 }
 
 
@@ -61,7 +66,7 @@ class Change:
     `candidate` is the index of the pool's candidate, -1 where it is none.
     """
 
-    kind: Kind
+    kind: ChangeKind
     words: str
     cost: float
     touches: frozenset[str]

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.computing.rounding import above, comparable
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import above, comparable
 
 from ...rank.verdict import effects, weak_limit
 from .changes import Change, apply_all
 
 # Part of a null direction that counts as its being there, and not rounding.
-THERE = 1e-6
+COMPONENT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Examined:
         """The summary."""
         found, model = self.at.spectrum, self.at.layout.model
         effect = effects(self.at)
-        limit = weak_limit(self.at.design, self.experiment.target_accuracy)
+        limit = weak_limit(self.at.design, self.experiment.target_uncertainty)
         return Judged(
             found.deficiency,
             int(above(effect, limit).sum()),
@@ -112,6 +112,6 @@ def removed(before: Array, after: Array) -> tuple[int, ...]:
     return tuple(
         int(k)
         for k in np.flatnonzero(
-            np.abs(parts).max(axis=1) < THERE * max(np.abs(parts).max(), 1e-300)
+            np.abs(parts).max(axis=1) < COMPONENT_TOLERANCE * max(np.abs(parts).max(), 1e-300)
         )
     )

@@ -20,7 +20,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from .changes import (
     Change,
-    Kind,
+    ChangeKind,
     count_readings,
     further,
     is_inside,
@@ -56,7 +56,9 @@ def moves(experiment: Experiment) -> Iterator[Change]:
             if is_inside(new, layout, volume, experiment.probes):
                 told = words.format(f'position "{place.name}"')
                 apply = partial(with_pose, name=place.name, pose=new.pose)
-                yield Change(Kind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), apply)
+                yield Change(
+                    ChangeKind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), apply
+                )
 
 
 def _turned(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[Array, Array]]]:
@@ -132,7 +134,7 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
             new = {name: offset} if name in tips else {}
             apply = partial(with_further, name=place.name, more=more, probes=new)
             touched = frozenset({f"position {place.name} with {name}"})
-            yield Change(Kind.READ_MORE, words, cost, touched, apply, more, place.name)
+            yield Change(ChangeKind.READ_MORE, words, cost, touched, apply, more, place.name)
 
 
 def repeats(experiment: Experiment) -> Iterator[Change]:
@@ -143,7 +145,7 @@ def repeats(experiment: Experiment) -> Iterator[Change]:
             cost = float((times - 1) * count_readings([place]))
             touched = frozenset(f"position {place.name} with {name}" for name in experiment.probes)
             apply = partial(with_repeats, name=place.name, times=times)
-            yield Change(Kind.READ_MORE, words, cost, touched, apply)
+            yield Change(ChangeKind.READ_MORE, words, cost, touched, apply)
 
 
 def new_tips(experiment: Experiment) -> dict[str, Array]:

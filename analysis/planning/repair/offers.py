@@ -15,37 +15,40 @@ from ballplate.simulator.experiment.pool import placed_only
 from .certificates import better_certificates, certificates
 from .changes import (
     Change,
-    Kind,
+    ChangeKind,
     with_calibration,
     with_position,
 )
-from .last_resorts import fewer_coefficients, more_balls
 from .moves import more_readings, moves, repeats
 from .positions import positions
+from .reductions import fewer_coefficients, more_balls
 
 Generator = Callable[[Experiment], Iterator[Change]]
 
 
-def offers(experiment: Experiment, is_deficient: bool = True) -> dict[Kind, list[Change]]:
+def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind, list[Change]]:
     """Changes that stay within the volume, by kind; additions are those of the pool where the
     experiment has one.
 
     What only makes observations more certain is offered where none is missing.
     """
-    makers: list[tuple[Kind, Generator]] = [(Kind.MOVE, moves), (Kind.READ_MORE, more_readings)]
+    makers: list[tuple[ChangeKind, Generator]] = [
+        (ChangeKind.MOVE, moves),
+        (ChangeKind.READ_MORE, more_readings),
+    ]
     if not is_deficient:
-        makers += [(Kind.READ_MORE, repeats), (Kind.CERTIFICATE, better_certificates)]
+        makers += [(ChangeKind.READ_MORE, repeats), (ChangeKind.CERTIFICATE, better_certificates)]
     if experiment.pool is not None:
-        makers.append((Kind.POOL, pool_additions))
+        makers.append((ChangeKind.POOL, pool_additions))
     else:
-        makers += [(Kind.CERTIFICATE, certificates), (Kind.ADD_POSITION, positions)]
-    makers += [(Kind.ARTEFACT, more_balls), (Kind.MODEL, fewer_coefficients)]
-    found: dict[Kind, list[Change]] = {
+        makers += [(ChangeKind.CERTIFICATE, certificates), (ChangeKind.ADD_POSITION, positions)]
+    makers += [(ChangeKind.ARTEFACT, more_balls), (ChangeKind.MODEL, fewer_coefficients)]
+    found: dict[ChangeKind, list[Change]] = {
         kind: [] for kind, _ in sorted(makers, key=lambda one: one[0])
     }
     placed = placed_only(experiment)
     for kind, maker in makers:
-        found[kind] += maker(experiment if kind == Kind.POOL else placed)
+        found[kind] += maker(experiment if kind == ChangeKind.POOL else placed)
     return {kind: sorted(changes, key=lambda one: one.cost) for kind, changes in found.items()}
 
 
@@ -65,7 +68,13 @@ def pool_additions(experiment: Experiment) -> Iterator[Change]:
         )
         words = f'add "{one.name}" of the pool ({duration(one.seconds)})'
         yield Change(
-            Kind.POOL, words, one.seconds, frozenset({f"candidate {k}"}), add, one.item, candidate=k
+            ChangeKind.POOL,
+            words,
+            one.seconds,
+            frozenset({f"candidate {k}"}),
+            add,
+            one.item,
+            candidate=k,
         )
 
 

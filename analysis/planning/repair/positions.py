@@ -22,7 +22,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from .changes import (
     Change,
-    Kind,
+    ChangeKind,
     count_readings,
     is_inside,
     probes_of,
@@ -59,7 +59,7 @@ def positions(experiment: Experiment) -> Iterator[Change]:
                     )
                 add = partial(with_added, position=new)
                 yield Change(
-                    Kind.ADD_POSITION,
+                    ChangeKind.ADD_POSITION,
                     told,
                     float(count_readings([new])),
                     frozenset({f"more {words}"}),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.numerics.threads import single_threaded
 
 from ...uncertainty.scale import OFFSET_TRIAL, Scale, lengths_with_offsets
 from .certificates import certificates
@@ -36,14 +36,14 @@ class ScaleCertificate:
 
 
 @single_threaded
-def scale_certificate(experiment: Experiment, found: Scale | None) -> ScaleCertificate | None:
+def scale_certificate(experiment: Experiment, scale: Scale | None) -> ScaleCertificate | None:
     """The best single certificate; None where the scale does not rest on offsets that are held
     exact.
     """
-    if found is None or not found.rests_on_offsets or found.loosened is None:
+    if scale is None or not scale.rests_on_offsets or scale.loosened is None:
         return None
     singles = [change for change in certificates(experiment) if change.cost == 1.0][:MOST_TRIED]
-    best, least = None, found.loosened.average / HELPS
+    best, least = None, scale.loosened.average / HELPS
     for change in singles:
         lengths = lengths_with_offsets(placed_only(change.apply(experiment)), OFFSET_TRIAL)
         average = inf if lengths is None else lengths.total / lengths.count
@@ -51,5 +51,5 @@ def scale_certificate(experiment: Experiment, found: Scale | None) -> ScaleCerti
         if average < least * (1.0 - 1e-6):
             best, least = change, average
     if best is None:
-        return ScaleCertificate(None, OFFSET_TRIAL, found.loosened.average)
+        return ScaleCertificate(None, OFFSET_TRIAL, scale.loosened.average)
     return ScaleCertificate(best, OFFSET_TRIAL, least, edits(experiment, best.apply(experiment)))

@@ -1,1 +1,0 @@
-"""Problems with certified answers, and how many digits of them a program finds."""

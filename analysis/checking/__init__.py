@@ -1,1 +1,0 @@
-"""Checks of many files, and their reports for build servers."""

@@ -1,0 +1,153 @@
+"""The rank of every design in some files; one that cannot be used does not keep the others from
+being checked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import unknown_variants
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.yamltree import Mark
+
+from ..planning.requirements.goals import Goal, GoalError, check_goal, judge
+from ..results.prediction import Prediction
+from ..results.study import check, planned_uncertainty
+
+if TYPE_CHECKING:
+    from ..planning.repair.repair_search import Repairs
+    from ..planning.repair.scale import ScaleCertificate
+
+
+@dataclass(frozen=True)
+class CheckedDesign:
+    """The verdict on one design; `place` is where its file should change, None where nothing is to
+    be complained of.
+
+    `repairs` are changes that would determine what is open, None where nothing is or none were
+    asked for. `goals` tell how each goal that was asked for is met, and `missed` what fails of
+    these and of what is weak.
+    """
+
+    plan: Prediction
+    place: Mark | None
+    repairs: Repairs | None = None
+    goals: tuple[str, ...] = ()
+    missed: tuple[str, ...] = ()
+    certificate: ScaleCertificate | None = None
+
+    @property
+    def complaints(self) -> tuple[str, ...]:
+        """What is wrong: the rank, then goals and weak directions that were not to be."""
+        complaint = self.plan.verdict.complaint
+        return (*([complaint] if complaint else []), *self.missed)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What designs are checked for besides their rank: `goals`, and whether a weak direction fails.
+
+    With `repairs` changes are looked for that would determine the rest. Without `with_modules` no
+    error model in Python is run, and files that have one are refused.
+    """
+
+    goals: tuple[Goal, ...] = ()
+    nothing_weak: bool = False
+    repairs: bool = False
+    with_modules: bool = True
+
+
+@dataclass(frozen=True)
+class CheckedFile:
+    """What came of a file: its designs, each variant one of its own, or the reasons why it cannot
+    be used.
+
+    `doubts` are about what is possible, and unlikely to be meant.
+    """
+
+    file: str
+    designs: tuple[CheckedDesign, ...]
+    messages: tuple[Message, ...]
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether all designs have the rank that the file expects and meet what was asked for."""
+        return not any(design.complaints for design in self.designs)
+
+
+def check_files(
+    files: Sequence[Path], variants: Sequence[str] = (), wanted: Wanted = Wanted()
+) -> Iterator[CheckedFile]:
+    """Check all files, one after the other; with `variants` only designs of these names.
+
+    A variant that no file has is told last, as the error of all files together.
+    """
+    found: set[str | None] = set()
+    complete = True
+    for path in files:
+        try:
+            experiments = load(path, with_modules=wanted.with_modules)
+            found |= {experiment.name for experiment in experiments}
+            chosen = [one for one in experiments if not variants or one.name in variants]
+            # What a plan may choose from is loaded where it is asked for only.
+            pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
+            doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
+            judged = tuple(_checked(one, pools.get(one.name), wanted) for one in chosen)
+            yield CheckedFile(str(path), judged, (), doubts)
+        except ExperimentError as error:
+            complete = False
+            yield CheckedFile(str(path), (), error.messages)
+    # A file that cannot be used may be the one that has the variant.
+    messages = unknown_variants(files, variants, found) if complete else ()
+    if messages:
+        yield CheckedFile(messages[0].file, (), messages)
+
+
+def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wanted) -> CheckedDesign:
+    plan = check(experiment, with_scale=True)
+    found, certificate = None, None
+    if with_pool is not None:
+        from ..planning.repair.repair_search import repairs
+        from ..planning.repair.scale import scale_certificate
+
+        found = repairs(with_pool)
+        certificate = scale_certificate(with_pool, plan.scale)
+    goals, missed = _goals(experiment, wanted.goals)
+    if wanted.nothing_weak and plan.verdict.weak:
+        count = len(plan.verdict.weak)
+        missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
+    design = CheckedDesign(plan, None, found, goals, missed, certificate)
+    if not design.complaints:
+        return design
+    steps: tuple[str, ...] = (
+        ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_uncertainty",)
+    )
+    if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
+        steps = ("evaluation", "tasks")
+    return replace(design, place=experiment.place(steps))
+
+
+def _goals(
+    experiment: Experiment, goals: Sequence[Goal]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """How goals are met, in words, and those of them that are not."""
+    found = planned_uncertainty(experiment) if goals else None
+    told, missed = [], []
+    for goal in goals:
+        assert found is not None
+        try:
+            check_goal(goal, found)
+        except GoalError as error:
+            told.append(f"goal not met: {goal}; {error}")
+            missed.append(told[-1])
+            continue
+        judged = judge(goal, found)
+        told.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
+        missed += [] if judged.is_met else [told[-1]]
+    return tuple(told), tuple(missed)

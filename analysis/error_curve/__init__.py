@@ -1,1 +1,0 @@
-"""Splines with prescribed values through measured errors."""

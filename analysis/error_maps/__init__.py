@@ -1,0 +1,1 @@
+"""Errors and uncertainties along curves, axes and through the volume."""

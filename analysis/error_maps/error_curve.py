@@ -1,0 +1,345 @@
+"""An error curve through measured points: a spline with what is prescribed for it, and how well it
+is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from ballplate.simulator.geometry.profile import NotOnProfileError, Profile, along
+from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, straight
+from ballplate.simulator.splines.knots import at_every, with_boundaries
+from ballplate.simulator.splines.read import ARC_LENGTH, CurvePoints
+from ballplate.simulator.splines.space import Array, SplineSpace
+from ballplate.simulator.splines.spline_fit import SplineFit, fit
+from ballplate.simulator.splines.spline_problems import SplineError, SplineProblem
+
+Place = float | tuple[float, float] | Literal["start", "end"]
+"""An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""
+
+EVERY = 5
+# A profile goes on beyond its points for no more than this many times the largest distance between
+# two of them.
+CONTINUED = 2.0
+# Time grows with the square of these, times the points.
+MOST_COEFFICIENTS = 500
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A prescribed value (derivative 0) or slope (1) at a place, in metres or radians."""
+
+    at: Place
+    derivative: int
+    value: float
+
+
+@dataclass(frozen=True)
+class CurveSettings:
+    """What curve is wanted. Lengths and angles are in metres and radians.
+
+    Knots are at every `every`-th point of each feature, or where `knots` says. At `boundaries` only
+    value and slope are continuous; `straight` are the features, counted from 1, that are straight
+    lines. `period` closes the curve.
+    """
+
+    order: int = 4
+    every: int = EVERY
+    knots: tuple[float, ...] | None = None
+    start: Place = "start"
+    end: Place = "end"
+    boundaries: tuple[Place, ...] = ()
+    straight: tuple[int, ...] = ()
+    holds: tuple[Hold, ...] = ()
+    period: float | None = None
+
+
+@dataclass(frozen=True)
+class ErrorCurve:
+    """A fitted curve. `fit` has the points in ascending order of x, which `points` (names and
+    columns) follows.
+
+    `sigma` is the standard uncertainty of a point, or the factor of the stated ones:
+    `sigma_is_estimated` from the residuals, and then not a number without degrees of freedom, or 1.
+    """
+
+    points: CurvePoints
+    settings: CurveSettings
+    fit: SplineFit
+    boundaries: tuple[float, ...]
+    holds: tuple[Constraint, ...]
+    sigma: float
+    sigma_is_estimated: bool
+    has_uncertainties: bool
+    profile_boundaries: Array = field(repr=False)
+
+    @property
+    def coverage_factor(self) -> float:
+        """Of the expanded uncertainty for 95 %: Student's where sigma is estimated, otherwise
+        normal.
+        """
+        from scipy.special import ndtri, stdtrit
+
+        if self.sigma_is_estimated:
+            return (
+                float(stdtrit(self.fit.degrees_of_freedom, 0.975))
+                if self.fit.degrees_of_freedom
+                else float("nan")
+            )
+        return float(ndtri(0.975))
+
+    def standard_uncertainty(self, x: Array, derivative: int = 0) -> Array:
+        """Of the curve or a derivative at x (m,), from the points' scatter alone.
+
+        :raises SplineError: an x beyond the ends.
+        """
+        return np.asarray(self.sigma * self.fit.spread(x, derivative))
+
+
+def fit_curve(
+    points: CurvePoints,
+    settings: CurveSettings,
+    uncertainty: float | None = None,
+    sigma: str | None = None,
+) -> ErrorCurve:
+    """Fit the curve. `uncertainty` is that of each point where the points state none; `sigma` is
+    given or estimated.
+
+    :raises SplineError: it cannot be fitted, all reasons found; or sigma should be given, and no
+        uncertainty is.
+    """
+    x, ends, boundaries, holds, on_profile = _located(points, settings)
+    lower, upper = ends
+    if lower == upper == x.min() == x.max():
+        raise SplineError(
+            [
+                SplineProblem(
+                    "all points are at {0}, where there is no curve; give points at several",
+                    (lower,),
+                )
+            ]
+        )
+    order = np.argsort(x, kind="stable")
+    x, points = x[order], points.chosen(order.tolist())
+    boundaries = tuple(sorted(set(boundaries)))
+    knots = settings.knots
+    problems = _misplaced(settings, boundaries, lower, upper)
+    if problems:
+        raise SplineError(problems)
+    features = list(pairwise((lower, *boundaries, upper)))
+    lines = [features[k - 1] for k in sorted(set(settings.straight))]
+    if knots is None:
+        found = at_every(x, settings.every, lower, upper, boundaries)
+        knots = tuple(
+            knot for knot in found if not any(start <= knot <= end for start, end in lines)
+        )
+    space = SplineSpace(
+        settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order)
+    )
+    if space.count > MOST_COEFFICIENTS:
+        text = (
+            f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible,"
+            " leave out knots"
+        )
+        raise SplineError([SplineProblem(text)])
+    constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
+    for start, end in lines:
+        constraints += straight(space, start, end)
+    stated = points.uncertainties
+    if stated is None and uncertainty is not None:
+        stated = np.full(len(x), uncertainty)
+    if stated is None and sigma == "given":
+        text = (
+            "no uncertainty is given that could be believed; add a column such as u_um, or give"
+            " --uncertainty"
+        )
+        raise SplineError([SplineProblem(text)])
+    fitted = fit(space, x, points.y, stated, constraints)
+    is_estimated = (sigma or ("estimated" if stated is None else "given")) == "estimated"
+    factor = fitted.sigma if is_estimated else 1.0
+    return ErrorCurve(
+        points,
+        settings,
+        fitted,
+        boundaries,
+        holds,
+        factor,
+        is_estimated,
+        stated is not None,
+        on_profile,
+    )
+
+
+def _misplaced(
+    settings: CurveSettings, boundaries: tuple[float, ...], lower: float, upper: float
+) -> list[SplineProblem]:
+    """What is wrong with features, boundaries and knots between the ends of a curve."""
+    problems = [
+        SplineProblem(
+            f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of"
+            " the curve"
+        )
+        for k in settings.straight
+        if not 1 <= k <= len(boundaries) + 1
+    ]
+    problems += [
+        SplineProblem(
+            "the boundary at {0} is not between the ends of the curve, {1} and {2}",
+            (place, lower, upper),
+        )
+        for place in boundaries
+        if not lower < place < upper
+    ]
+    problems += [
+        SplineProblem("{0} is a boundary and a knot; leave it out of the knots", (knot,))
+        for knot in settings.knots or ()
+        if knot in boundaries
+    ]
+    if settings.order < 3 and boundaries:
+        problems.append(
+            SplineProblem("broken lines share no slope at boundaries; give an order of 3 or more")
+        )
+    return problems
+
+
+def whole_profile(points: CurvePoints, boundaries: Array) -> tuple[Profile, Array]:
+    """The profile of all points of a file with boundaries (n, 2) on it, and the points' indices in
+    it.
+
+    :raises SplineError: the points do not make a profile.
+    """
+    assert points.places is not None
+    _refuse_coincident(points.places)
+    profile, own, _ = along(points.places, points.features, boundaries)
+    return profile, own
+
+
+def _located(
+    points: CurvePoints, settings: CurveSettings
+) -> tuple[Array, tuple[float, float], tuple[float, ...], tuple[Constraint, ...], Array]:
+    """Abscissae of points, ends, boundaries and prescribed values, and the places among them on the
+    profile (n, 2).
+    """
+    wanted = [*settings.boundaries, *(hold.at for hold in settings.holds)]
+    nominal = list(dict.fromkeys(place for place in wanted if isinstance(place, tuple)))
+    ends = [settings.start, settings.end]
+    where: dict[Place, float] = {}
+    if points.x is not None:
+        if nominal or any(isinstance(end, tuple) for end in ends):
+            text = (
+                "nominal co-ordinates tell a place on the profile, but the abscissa is"
+                f" {points.x_column.words}"
+            )
+            raise SplineError(
+                [SplineProblem(f"{text}; give one value, or choose --x {ARC_LENGTH}")]
+            )
+        x = points.x
+    else:
+        x, where = _on_profile(points, settings, nominal)
+    lower = float(x.min()) if settings.start == "start" else _abscissa(settings.start, where)
+    upper = float(x.max()) if settings.end == "end" else _abscissa(settings.end, where)
+    if settings.period is not None:
+        if settings.end != "end":
+            raise SplineError(
+                [
+                    SplineProblem(
+                        "a periodic curve ends one period after its start; leave the end out"
+                    )
+                ]
+            )
+        if settings.start == "start" and points.x_column.kind == "angle":
+            lower = 0.0
+        upper = lower + settings.period
+        x = lower + np.mod(x - lower, settings.period)
+    where |= {"start": lower, "end": upper}
+    # The slope at the upper end is that of the last piece, so that either side will do.
+    holds = tuple(
+        prescribed(_abscissa(hold.at, where), hold.derivative, hold.value)
+        for hold in settings.holds
+    )
+    boundaries = tuple(_abscissa(place, where) for place in settings.boundaries)
+    on_profile = np.array(
+        [place for place in settings.boundaries if isinstance(place, tuple)]
+    ).reshape(-1, 2)
+    return x, (lower, upper), boundaries, holds, on_profile
+
+
+def _abscissa(place: Place, where: dict[Place, float]) -> float:
+    return where[place] if isinstance(place, tuple | str) else place
+
+
+def _on_profile(
+    points: CurvePoints, settings: CurveSettings, nominal: Sequence[tuple[float, float]]
+) -> tuple[Array, dict[Place, float]]:
+    """Arc lengths of the points and of places by their nominal co-ordinates."""
+    assert points.places is not None
+    start, end = (
+        (
+            None
+            if isinstance(place, float | str) or (points.places == place).all(axis=1).any()
+            else np.array(place)
+        )
+        for place in (settings.start, settings.end)
+    )
+    _refuse_coincident(points.places)
+    _refuse_distant(points.places, start, end)
+    try:
+        profile, own, at = along(
+            points.places, points.features, np.array(nominal).reshape(-1, 2), start, end
+        )
+    except NotOnProfileError as error:
+        text = (
+            "the place ({0}, {1}) is not on the profile between two points; correct it, or give the"
+            " arc length"
+        )
+        raise SplineError([SplineProblem(text, nominal[error.args[0]])]) from None
+    lengths = profile.lengths
+    where: dict[Place, float] = dict(zip(nominal, lengths[at].tolist(), strict=True))
+    for place in (settings.start, settings.end):
+        if isinstance(place, tuple):
+            where[place] = float(lengths[(profile.places == place).all(axis=1)][0])
+    return lengths[own], where
+
+
+def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> None:
+    """Refuse a start or an end that does not continue the profile beyond its first or last point.
+
+    :raises SplineError: it is nearer to another point, or much farther away than points are from
+        one another.
+    """
+    if len(places) < 2:
+        return
+    farthest = CONTINUED * np.hypot(*np.diff(places, axis=0).T).max()
+    problems = []
+    for place, own in ((start, 0), (end, len(places) - 1)):
+        if place is None:
+            continue
+        away = np.hypot(*(places - place).T)
+        if away[own] > min(float(away.min()), farthest):
+            text = (
+                "the place ({0}, {1}) is not on the profile or just beyond it; correct it, or give"
+                " the arc length"
+            )
+            problems.append(SplineProblem(text, tuple(place.tolist())))
+    if problems:
+        raise SplineError(problems)
+
+
+def _refuse_coincident(places: Array) -> None:
+    """Refuse neighbouring places that are the same, between which nothing has a direction.
+
+    :raises SplineError: there are such.
+    """
+    same = [
+        SplineProblem(
+            "two neighbouring points stand at ({0}, {1}); leave one of them out", tuple(one)
+        )
+        for one, two in pairwise(places.tolist())
+        if one == two
+    ]
+    if same:
+        raise SplineError(same)

@@ -1,0 +1,265 @@
+"""Lengths throughout the volume as text for people, as CSV and as plain data for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length
+from ballplate.simulator.machines.protocol import Array
+
+from ..presentation.formatting import (
+    aligned,
+    as_data,
+    csv_lines,
+    number,
+    percent,
+    picked,
+    records,
+    uncertainty_words,
+)
+from .length_map import LengthGroups, LengthMap, LengthMapSettings, length_pairs
+
+AXES = "xyz"
+POINT_COLUMNS = (
+    "lengths,undetermined,u_average_um,u_maximum_um,ratio_average,ratio_maximum,share_within,"
+    "share_expanded_within"
+)
+
+
+def target_words(target: LengthFunction) -> str:
+    """The target as it is written in a file.
+
+    >>> target_words(LengthFunction(5e-7, 1e-6))
+    '0.5 um + L/1000000'
+    """
+    return format_length(target.constant) + (f" + L/{1 / target.slope:.9g}" if target.slope else "")
+
+
+def length_lines(title: str, lengths: LengthMap) -> list[str]:
+    """The share of lengths that meet the target, and where, how long and in which direction they
+    are.
+    """
+    settings, whole = lengths.settings, lengths.whole
+    k = f"{settings.coverage_factor:g}"
+    rank = f"rank deficiency {lengths.deficiency}; " if lengths.deficiency else ""
+    scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
+    count, n = int(whole.count[0]), len(lengths.points)
+    lines = [
+        title,
+        (
+            f"{rank}{count} lengths between {n} points of a grid, with the probe"
+            f" {settings.probe}{scatter}"
+        ),
+        (
+            f"target {target_words(settings.target)}: met by the standard uncertainty u of"
+            f" {_share(whole, False)}, by the expanded uncertainty {k} u of {_share(whole, True)}"
+            " lengths"
+        ),
+        f"the target is meant for the {uncertainty_words(settings.target_factor)}",
+    ]
+    if whole.undetermined[0]:
+        some = ", ".join(
+            f"{_place(lengths.points[i])} to {_place(lengths.points[j])}"
+            for i, j in lengths.open_pairs
+        )
+        lines.append(
+            f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as {some}"
+        )
+    elif lengths.deficiency:
+        lines.append(
+            "what is undetermined changes none of these lengths; those of another --grid it may"
+            " change"
+        )
+    if lengths.worst is not None:
+        i, j = lengths.worst
+        ratio = settings.target_factor * float(whole.maximum_ratio[0])
+        told = f"largest ratio of {_compared(lengths)} to the target: {number(ratio)}"
+        lines.append(f"{told}, from {_place(lengths.points[i])} to {_place(lengths.points[j])}")
+    return [
+        *lines,
+        "",
+        *_table(
+            "length",
+            _class_names(lengths.edges),
+            lengths.by_length,
+            lengths,
+            _class_targets(lengths),
+        ),
+        "",
+        *_table("direction", list(lengths.directions), lengths.by_direction, lengths, None),
+        "",
+        *_table("point, mm", *_extremes(lengths), lengths, None),
+        (
+            f"(points in the order of their largest ratio of {_compared(lengths)} to the target;"
+            " lengths are those that start or end there)"
+        ),
+    ]
+
+
+def _share(groups: LengthGroups, expanded: bool) -> str:
+    share = percent(float(groups.share(expanded)[0]))
+    return f"{share} of" if expanded else share
+
+
+def _place(point: Array) -> str:
+    return f"({', '.join(f'{1e3 * v + 0.0:.6g}' for v in point)}) mm"
+
+
+def _class_names(edges: Array) -> list[str]:
+    return [
+        f"{1e3 * low:g} to {1e3 * high:g} mm" for low, high in zip(edges, edges[1:], strict=False)
+    ]
+
+
+def _class_targets(lengths: LengthMap) -> list[str] | None:
+    if not lengths.settings.target.slope:
+        return None
+    ends = 1e6 * lengths.settings.target.at(lengths.edges)
+    return [
+        f"{number(float(a), 3)} to {number(float(b), 3)}"
+        for a, b in zip(ends, ends[1:], strict=False)
+    ]
+
+
+# Of the points, this many with the largest ratios, and as many with the smallest.
+SHOWN_POINTS = 3
+
+
+def _extremes(lengths: LengthMap) -> tuple[list[str], LengthGroups]:
+    ratio = np.where(
+        np.isnan(lengths.by_point.maximum_ratio), np.inf, lengths.by_point.maximum_ratio
+    )
+    order = np.argsort(-comparable(ratio), kind="stable")
+    chosen = (
+        order
+        if len(order) <= 2 * SHOWN_POINTS
+        else np.concatenate([order[:SHOWN_POINTS], order[-SHOWN_POINTS:]])
+    )
+    names = [_place(lengths.points[i]).removesuffix(" mm") for i in chosen]
+    return names, LengthGroups(
+        **{name: values[chosen] for name, values in vars(lengths.by_point).items()}
+    )
+
+
+def _compared(lengths: LengthMap) -> str:
+    """The uncertainty that the target is meant for, as a symbol."""
+    factor = lengths.settings.target_factor
+    return "u" if factor == 1.0 else f"{factor:g} u"
+
+
+def _table(
+    head: str, names: list[str], groups: LengthGroups, lengths: LengthMap, targets: list[str] | None
+) -> list[str]:
+    factor = lengths.settings.coverage_factor
+    k = f"{factor:g}"
+    heads = [
+        head,
+        "lengths",
+        "undetermined",
+        "u average, um",
+        "maximum",
+        f"{k} u maximum",
+        "target",
+    ]
+    heads += [f"{_compared(lengths)} / target, maximum", "u within", f"{k} u within"]
+    rows = [heads]
+    for i, name in enumerate(names):
+        if not groups.count[i]:
+            continue
+        row = [name, str(groups.count[i]), str(groups.undetermined[i])]
+        row += [
+            number(1e6 * float(v[i]))
+            for v in (groups.average, groups.maximum, factor * groups.maximum)
+        ]
+        row += [
+            targets[i] if targets else "",
+            number(lengths.settings.target_factor * float(groups.maximum_ratio[i])),
+        ]
+        row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
+        rows.append(row)
+    unused = {6} if not targets else set[int]()
+    unused |= {2} if not groups.undetermined.any() else set()
+    kept = [j for j in range(len(heads)) if j not in unused]
+    return aligned([[row[j] for j in kept] for row in rows], [j > 0 for j in kept])
+
+
+def point_csv(lengths: LengthMap) -> Iterator[str]:
+    """A line for each point of the grid: of the lengths that start or end there."""
+    axes = AXES[: lengths.design.dimension]
+    groups = lengths.by_point
+    return csv_lines(
+        [*(f"{axis}_mm" for axis in axes), POINT_COLUMNS],
+        1e3 * lengths.points,
+        groups.count,
+        groups.undetermined,
+        1e6 * groups.average,
+        1e6 * groups.maximum,
+        groups.average_ratio,
+        groups.maximum_ratio,
+        groups.share(),
+        groups.share(True),
+    )
+
+
+def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
+    """A line for each length; what is undetermined is left empty."""
+    points, tiles = length_pairs(experiment, settings)
+    axes = AXES[: points.shape[1]]
+    heads = [
+        *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
+        "length_mm,u_um,expanded_um,target_um",
+    ]
+    for k, tile in enumerate(tiles):
+        u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
+        lines = csv_lines(
+            heads,
+            1e3 * points[tile.first],
+            1e3 * points[tile.second],
+            1e3 * tile.lengths,
+            u,
+            settings.coverage_factor * u,
+            1e6 * settings.target.at(tile.lengths),
+        )
+        # The heads stand above the first lengths alone.
+        yield from islice(lines, int(k > 0), None)
+
+
+def length_data(label: str, title: str, lengths: LengthMap) -> dict[str, Any]:
+    """The same as plain data in metres; what is undetermined is None."""
+    settings, edges = lengths.settings, lengths.edges.tolist()
+    classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
+    data: dict[str, Any] = as_data(
+        {
+            "experiment": label,
+            "title": title,
+            "rank_deficiency": lengths.deficiency,
+            **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+            "target": picked(settings.target, "constant", "slope"),
+            "target_coverage_factor": settings.target_factor,
+            "all": _group_data([{}], lengths.whole)[0],
+            "worst": None if lengths.worst is None else [lengths.points[k] for k in lengths.worst],
+            "by_length": _group_data(classes, lengths.by_length),
+            "by_direction": _group_data(
+                [{"direction": name} for name in lengths.directions], lengths.by_direction
+            ),
+            "by_point": _group_data(
+                [{"point": point} for point in lengths.points], lengths.by_point
+            ),
+        }
+    )
+    return data
+
+
+def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[dict[str, Any]]:
+    rows = records(
+        lengths=groups.count,
+        **picked(groups, "undetermined", "average", "maximum", "average_ratio", "maximum_ratio"),
+        share_within=groups.share(),
+        share_expanded_within=groups.share(True),
+    )
+    return [head | row for head, row in zip(heads, rows, strict=True)]

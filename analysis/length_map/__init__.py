@@ -1,1 +1,0 @@
-"""Uncertainties of lengths over the whole volume."""

@@ -1,0 +1,212 @@
+"""An error model in the neighbourhood of given readings, for many small changes of readings and
+parameters at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from ballplate.simulator.estimation.observations import OFFSET_STEP, offset_sensitivity
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from numpy.typing import NDArray
+
+Single = NDArray[np.float32]
+
+# Half the distance, in metres, between the readings whose difference gives a derivative.
+STEP = 1e-4
+
+
+class LocalModel(Protocol):
+    """How the correction at m readings changes with the readings and with the model's parameters.
+
+    For b replicates `moved` (b, d, m) is what each reading differs by, `offsets` (b, d, m) what its
+    probe's offset differs by where offsets are parameters, and `step` (b, n) what the parameters
+    differ by; without a step it is zero.
+    """
+
+    def change(
+        self, moved: Single | Array, step: Array | None, offsets: Array | None = None
+    ) -> Array:
+        """Change of the correction (b, d, m)."""
+        ...
+
+    def gather(
+        self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
+    ) -> Array:
+        """The derivative by the parameters, transposed, times `pull` (b, d, m): (b, n)."""
+        ...
+
+    def gather_offsets(self, step: Array | None, pull: Array) -> Array:
+        """The derivative by each reading's probe offset, transposed, times `pull` (b, d, m): (b, d,
+        m).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """A model that is linear in its parameters and smooth in the readings: matrix products serve
+    all replicates.
+
+    For each component: `columns` the parameters that matter, `by_parameters` (columns, m),
+    `by_place` (axes, m), and `mixed_columns` with `mixed` (columns, axes x m), the derivative of
+    `by_parameters` by the place. The axes are those of the reading and then, if they are
+    parameters, those of the probe offset, less the offset itself. What a place contributes
+    otherwise is a small part of the whole and needs no more digits than single precision has.
+    """
+
+    size: int
+    columns: tuple[Integers, ...]
+    by_parameters: tuple[Array, ...]
+    by_place: tuple[Single, ...]
+    mixed_columns: tuple[Integers, ...]
+    mixed: tuple[Single, ...]
+
+    def change(
+        self, moved: Single | Array, step: Array | None, offsets: Array | None = None
+    ) -> Array:
+        found = np.empty(moved.shape)
+        if step is not None and offsets is None and len(self.by_place[0]) > moved.shape[1]:
+            offsets = np.zeros(moved.shape)
+        places = _places(moved, offsets)
+        for i in range(len(self.columns)):
+            if step is None:
+                np.einsum(
+                    "am,bam->bm",
+                    self.by_place[i][: places.shape[1]],
+                    places,
+                    out=found[:, i],
+                    casting="same_kind",
+                )
+                continue
+            np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=found[:, i])
+            found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
+        if offsets is not None:
+            found += offsets
+        return found
+
+    def _slopes(self, i: int, step: Array) -> Single:
+        """Derivatives (b, axes, m) of component i by the places."""
+        slopes = step[:, self.mixed_columns[i]].astype(np.float32) @ self.mixed[i]
+        slopes = slopes.reshape(len(step), *self.by_place[i].shape)
+        slopes += self.by_place[i]
+        return slopes
+
+    def gather(
+        self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
+    ) -> Array:
+        found = np.zeros((len(pull), self.size))
+        for i, columns in enumerate(self.columns):
+            found[:, columns] += pull[:, i] @ self.by_parameters[i].T
+        if step is not None:
+            places, single = _places(moved, offsets), pull.astype(np.float32)
+            for i, columns in enumerate(self.mixed_columns):
+                both = (places * single[:, i, None]).reshape(len(pull), -1)
+                found[:, columns] += both @ self.mixed[i].T
+        return found
+
+    def gather_offsets(self, step: Array | None, pull: Array) -> Array:
+        found, d = pull.copy(), pull.shape[1]
+        for i in range(d):
+            slopes = self.by_place[i][None] if step is None else self._slopes(i, step)
+            found += slopes[:, d:] * pull[:, i, None]
+        return found
+
+
+@dataclass(frozen=True)
+class Direct:
+    """Any model, evaluated replicate by replicate: `x` (m, d), `a` (n,), `p` (m, d), `value` (m, d)
+    the correction.
+    """
+
+    model: ErrorModel
+    x: Array
+    a: Array
+    p: Array
+    value: Array
+
+    def _parameters(self, step: Array | None, k: int) -> Array:
+        return self.a if step is None else self.a + step[k]
+
+    def _probe(self, offsets: Array | None, k: int) -> Array:
+        return self.p if offsets is None else self.p + offsets[k].T
+
+    def change(
+        self, moved: Single | Array, step: Array | None, offsets: Array | None = None
+    ) -> Array:
+        found = np.empty(moved.shape)
+        for k in range(len(moved)):
+            error = self.model.error(
+                self.x + moved[k].T, self._parameters(step, k), self._probe(offsets, k)
+            )
+            found[k] = (error - self.value).T
+        return found
+
+    def gather(
+        self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
+    ) -> Array:
+        found = np.empty((len(pull), len(self.a)))
+        for k in range(len(pull)):
+            probe = self._probe(offsets, k)
+            jacobian = self.model.jacobian(self.x + moved[k].T, self._parameters(step, k), probe)
+            found[k] = np.einsum("mdn,dm->n", jacobian, pull[k])
+        return found
+
+    def gather_offsets(self, step: Array | None, pull: Array) -> Array:
+        found = np.empty_like(pull)
+        for k in range(len(pull)):
+            by_offset = offset_sensitivity(self.model, self.x, self._parameters(step, k), self.p)
+            found[k] = np.einsum("mij,im->jm", by_offset, pull[k])
+        return found
+
+
+def _places(moved: Single | Array, offsets: Array | None) -> Single:
+    """What readings, and offsets if they are parameters, differ by, (b, axes, m)."""
+    if offsets is None:
+        return moved.astype(np.float32)
+    return np.concatenate([moved, offsets], axis=1, dtype=np.float32)
+
+
+def expand(
+    model: ErrorModel, x: Array, a: Array, p: Array, with_offsets: bool = False
+) -> Expansion:
+    """Expand a model about readings x (m, d), parameters a (n,) and, if asked for, probe offsets p
+    (m, d).
+    """
+    d = x.shape[1]
+    jacobian = model.jacobian(x, a, p)
+    by_place, mixed = [], []
+    for axis in range(2 * d if with_offsets else d):
+        # Offsets act linearly, so that a step of their own size is exact to rounding.
+        step = STEP if axis < d else OFFSET_STEP
+        shift = np.zeros((2, d))
+        shift[axis // d, axis % d] = step
+        above, below = (x + shift[0], a, p + shift[1]), (x - shift[0], a, p - shift[1])
+        by_place.append((model.error(*above) - model.error(*below)) / (2 * step))
+        mixed.append((model.jacobian(*above) - model.jacobian(*below)) / (2 * step))
+    for axis in range(d, len(by_place)):
+        by_place[axis][:, axis - d] -= 1.0
+    # Differences leave rounding where the derivative is zero.
+    floor = 1e-9 * max((float(np.abs(one).max(initial=0.0)) for one in mixed), default=0.0)
+    together = np.stack(mixed, axis=3)
+    columns = tuple(np.flatnonzero(jacobian[:, i].any(axis=0)) for i in range(d))
+    used = tuple(
+        np.flatnonzero((np.abs(together[:, i]) > floor).any(axis=(0, 2))) for i in range(d)
+    )
+    return Expansion(
+        size=len(a),
+        columns=columns,
+        by_parameters=tuple(np.ascontiguousarray(jacobian[:, i, columns[i]].T) for i in range(d)),
+        by_place=tuple(
+            np.stack([one[:, i] for one in by_place]).astype(np.float32) for i in range(d)
+        ),
+        mixed_columns=used,
+        mixed=tuple(
+            np.ascontiguousarray(together[:, i, used[i]].transpose(1, 2, 0), np.float32).reshape(
+                len(used[i]), len(mixed) * len(x)
+            )
+            for i in range(d)
+        ),
+    )

@@ -1,0 +1,100 @@
+"""Another plate, or less that is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
+from ballplate.simulator.machines.settings import (
+    EmpiricalSettings,
+    KinematicSettings,
+    MachineFileSettings,
+    SplineSettings,
+)
+
+from .changes import Change, ChangeKind, count_readings, with_artefact
+
+# More balls a side, and fewer coefficients, than this are not tried.
+MOST_BALLS_MORE, MOST_COEFFICIENTS_LESS = 6, 6
+
+
+def more_balls(experiment: Experiment) -> Iterator[Change]:
+    """Plates with more balls on the same size."""
+    for name, settings in experiment.artefacts.items():
+        for more in range(1, MOST_BALLS_MORE + 1):
+            if isinstance(settings, GridSettings):
+                n = settings.balls
+                balls: Any = (n[0] + more, n[1] + more)
+                words = f"{balls[0]} x {balls[1]} balls on {name} instead of {n[0]} x {n[1]}"
+            elif isinstance(settings, SquareSettings):
+                balls = settings.balls + more
+                words = f"{balls} balls a side on {name} instead of {settings.balls}"
+            else:
+                break
+            try:
+                new = type(settings).model_validate(
+                    {**settings.model_dump(exclude_unset=True), "balls": balls}
+                )
+            except ValueError:
+                new = settings.model_copy(update={"balls": balls})
+            changed = with_artefact(experiment, name, new)
+            if changed is not None:
+                cost = float(
+                    count_readings(changed.positions) - count_readings(experiment.positions)
+                )
+                apply = partial(_with_artefact, name=name, settings=new)
+                yield Change(
+                    ChangeKind.ARTEFACT,
+                    f"use {words}",
+                    cost,
+                    frozenset({f"artefact {name}"}),
+                    apply,
+                )
+
+
+def _with_artefact(experiment: Experiment, name: str, settings: Any) -> Experiment:
+    changed = with_artefact(experiment, name, settings)
+    assert changed is not None
+    return changed
+
+
+def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
+    """An error model that asks for less."""
+    model = experiment.error_model
+    if any(prior.by_model.any() for prior in experiment.priors):
+        # They are about coefficients that there would be no more.
+        return
+    keys: tuple[tuple[str, int, str], ...] = ()
+    if isinstance(model, KinematicSettings) and not isinstance(model.basis, SplineSettings):
+        keys = (
+            ("position_coefficients", 2, "coefficients of positional errors"),
+            ("rotation_coefficients", 1, "coefficients of rotational errors"),
+        )
+    elif isinstance(model, EmpiricalSettings) and model.terms in ("sums", "tensor"):
+        keys = (
+            ()
+            if isinstance(model.basis, SplineSettings)
+            else (("coefficients", 2, "coefficients"),)
+        )
+    elif isinstance(model, MachineFileSettings):
+        keys = (("knots", 0, "interior knots"),)
+    for key, least, words in keys:
+        now = getattr(model, key)
+        for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
+            new = model.model_copy(update={key: value})
+            apply = partial(_with_model, settings=new)
+            what = (
+                words
+                if value != 1
+                else words.replace("coefficients", "coefficient").replace("knots", "knot")
+            )
+            told = f"ask for {value} {what} instead of {now}"
+            yield Change(ChangeKind.MODEL, told, float(now - value), frozenset({"model"}), apply)
+
+
+def _with_model(experiment: Experiment, settings: Any) -> Experiment:
+    return replace(experiment, error_model=settings)

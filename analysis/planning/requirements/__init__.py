@@ -1,0 +1,1 @@
+"""Accuracies of equipment that a target uncertainty requires."""

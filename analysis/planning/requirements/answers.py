@@ -1,0 +1,137 @@
+"""What is needed for a goal, and how it is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ...presentation.formatting import aligned
+from ...presentation.result import Result
+from .goals import Goal, Judgement
+from .unknowns import UnknownName
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an unknown must be for the goal to be met, the others as they are.
+
+    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that
+    was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
+    unknown cannot be `varied`. `words` and `value`, in metres or a number, are the value needed, or
+    without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
+    gives. `remarks` tell of the range.
+    """
+
+    name: UnknownName
+    title: str
+    status: Literal["found", "any", "none", "undetermined", "varied"]
+    present: str = ""
+    grows: bool = False
+    words: str = ""
+    value: float | None = None
+    outcome: str = ""
+    beside: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def is_met(self) -> bool:
+        return self.status in ("found", "any")
+
+
+@dataclass(frozen=True, repr=False)
+class Reach(Result):
+    """A goal, what the design as it is makes of it, and what each unknown must be."""
+
+    label: str
+    title: str
+    goal: Goal
+    present: Judgement
+    deficiency: int
+    answers: tuple[Answer, ...]
+
+    def headline(self) -> str:
+        return self.present.words
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each unknown."""
+        return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
+
+
+def _lines(reach: Reach) -> list[str]:
+    """The goal, what the design makes of it, and a row for each unknown."""
+    now = "met" if reach.present.is_met else "not met"
+    lines = [
+        f"{reach.label}: {reach.title}",
+        f"goal: {reach.goal}",
+        f"as drawn: {now}; {reach.present.words}",
+    ]
+    if reach.present.undetermined:
+        lines.append(
+            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check tells"
+            " what is undetermined"
+        )
+    rows = [["changed alone", "as drawn", "needed", "what comes of it"]]
+    for one in reach.answers:
+        rows.append([one.title, one.present, _needed(one), _outcome(one)])
+    lines += ["", *aligned(rows, [False] * 4)]
+    notes = []
+    for one in reach.answers:
+        notes += [f"{one.name}: {one.beside}"] if one.beside else []
+        notes += [f"{one.name}: {remark}" for remark in one.remarks]
+    return lines + ["", *notes] if notes else lines
+
+
+def _needed(answer: Answer) -> str:
+    if answer.status == "found":
+        return f"at {'least' if answer.grows else 'most'} {answer.words}"
+    if answer.status == "any":
+        return f"any, even {answer.words}"
+    return "cannot be varied" if answer.status == "varied" else "no value does"
+
+
+def _outcome(answer: Answer) -> str:
+    if answer.status == "none":
+        return (
+            f"even {answer.words}: {answer.outcome}"
+            if answer.name != "size"
+            else f"best of those tried, {answer.words}: {answer.outcome}"
+        )
+    return answer.outcome
+
+
+def _data(reach: Reach) -> dict[str, Any]:
+    """The same as plain data, values in metres or as numbers."""
+    goal = reach.goal
+    told: dict[str, Any] = {"kind": goal.kind}
+    if goal.kind == "lengths":
+        told["share"] = goal.share
+    if goal.kind == "quantity":
+        told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
+    return {
+        "experiment": reach.label,
+        "title": reach.title,
+        "goal": told,
+        "is_met": reach.present.is_met,
+        "as_drawn": reach.present.words,
+        "rank_deficiency": reach.deficiency,
+        "undetermined": reach.present.undetermined,
+        "answers": {
+            one.name: {
+                "status": {"varied": "cannot be varied"}.get(one.status, one.status),
+                "as_drawn": one.present or None,
+                "needed": one.words if one.is_met else None,
+                "needed_value": one.value if one.is_met else None,
+                "limit": one.words if one.status == "none" else None,
+                "outcome": one.outcome or None,
+                "next": one.beside or None,
+                "remarks": list(one.remarks),
+            }
+            for one in reach.answers
+        },
+    }

@@ -1,0 +1,1 @@
+"""Forms of tables and pictures in which results are shown."""

@@ -1,0 +1,141 @@
+"""Numbers, units and columns as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.computing.rounding import printable
+
+# Small lengths and angles are shown in these; the factor takes metres and radians there.
+SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
+
+
+def shown_unit(unit: str) -> str:
+    """Unit in which tables show values of a unit.
+
+    >>> shown_unit("m, rad")
+    'um, urad'
+    """
+    return ", ".join(SHOWN[part] for part in unit.split(", "))
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number with significant digits, and a dash for what is undetermined.
+
+    >>> number(0.123456), number(12345.678), number(float("nan"))
+    ('0.1235', '12350', '-')
+    """
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    if value == 0:
+        return "0"
+    value = printable(value, digits + 5)
+    decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    magnitude = round(value, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
+
+
+def percent(share: float) -> str:
+    """A share in words, never rounded up.
+
+    >>> percent(0.99999), percent(0.125)
+    ('99.99 %', '12.5 %')
+    """
+    return f"{math.floor(1e4 * share + 1e-9) / 100:g} %"
+
+
+def uncertainty_words(coverage_factor: float) -> str:
+    """The uncertainty that a target is compared with.
+
+    >>> uncertainty_words(1.0), uncertainty_words(2.0)
+    ('standard uncertainty u', 'expanded uncertainty U = 2 u')
+    """
+    return (
+        "standard uncertainty u"
+        if coverage_factor == 1.0
+        else f"expanded uncertainty U = {coverage_factor:g} u"
+    )
+
+
+def to_uncertainty(value: float, uncertainty: float) -> str:
+    """A value to the third digit of its standard uncertainty.
+
+    >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597)
+    ('50000.213', '-0.042')
+    >>> to_uncertainty(12.0, float("nan"))
+    '12.0000'
+    """
+    if math.isnan(value) or not uncertainty > 0.0:
+        return number(value, 6)
+    return f"{value:.{max(2 - math.floor(math.log10(uncertainty)), 0)}f}"
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
+    """Rows of cells as lines of text with aligned columns.
+
+    >>> aligned([["a", "1"], ["bb", "22"]], [False, True])
+    ['a    1', 'bb  22']
+    """
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if to_right else cell.ljust(width)
+            for cell, width, to_right in zip(row, widths, right, strict=True)
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def finite(value: float) -> float | None:
+    """A value as JSON can have it; None for what is undetermined."""
+    return value if math.isfinite(value) else None
+
+
+def as_data(value: Any) -> Any:
+    """A result as JSON can have it: objects by their fields, arrays and tuples as lists, and None
+    for what is undetermined.
+
+    >>> as_data({"u": (0.5, math.nan)})
+    {'u': [0.5, None]}
+    """
+    if is_dataclass(value):
+        value = {one.name: getattr(value, one.name) for one in fields(value)}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {key: as_data(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_data(item) for item in value]
+    return finite(value) if isinstance(value, float) else value
+
+
+def records(**columns: Any) -> list[dict[str, Any]]:
+    """Columns of the same length as a mapping for each row.
+
+    >>> records(x=(1, 2), y="ab")
+    [{'x': 1, 'y': 'a'}, {'x': 2, 'y': 'b'}]
+    """
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def csv_lines(heads: Iterable[str], *columns: np.ndarray) -> Iterator[str]:
+    """Numbers (m,) or (m, k) as lines of CSV with twelve digits; what is undetermined is empty."""
+    yield ",".join(heads)
+    for row in np.column_stack(columns).tolist():
+        yield ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
+
+
+def picked(source: object, *names: str) -> dict[str, Any]:
+    """Some attributes of an object by their names.
+
+    >>> picked(1 + 2j, "real", "imag")
+    {'real': 1.0, 'imag': 2.0}
+    """
+    return {name: getattr(source, name) for name in names}

@@ -1,1 +1,0 @@
-"""Reverse planning: which value of one unknown meets a goal."""

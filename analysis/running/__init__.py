@@ -1,1 +1,0 @@
-"""Work spread over processes, how far it is, and what it needs."""

@@ -1,1 +1,0 @@
-"""Volumetric errors of a machine from its parametric errors."""

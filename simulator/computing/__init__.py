@@ -1,0 +1,1 @@
+"""Threads, processes, memory, progress and rounding of computations."""

@@ -1,0 +1,152 @@
+"""Measured error curves in CSV files: a position along the axis and functions by their ISO 230-1
+names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
+from ..inputs.settings import hint, listing, shorten
+from ..inputs.tables import (
+    _cells,
+    refuse_columns,
+    refuse_separators,
+    table_lines,
+    wrong_count,
+    wrong_number,
+)
+from ..inputs.yamltree import Mark
+from ..machines.curves import NAMES, Points
+from ..machines.kinematic import TRANSLATIONS
+
+POSITION = "position"
+EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
+BANDWIDTH = "_bandwidth"
+# Far more than are measured along an axis.
+MOST_POINTS = 100_000
+
+
+def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
+    """Read curves of one axis from a file whose first line names the columns, such as
+    position_mm,EXX_um,EAX_urad.
+
+    With `bandwidths` columns such as EXX_bandwidth_um are curves too.
+
+    :raises ExperimentError: everything that is wrong with the file at once.
+    """
+    return read_numbered_curves(path, bandwidths)[0]
+
+
+def read_numbered_curves(
+    path: Path, bandwidths: bool = False
+) -> tuple[dict[str, Points], tuple[int, ...]]:
+    """The same with the number of each point's line.
+
+    :raises ExperimentError: as `read_curves`.
+    """
+    file = str(path)
+    lines = table_lines(path)
+    if not lines:
+        raise ExperimentError(
+            [Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")]
+        )
+    if len(lines) > MOST_POINTS + 1:
+        text = (
+            f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"
+            " of them out"
+        )
+        raise ExperimentError([Message(file, lines[0][0], 1, "", text)])
+    known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
+    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], known)
+    messages: list[Message] = []
+    rows: list[tuple[int, list[float]]] = []
+    for number, line in lines[1:]:
+        if len(messages) >= MOST_MESSAGES:
+            messages.append(Message(file, number, 1, "", MORE_ERRORS))
+            break
+        cells = _cells(line)
+        if cells is None or len(cells) != len(names):
+            messages.append(Message(file, number, 1, "", wrong_count(line, cells, len(names))))
+            continue
+        row = []
+        for (column, cell), name, factor in zip(cells, names, factors, strict=True):
+            try:
+                row.append(metres_or_radians(cell, factor))
+            except QuantityError as error:
+                messages.append(
+                    Message(file, number, column, "", wrong_number(cell, name) or str(error))
+                )
+        rows.append((number, row))
+    if messages:
+        raise ExperimentError(messages)
+    if len(rows) < 2:
+        raise ExperimentError(
+            [Message(file, lines[0][0], 1, "", "a curve needs two points at least; add rows")]
+        )
+    place = names.index(POSITION)
+    rows.sort(key=lambda row: row[1][place])
+    for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
+        if after[place] == before[place]:
+            text = "this position stands in the file twice; leave one of the rows out"
+            raise ExperimentError([Message(file, number, 1, "", text)])
+    positions = tuple(row[place] for _, row in rows)
+    curves = {
+        name: Points(positions, tuple(row[k] for _, row in rows))
+        for k, name in enumerate(names)
+        if name != POSITION
+    }
+    return curves, tuple(number for number, _ in rows)
+
+
+def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str], list[Fraction]]:
+    messages: list[Message] = []
+    names: list[str] = []
+    factors: list[Fraction] = []
+    refuse_columns(mark, header, EXAMPLE)
+    refuse_separators(mark, header, EXAMPLE)
+    for column, cell in _cells(header) or []:
+        place = Mark(mark.file, mark.line, column)
+        name, _, unit = cell.rpartition("_")
+        unit = unit.replace("µ", "u").replace("μ", "u")
+        if name != POSITION and name not in errors:
+            known = cell in (POSITION, *errors)
+            remedy = (
+                f"write it with its unit, as in {EXAMPLE}"
+                if known
+                else hint(name or cell, [POSITION, *errors])
+            )
+            problem = "has no unit" if known else "is no error of an axis"
+            messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
+            continue
+        units: Mapping[str, Fraction] = (
+            LENGTH_UNITS if name == POSITION or name[1] in TRANSLATIONS else ANGLE_UNITS
+        )
+        if unit not in units:
+            messages.append(
+                place.message(
+                    "", f'unknown unit in the column "{shorten(cell)}"; {hint(unit, units)}'
+                )
+            )
+            continue
+        if name in names:
+            messages.append(
+                place.message("", f'a second column "{shorten(cell)}"; remove one of them')
+            )
+        names.append(name)
+        factors.append(units[unit])
+    axes = sorted({name[2] for name in names if name != POSITION})
+    if not messages and (POSITION not in names or not axes):
+        messages.append(
+            mark.message("", f"has no position, or no error; write columns as in {EXAMPLE}")
+        )
+    if len(axes) > 1:
+        messages.append(
+            mark.message("", f"errors of the axes {listing(axes)}; write one file for each axis")
+        )
+    if messages:
+        raise ExperimentError(messages)
+    return names, factors

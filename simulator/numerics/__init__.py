@@ -1,1 +1,0 @@
-"""What keeps figures the same on every machine."""

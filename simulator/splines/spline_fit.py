@@ -1,0 +1,220 @@
+"""Least squares under constraints by orthogonal factorisation.
+
+The constraints C c = f are met by c = c0 + Z z, where C' P = Q R gives the particular solution c0
+and the columns Z of Q that C does not see; then || W (A Z z - (y - A c0)) || is made small by a
+second factorisation. NISTIR 6517, equation (25), is the same solution by pseudo-inverses; Lawson
+and Hanson, Solving Least Squares Problems, chapter 20, has this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from .constraints import Constraint, rows
+from .space import Array, Side, SplineSpace
+from .spline_problems import SplineError, SplineProblem
+
+# Rows of length 1, and columns of functions of size 1: what is smaller is rounding.
+NOTHING = 1e-10
+# Singular values of the points' rows below this part of the largest are rounding.
+UNDETERMINED = 1e-9
+
+
+@dataclass(frozen=True)
+class SplineFit:
+    """A fitted spline.
+
+    `coefficients` (count,) are those of the B-splines of `space`; with `root` (count, free) their
+    covariance is sigma² root root'. x, y (m,) are the points, `uncertainties` (m,) those of y, all
+    1 where none are stated: then `sigma` is a standard uncertainty, otherwise a factor. `redundant`
+    are constraints that the others imply.
+    """
+
+    space: SplineSpace
+    constraints: tuple[Constraint, ...]
+    redundant: tuple[Constraint, ...]
+    coefficients: Array = field(repr=False)
+    root: Array = field(repr=False)
+    x: Array = field(repr=False)
+    y: Array = field(repr=False)
+    uncertainties: Array = field(repr=False)
+
+    @property
+    def free(self) -> int:
+        """Number of coefficients that the points determine."""
+        return self.root.shape[1]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Points more than free coefficients."""
+        return len(self.x) - self.free
+
+    def values(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
+        """The curve or a derivative at x (m,).
+
+        :raises SplineError: an x beyond the ends.
+        """
+        return np.asarray(self.space.rows(x, derivative, side) @ self.coefficients)
+
+    def spread(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
+        """Standard uncertainty of the curve or a derivative at x (m,) for sigma 1.
+
+        :raises SplineError: an x beyond the ends.
+        """
+        return np.asarray(
+            np.sqrt(((self.space.rows(x, derivative, side) @ self.root) ** 2).sum(axis=1))
+        )
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Points less curve (m,)."""
+        return np.asarray(self.y - self.values(self.x))
+
+    @cached_property
+    def sum_of_squares(self) -> float:
+        """Of residuals over uncertainties."""
+        return float(((self.residuals / self.uncertainties) ** 2).sum())
+
+    @property
+    def sigma(self) -> float:
+        """Estimated from the residuals; not a number where there are no degrees of freedom."""
+        if self.degrees_of_freedom < 1:
+            return float("nan")
+        return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
+
+    def violation(self, constraint: Constraint) -> float:
+        """By how much the curve misses a constraint, in the constraint's own unit."""
+        terms = constraint.terms
+        return float(
+            sum(t.factor * self.values(np.array([t.at]), t.derivative, t.side)[0] for t in terms)
+            - constraint.value
+        )
+
+
+def fit(
+    space: SplineSpace,
+    x: Array,
+    y: Array,
+    uncertainties: Array | None = None,
+    constraints: tuple[Constraint, ...] = (),
+) -> SplineFit:
+    """The spline that fits points x, y (m,) best among those that meet the constraints.
+
+    Points count by the inverse squares of their `uncertainties` (m,), alike where there are none.
+
+    :raises SplineError: constraints that contradict one another, points that do not determine the
+        curve, or places beyond its ends; all of a kind at once.
+    """
+    from scipy.linalg import solve_triangular
+
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    weights = (
+        np.ones(len(x)) if uncertainties is None else 1.0 / np.asarray(uncertainties, dtype=float)
+    )
+    particular, null, redundant = _constrained(space, constraints)
+    design = space.rows(x)
+    _refuse_undetermined(space, x, design @ null, null)
+    q, r = np.linalg.qr(weights[:, None] * (design @ null))
+    free = solve_triangular(r, q.T @ (weights * (y - design @ particular)))
+    root = null @ solve_triangular(r, np.eye(len(r)))
+    coefficients = particular + null @ free
+    return SplineFit(space, constraints, redundant, coefficients, root, x, y, 1.0 / weights)
+
+
+def _constrained(
+    space: SplineSpace, constraints: tuple[Constraint, ...]
+) -> tuple[Array, Array, tuple[Constraint, ...]]:
+    """A solution (count,) of the constraints, what they leave free (count, free), and constraints
+    that others imply.
+    """
+    from scipy.linalg import qr, solve_triangular
+
+    matrix, values = rows(space, constraints)
+    if not constraints:
+        return np.zeros(space.count), np.eye(space.count), ()
+    q, r, order = qr(matrix.T, pivoting=True)
+    rank = int((np.abs(np.diag(r)) > NOTHING).sum())
+    kept, rest = order[:rank], sorted(order[rank:].tolist())
+    particular = q[:, :rank] @ solve_triangular(r[:rank, :rank], values[kept], trans="T")
+    # What is left of a value that is met up to rounding, beside the values that it is made of.
+    size = NOTHING * max(float(np.abs(values).max()), float(np.abs(particular).max(initial=0.0)))
+    contradictory = [k for k in rest if abs(matrix[k] @ particular - values[k]) > size]
+    if contradictory:
+        raise SplineError(_contradiction(constraints, matrix, kept, k) for k in contradictory)
+    return particular, q[:, rank:], tuple(constraints[k] for k in rest)
+
+
+def _contradiction(
+    constraints: tuple[Constraint, ...], matrix: Array, kept: Array, k: int
+) -> SplineProblem:
+    """Say what a constraint contradicts: those of which it is a combination."""
+    if not matrix[k].any():
+        text = f"the {constraints[k].words} is zero for every spline of this order; leave it out"
+        return SplineProblem(text, constraints[k].places)
+    parts = np.linalg.lstsq(matrix[kept].T, matrix[k], rcond=None)[0]
+    others = [
+        constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING
+    ]
+    if len(others) == 1 and _is_same(constraints[k], others[0]):
+        return SplineProblem(
+            f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
+            constraints[k].places,
+        )
+    texts: list[str] = []
+    places: list[float] = []
+    for one in (constraints[k], *others):
+        indices = [f"{{{len(places) + i}}}" for i in range(len(one.places))]
+        texts.append(one.words.format(*indices))
+        places += one.places
+    text = (
+        f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; leave one of them out or add a"
+        " knot"
+    )
+    return SplineProblem(text, tuple(places))
+
+
+def _is_same(one: Constraint, other: Constraint) -> bool:
+    """Whether two constraints prescribe the same thing."""
+    return one.words == other.words and bool(
+        np.allclose(one.places, other.places, rtol=1e-12, atol=0.0)
+    )
+
+
+def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:
+    """Name the parts of the curve that the points leave open.
+
+    :raises SplineError: there are such parts.
+    """
+    if null.shape[1] == 0:
+        return
+    _, values, directions = np.linalg.svd(np.linalg.qr(design, mode="r"), full_matrices=True)
+    known = int((values > UNDETERMINED * max(float(values.max(initial=0.0)), UNDETERMINED)).sum())
+    if known == null.shape[1]:
+        return
+    open_ = null @ directions[known:].T
+    size = np.abs(space.pieces @ open_).max(axis=(1, 2))
+    touched = size > 1e-6 * size.max()
+    problems = []
+    for first, last in _runs(touched):
+        lower, upper = float(space.breaks[first]), float(space.breaks[last + 1])
+        inside = int(((x >= lower) & (x <= upper)).sum())
+        within = open_ * (np.abs(space.pieces[first : last + 1]).max(axis=(0, 1)) > 0)[:, None]
+        missing = np.linalg.matrix_rank(within, tol=1e-6)
+        lacks = f"{missing} point{'s' if missing > 1 else ''}"
+        where = f"between {{0}} and {{1}}, where it has {inside}"
+        text = f"the curve lacks {lacks} {where}; leave out knots or prescribe more"
+        problems.append(SplineProblem(text, (lower, upper)))
+    raise SplineError(problems)
+
+
+def _runs(chosen: np.ndarray) -> list[tuple[int, int]]:
+    """First and last index of every run of true entries.
+
+    >>> _runs(np.array([True, True, False, True]))
+    [(0, 1), (3, 3)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
