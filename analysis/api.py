@@ -177,9 +177,9 @@ def simulate(
     found = simulated_readings(_experiment(experiment), seed, exact)
     design, readings = found.design, found.readings
     columns: dict[str, Any] = {
-        "position": [design.position_names[k] for k in readings.position],
-        "ball": [design.ball_names[k] for k in readings.ball],
-        "probe": [design.probe_names[k] for k in readings.probe],
+        "position": [design.positions.names[k] for k in readings.position],
+        "ball": [design.balls.names[k] for k in readings.ball],
+        "probe": [design.probes.names[k] for k in readings.probe],
     }
     for k, axis in enumerate(AXES[: design.dimension]):
         columns[f"{axis}_mm"] = 1e3 * found.x[:, k]

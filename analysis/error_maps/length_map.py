@@ -117,7 +117,7 @@ def length_map(
     """
     design = lay_out(experiment)
     points = grid_points(design, settings.grid)
-    edges = class_edges(float(np.linalg.norm(design.upper - design.lower)))
+    edges = class_edges(float(np.linalg.norm(design.machine.volume.size)))
     names = direction_names(design.dimension)
     deficiency, tiles = _tiles(design, points, settings)
     factors = (1.0, settings.coverage_factor, settings.target_factor)
@@ -134,7 +134,7 @@ def length_map(
         by_point.add(tile.first, values, ratio)
         by_point.add(tile.second, values, ratio)
         by_length.add(length_classes(tile.lengths, edges), values, ratio)
-        apart = (points[tile.second] - points[tile.first]) / (design.upper - design.lower)
+        apart = (points[tile.second] - points[tile.first]) / design.machine.volume.size
         by_direction.add(direction_classes(apart), values, ratio)
         whole.add(np.zeros(len(values), np.int64), values, ratio)
         if (
@@ -178,16 +178,17 @@ def _tiles(
 ) -> tuple[int, Iterator[PairTile]]:
     """Rank deficiency, and the tiles of all pairs of points."""
     at = linearise(design)
-    probes = np.full(len(points), design.probe_names.index(settings.probe))
+    probes = np.full(len(points), design.probes.names.index(settings.probe))
     moved = displacements(at, MeasuredPoints(points, probes))
     if settings.with_repeatability:
-        moved.own[:] = np.diag(design.repeatability)
+        moved.own[:] = np.diag(design.machine.repeatability)
     return at.deficiency, pair_tiles(moved)
 
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:
     """Points (n, d) of a grid over the whole volume, the last axis changing fastest."""
-    sides = [np.linspace(*ends) for ends in zip(design.lower, design.upper, counts, strict=True)]
+    ends = zip(*design.machine.volume.corners, counts, strict=True)
+    sides = [np.linspace(*one) for one in ends]
     return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, design.dimension)
 
 

@@ -96,7 +96,7 @@ def _others(built: Volumetric) -> list[list[str]]:
     """Squareness, expansion and droop at the reference point."""
     rows = []
     for parameter, value in _numbers(built):
-        square = parameter.name.startswith("E")
+        square = parameter.name in SQUARENESS
         unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
         rows.append(
             [
@@ -112,7 +112,7 @@ def _others(built: Volumetric) -> list[list[str]]:
 
 def _told(parameter: Parameter) -> str:
     """What an error that is no function means."""
-    is_droop = parameter.name.startswith("phi")
+    is_droop = parameter.name in ("phi1", "phi2")
     return parameter.meaning + (", over the whole axis" if is_droop else "")
 
 

@@ -119,7 +119,7 @@ def count_terms(
     position has all the balls.
     """
     count = 0
-    artefact_of = design.ball_artefact[design.readings.ball]
+    artefact_of = design.balls.artefact[design.readings.ball]
     for k, (artefact, layout) in enumerate(experiment.layouts.items()):
         if experiment.artefacts[artefact].role != "plate":
             continue
@@ -166,11 +166,9 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
 
     :raises ExperimentError: a Bryan gauge, or a length standard without a certificate.
     """
-    gauges = design.is_gauge is not None and bool(design.is_gauge.any())
-    if gauges or design.length_names:
-        what = (
-            "a Bryan gauge's pivot" if gauges else f"an unknown length ({design.length_names[0]})"
-        )
+    gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
+    if gauges or unknown:
+        what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
         text = (
             f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         )
@@ -265,9 +263,8 @@ def compare_estimators(
         _refuse_unknown_lengths(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
-    corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
     on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
@@ -284,7 +281,7 @@ def compare_estimators(
         if both is None:
             failed.append(trial)
         else:
-            ends = design.lower + (design.upper - design.lower) * generator.random(
+            ends = design.machine.volume.lower + design.machine.volume.size * generator.random(
                 (2, points, design.dimension)
             )
             difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
@@ -347,7 +344,7 @@ def _both_estimates(
 
 def _distances(design: Design, a: Array, ends: Array) -> Array:
     """Distances (m,) between corrected points of scale readings `ends` (2, m, d)."""
-    offsets = np.broadcast_to(design.probes[design.point_probe], ends.shape[1:])
+    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], ends.shape[1:])
     corrected = [x + design.model.error(x, a, offsets) for x in ends]
     return np.asarray(np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1)))
 

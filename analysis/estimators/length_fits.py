@@ -87,9 +87,9 @@ def fit_lengths(
         ),
         tuple(factors.tolist()),
         tuple(
-            (design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
+            (design.positions.names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
         ),
-        tuple(zip(design.length_names, lengths.tolist(), strict=True)),
+        tuple(zip(design.unknown_lengths.names, lengths.tolist(), strict=True)),
         tuple(remarks),
         tuple(_spheres(design, observed.x)),
     )
@@ -122,7 +122,7 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
     if len(design.priors):
         remarks.append(f"{estimator} takes no notice of priors")
-    if design.free_offsets is not None and design.free_offsets.any():
+    if design.probes.free.any():
         remarks.append(
             f"{estimator} takes the probes' offsets as the file states them, though they are"
             " unknown"
@@ -156,10 +156,10 @@ def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
     """
     for k in design.gauge_positions:
         rows = design.readings.position == k
-        points = x[rows] + design.probes[design.readings.probe[rows]]
+        points = x[rows] + design.probes.offsets[design.readings.probe[rows]]
         extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if len(points) > design.dimension and extent[-1] > FLAT * extent[0]:
-            yield design.position_names[k], fit_sphere(points, design.origins[k])[1]
+            yield design.positions.names[k], fit_sphere(points, design.positions.origins[k])[1]
 
 
 def length_fit_lines(fit: LengthFit) -> list[str]:

@@ -167,10 +167,7 @@ def fit_reversal(
     settings: MetricSettings = experiment.error_model
     scale = settings.plane_scale if scale is None else scale
     experiment = replace(experiment, error_model=settings.model_copy(update={"scale": scale}))
-    corners = (
-        tuple(map(float, experiment.machine.volume.lower)),
-        tuple(map(float, experiment.machine.volume.upper)),
-    )
+    corners = experiment.machine.volume.corners
     design = replace(observed.design, model=build_error_model(experiment.error_model, *corners))
     observed = replace(observed, design=design)
     seen = _mean_readings(observed)
@@ -181,9 +178,9 @@ def fit_reversal(
     except UndeterminedError as error:
         text = f"{error}; read balls that are not"
         raise ExperimentError(
-            [experiment.message(("artefacts", design.artefact_names[0]), text)]
+            [experiment.message(("artefacts", design.artefacts.names[0]), text)]
         ) from None
-    axes = axes_of_plates(experiment)[design.artefact_names[0]]
+    axes = axes_of_plates(experiment)[design.artefacts.names[0]]
     full = fit(experiment, observed, sigma)
     values = [found.alpha, found.beta, found.gamma, *found.offset.tolist()][: 5 if offsets else 3]
     return ReversalFit(
@@ -191,16 +188,16 @@ def fit_reversal(
         experiment.title,
         scale,
         offsets,
-        design.position_names[k],
-        design.position_names[m],
-        seen[k] + design.origins[k],
+        design.positions.names[k],
+        design.positions.names[m],
+        seen[k] + design.positions.origins[k],
         found,
         tuple(
             ParameterEstimate(n, v, np.nan, u)
             for (n, u), v in zip(PARAMETERS, values, strict=False)
         ),
         axes,
-        design.ball_names,
+        design.balls.names,
         in_plate_axes(found.coordinates, axes)[0],
         full,
         _redundant(design, full, k, m) if full.converged else (),
@@ -275,20 +272,20 @@ def _unusable_readings(experiment: Experiment, observed: ObservedReadings) -> li
         observed.marks[0].file if observed.marks else str(experiment.source),
     )
     found = []
-    probes = [design.probe_names[probe] for probe in np.unique(design.readings.probe)]
+    probes = [design.probes.names[probe] for probe in np.unique(design.readings.probe)]
     if len(probes) > 1:
         text = (
             f"the reversal takes readings with one probe, not with {listing(probes)}; keep those"
             f" with one, {INSTEAD}"
         )
         found.append(Message(file, 0, 0, "", text))
-    count = np.zeros((2, len(design.ball_names)), np.int64)
+    count = np.zeros((2, len(design.balls.names)), np.int64)
     np.add.at(count, (design.readings.position, design.readings.ball), 1)
     for k in range(2):
-        unread = [f'"{design.ball_names[ball]}"' for ball in np.flatnonzero(count[k] == 0)]
+        unread = [f'"{design.balls.names[ball]}"' for ball in np.flatnonzero(count[k] == 0)]
         if unread:
             text = (
-                f'the reversal needs every ball in both positions; in "{design.position_names[k]}"'
+                f'the reversal needs every ball in both positions; in "{design.positions.names[k]}"'
                 " the readings lack "
             )
             found.append(Message(file, 0, 0, "", f"{text}{listing(unread)}; read them, {INSTEAD}"))
@@ -297,11 +294,11 @@ def _unusable_readings(experiment: Experiment, observed: ObservedReadings) -> li
 
 def _refuse_turn(observed: ObservedReadings, say: Callable[[Steps, str], None]) -> None:
     """Refuse positions between which no quarter turn lies."""
-    if len(observed.design.ball_names) < 2:
+    if len(observed.design.balls.names) < 2:
         return
     turn = np.degrees(turn_between(*_mean_readings(observed)))
     if not 45.0 < abs(turn) < 135.0:
-        names = " and ".join(f'"{name}"' for name in observed.design.position_names)
+        names = " and ".join(f'"{name}"' for name in observed.design.positions.names)
         say(
             ("positions",),
             f"a turn of {abs(turn):.4g} degrees lies between {names}; turn the plate by about 90",
@@ -313,8 +310,12 @@ def _mean_readings(observed: ObservedReadings) -> Array:
     nominal origin.
     """
     design, readings = observed.design, observed.design.readings
-    places = observed.x + design.probes[readings.probe] - design.origins[readings.position]
-    total = np.zeros((2, len(design.ball_names), 2))
+    places = (
+        observed.x
+        + design.probes.offsets[readings.probe]
+        - design.positions.origins[readings.position]
+    )
+    total = np.zeros((2, len(design.balls.names), 2))
     count = np.zeros(total.shape[:2])
     np.add.at(total, (readings.position, readings.ball), places)
     np.add.at(count, (readings.position, readings.ball), 1.0)
@@ -379,10 +380,10 @@ def _relation(
     between = rotations[k] @ rotations[m].T
     relation = metric @ between @ inverse
     origins = state.origins + poses[:, :2]
-    probe = design.probes[design.readings.probe[0]]
+    probe = design.probes.offsets[design.readings.probe[0]]
     # Where readings with the probe's offset added are, less where the axes' errors have taken that.
     shift = probe - metric @ probe
     offset = metric @ (origins[k] - between @ origins[m]) + shift - relation @ shift
-    offset = offset - design.origins[k] + relation @ design.origins[m]
+    offset = offset - design.positions.origins[k] + relation @ design.positions.origins[m]
     turn = vector_from_rotation((state.rotations[k] @ state.rotations[m].T)[None])[0, 0]
     return np.array([turn - np.pi / 2 + poses[k, 2] - poses[m, 2], *offset])

@@ -139,7 +139,7 @@ def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_a
     """The parts (places d, n d) that balls have alone, in the columns of all balls."""
     from scipy.sparse import coo_array
 
-    n, d = at.design.balls.shape
+    n, d = at.design.balls.places.shape
     row = d * np.arange(len(index))[:, None, None] + np.arange(d)[:, None] + np.zeros(d, np.int64)
     column = d * index[:, None, None] + np.zeros((d, 1), np.int64) + np.arange(d)
     own = coo_array(

@@ -31,7 +31,7 @@ def event_groups(given: Patterns) -> list[Integers]:
     if len(shift):
         found += [shift, np.concatenate([shift, turn], axis=1)]
     expansion = given.of_kind("expansion")
-    artefact = given.design.position_artefact[given.subject[expansion]]
+    artefact = given.design.positions.artefact[given.subject[expansion]]
     pairs = [
         expansion[[i, j]]
         for i, j in combinations(range(len(expansion)), 2)

@@ -114,7 +114,7 @@ def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
     for some in hat_rows(at, x):
         common[some.rows], own[some.rows], ball[some.rows] = some.common, some.own, some.ball
     residual = whitened_residuals(design, at.layout, at.state, x)
-    found = Leftover(residual, common, own, ball, len(design.balls), freedom)
+    found = Leftover(residual, common, own, ball, len(design.balls.places), freedom)
     return replace(found, residual=found.of(residual[:, None])[:, 0])
 
 

@@ -20,7 +20,7 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
     if kind == "length":
         return (
             f"{length_name(design, subject)} in position"
-            f" {design.position_names[_position(design, subject)]}"
+            f" {design.positions.names[_position(design, subject)]}"
         )
     if kind == "prior":
         return f"prior of {design.priors.names[subject]}"
@@ -30,27 +30,27 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
         first, second = (
             int(end[subject]) for end in (design.distances.first, design.distances.second)
         )
-        return f"distance {design.ball_label(first)} to {design.ball_names[second]}"
+        return f"distance {design.ball_label(first)} to {design.balls.names[second]}"
     if kind == "ball":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
         return (
             f"dirt on ball {design.ball_label(int(ball))} in position"
-            f" {design.position_names[position]}, {letter}"
+            f" {design.positions.names[position]}, {letter}"
         )
     if kind == "moved":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
-        where = f"from position {design.position_names[position]} on"
+        where = f"from position {design.positions.names[position]} on"
         return f"ball {design.ball_label(int(ball))} displaced {where}, along {letter} of the plate"
     if kind in ("shift", "turn"):
         how = f"along {letter}" if kind == "shift" else f"turned about {letter}"
-        return f"position {design.position_names[subject]} slipped {slip_place(given, k)}, {how}"
+        return f"position {design.positions.names[subject]} slipped {slip_place(given, k)}, {how}"
     if kind == "probe":
-        return f"offset {letter} of probe {design.probe_names[subject]}"
+        return f"offset {letter} of probe {design.probes.names[subject]}"
     if kind == "length value":
         return f"certified {length_name(design, subject, of_reading=False)}"
     if kind == "scale":
-        return f"scale of the certificate of {design.artefact_names[subject]}"
-    return f"expansion in position {design.position_names[subject]}"
+        return f"scale of the certificate of {design.artefacts.names[subject]}"
+    return f"expansion in position {design.positions.names[subject]}"
 
 
 def common_ball(design: Design, distances: Integers) -> int:
@@ -66,7 +66,7 @@ def slip_place(given: Patterns, k: int) -> str:
     probe = design.readings.probe[rows]
     at = int(np.searchsorted(rows, start))
     if probe[at - 1] != probe[at] and probe[at - 1] not in probe[at:]:
-        return f"before probe {design.probe_names[probe[at]]}"
+        return f"before probe {design.probes.names[probe[at]]}"
     half = "half-way, " if at == len(rows) // 2 else ""
     return f"{half}before ball {design.ball_label(int(design.readings.ball[start]))}"
 
@@ -75,11 +75,13 @@ def reading_name(design: Design, reading: int, with_position: bool = True) -> st
     """A reading by ball and position, and by its probe where there are several."""
     readings = design.readings
     position = (
-        f" in position {design.position_names[readings.position[reading]]}" if with_position else ""
+        f" in position {design.positions.names[readings.position[reading]]}"
+        if with_position
+        else ""
     )
     probe = (
-        f" with {design.probe_names[readings.probe[reading]]}"
-        if len(design.probe_names) > 1
+        f" with {design.probes.names[readings.probe[reading]]}"
+        if len(design.probes.names) > 1
         else ""
     )
     return f"ball {design.ball_label(int(readings.ball[reading]))}{position}{probe}"
@@ -89,17 +91,13 @@ def length_name(design: Design, length: int, of_reading: bool = True) -> str:
     """A length of a standard by its ends, or a gauge's radius, of one reading or as it is
     certified.
     """
-    given, readings = design.lengths, design.readings
+    given, readings, balls = design.lengths, design.readings, design.balls
     ball = int(readings.ball[given.first[length]])
-    artefact = design.artefact_names[design.ball_artefact[ball]]
+    artefact = design.artefacts.names[balls.artefact[ball]]
     if given.second[length] < 0:
-        return f"radius of {artefact}" + (
-            f" to ball {design.ball_names[ball]}" if of_reading else ""
-        )
-    return (
-        f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]}"
-        f" of {artefact}"
-    )
+        return f"radius of {artefact}" + (f" to ball {balls.names[ball]}" if of_reading else "")
+    second = balls.names[readings.ball[given.second[length]]]
+    return f"length {balls.names[ball]}-{second} of {artefact}"
 
 
 def _position(design: Design, length: int) -> int:

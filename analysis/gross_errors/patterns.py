@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, locations, probe_offsets
+from ballplate.simulator.design.arrays import Design, State, locations
 from ballplate.simulator.estimation.hat import RowPlaces, row_places
 from ballplate.simulator.estimation.observations import (
     expected_readings,
@@ -171,7 +171,7 @@ class _Place:
         self.unit, self.white = length_directions(design, state, x), design.length_whitening
         turned = locations(design, state, self.readings) - state.origins[self.readings.position]
         self.arm = turned
-        self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
+        self.has_plate = design.plate_positions
 
     def of_readings(
         self, rows: Integers, by_axis: Array, group: Integers | None = None
@@ -298,7 +298,7 @@ def _dirty_balls(at: _Place) -> Iterator[BiasPatterns]:
     as its reading.
     """
     d = at.design.dimension
-    key = at.readings.ball * len(at.design.position_names) + at.readings.position
+    key = at.readings.ball * len(at.design.positions.names) + at.readings.position
     _, first, group, count = np.unique(
         key, return_index=True, return_inverse=True, return_counts=True
     )
@@ -343,7 +343,7 @@ def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
 
 def position_order(design: Design) -> Integers:
     """Place (positions,) of each position in the order in which the readings were taken."""
-    order = np.full(len(design.position_names), len(design.position_names))
+    order = np.full(len(design.positions.names), len(design.positions.names))
     found, first = np.unique(design.readings.position, return_index=True)
     order[found[np.argsort(first)]] = np.arange(len(found))
     return order
@@ -394,11 +394,11 @@ def _probes(at: _Place) -> Iterator[BiasPatterns]:
     wrong.
     """
     design, state = at.design, at.state
-    d, offsets = design.dimension, probe_offsets(design, state)[design.readings.probe]
+    offsets = state.probes[design.readings.probe]
     given = design.lengths
     all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
     for probe in np.unique(design.readings.probe):
-        fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
+        fixed = ~design.probes.free[probe]
         if not fixed.any():
             continue
         rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[
@@ -436,11 +436,11 @@ def _scales(at: _Place) -> Iterator[BiasPatterns]:
         if design.lengths.free is None
         else design.lengths.free < 0
     )
-    for artefact in range(len(design.artefact_names)):
-        of_distances = np.flatnonzero(design.ball_artefact[design.distances.first] == artefact)
-        of_coordinates = np.flatnonzero(design.ball_artefact[design.coordinates.ball] == artefact)
+    for artefact in range(len(design.artefacts.names)):
+        of_distances = np.flatnonzero(design.balls.artefact[design.distances.first] == artefact)
+        of_coordinates = np.flatnonzero(design.balls.artefact[design.coordinates.ball] == artefact)
         of_lengths = known & (
-            design.ball_artefact[design.readings.ball[design.lengths.first]] == artefact
+            design.balls.artefact[design.readings.ball[design.lengths.first]] == artefact
         )
         if (
             len(of_distances)
@@ -469,7 +469,7 @@ def _expansions(at: _Place) -> Iterator[BiasPatterns]:
     design = at.design
     values = length_values(design, at.state)
     of_lengths = design.readings.position[design.lengths.first]
-    for k in range(len(design.position_names)):
+    for k in range(len(design.positions.names)):
         rows = np.flatnonzero(at.readings.position == k)
         if not len(rows) and not (of_lengths == k).any():
             continue

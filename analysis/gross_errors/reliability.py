@@ -141,7 +141,7 @@ class Reliability(Result):
 
     def size(self, k: int) -> float:
         """About how far, in metres, a unit of a bias moves what it is about."""
-        extent = float(np.ptp(self.design.balls, axis=0).max(initial=0.0))
+        extent = float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0))
         return 1.0 if self.patterns.unit(k) == "m" else max(extent, 1e-3)
 
 
@@ -232,7 +232,7 @@ def _positions(result: Reliability) -> list[str]:
         )
         rows.append(
             [
-                design.position_names[k],
+                design.positions.names[k],
                 str(len(own) // design.dimension),
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
@@ -373,11 +373,9 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
         )
     if result.deficiency:
         lines.append("(functions that the observations leave undetermined are left out)")
-    if len(result.design.points) > MOST_PLACES:
-        lines.append(
-            f"(effects on U6 are those on {MOST_PLACES} of {len(result.design.points)} evaluation"
-            " points)"
-        )
+    count = len(result.design.evaluation.points)
+    if count > MOST_PLACES:
+        lines.append(f"(effects on U6 are those on {MOST_PLACES} of {count} evaluation points)")
     return ["", *lines] if lines else []
 
 
@@ -485,8 +483,8 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             i = int(given.subject[k])
             readings = design.readings
             position, probe = (
-                design.position_names[readings.position[i]],
-                design.probe_names[readings.probe[i]],
+                design.positions.names[readings.position[i]],
+                design.probes.names[readings.probe[i]],
             )
             names = [
                 position,

@@ -50,7 +50,7 @@ def responses(at: Linearisation, x: Array | None, given: Patterns) -> Iterator[R
     from scipy.sparse import csr_array
 
     matrix = given.matrix.tocsr()
-    n, d = at.design.balls.shape
+    n, d = at.design.balls.places.shape
     square = np.asarray(given.matrix.power(2).sum(axis=0)).ravel()
     wide = np.flatnonzero(~given.is_local)
     first_row = given.matrix.indices[np.minimum(given.matrix.indptr[:-1], given.matrix.nnz - 1)]

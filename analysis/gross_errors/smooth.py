@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, probe_offsets
+from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.estimation.observations import (
     length_directions,
     reading_weights,
@@ -82,7 +82,7 @@ def _along_axes(design: Design, state: State, x: Array) -> Displacements:
 def _of_probes(design: Design, state: State, x: Array) -> Displacements:
     """Rotations that act on the probes' offsets, as polynomials of one scale reading."""
     t, letters = _fractions(x), AXIS_NAMES[: design.dimension]
-    turned = rotation_sensitivity(probe_offsets(design, state)[design.readings.probe])
+    turned = rotation_sensitivity(state.probes[design.readings.probe])
     for axis, letter in enumerate(letters):
         along = legendre.legvander(t[:, axis], OF_PROBES)
         for k in range(turned.shape[2]):
@@ -138,7 +138,7 @@ def _time_within(design: Design) -> Array:
     readings.
     """
     position = design.readings.position
-    within = np.zeros((len(position), len(design.position_names)))
+    within = np.zeros((len(position), len(design.positions.names)))
     for k in np.unique(position):
         rows = np.flatnonzero(position == k)
         within[rows, k] = np.linspace(-1.0, 1.0, len(rows)) if len(rows) > 1 else 0.0

@@ -77,8 +77,8 @@ def unexplained_words(unexplained: Unexplained) -> str:
 
 def _scatter_place(scatter: MoreScatter) -> str:
     if scatter.of.position >= 0:
-        return f"in position {scatter.design.position_names[scatter.of.position]}"
-    return f"with probe {scatter.design.probe_names[scatter.of.probe]}"
+        return f"in position {scatter.design.positions.names[scatter.of.position]}"
+    return f"with probe {scatter.design.probes.names[scatter.of.probe]}"
 
 
 def _significance(cause: Suspect | MoreScatter | Unexplained) -> str:
@@ -142,19 +142,19 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         what = length_name(design, subject, False) if kind == "length value" else name(given, k)
         return f"{what} certified {size} too {long}", "check the certificate"
     if kind == "scale":
-        artefact = design.artefact_names[subject]
+        artefact = design.artefacts.names[subject]
         told = f"all that is certified of {artefact} is {size} too {long}"
         return told, "check the certificate, and the temperature of the artefact and of the scales"
     if kind == "probe":
-        told = f"offset {letter} of probe {design.probe_names[subject]} stated {size} too {high}"
+        told = f"offset {letter} of probe {design.probes.names[subject]} stated {size} too {high}"
         if len(suspect.columns) > 1:
             sizes = _sizes(suspect, "too high")
-            told = f"offset of probe {design.probe_names[subject]} stated {sizes}"
+            told = f"offset of probe {design.probes.names[subject]} stated {sizes}"
         return told, "qualify the probe again, or let its offset be estimated"
-    place = design.position_names[subject] if kind in ("shift", "turn", "expansion") else ""
+    place = design.positions.names[subject] if kind in ("shift", "turn", "expansion") else ""
     if kind in ("ball", "moved"):
         ball = design.ball_label(int(design.readings.ball[subject]))
-        place = design.position_names[design.readings.position[subject]]
+        place = design.positions.names[design.readings.position[subject]]
         if kind == "ball":
             told = f"ball {ball} in position {place} read {_sizes(suspect, 'too high')} each time"
             return told, f"clean the ball, and {leave}"
@@ -166,7 +166,7 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
             told,
             "look whether it is loose, dirty or another one; from there on it is a ball of its own",
         )
-    artefact = design.artefact_names[design.position_artefact[subject]]
+    artefact = design.artefacts.names[design.positions.artefact[subject]]
     if kind in ("shift", "turn"):
         return (
             (
@@ -182,13 +182,13 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         larger = "larger" if value > 0 else "smaller"
         size = with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)
         told = f"{size} {SHOWN[suspect.unit]} {larger}"
-        parts.append(f"{told} in position {design.position_names[given.subject[column]]}")
+        parts.append(f"{told} in position {design.positions.names[given.subject[column]]}")
     return f"{artefact} {' and '.join(parts)}", "check the temperature there"
 
 
 def _from(ball: int, suspect: Suspect) -> str:
     """Sizes by which the distances of a ball are wrong, those that are significant."""
-    given, ends = suspect.patterns.design.distances, suspect.patterns.design.ball_names
+    given, ends = suspect.patterns.design.distances, suspect.patterns.design.balls.names
     parts = []
     for place in _significant(suspect):
         distance, value = (

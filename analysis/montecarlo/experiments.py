@@ -72,9 +72,8 @@ class Trials:
 def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
     """The design, and the artefacts as drawn on the true machine."""
     design = lay_out(experiment)
-    lower, upper = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     on_truth, state = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, lower, upper)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     return design, Truth(state, on_truth.model)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State, probe_offsets
+from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.estimation.covariance import Spectrum
 from ballplate.simulator.estimation.elimination import Factor
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
@@ -109,7 +109,7 @@ class Reference:
 
     def local_model(self, points: Array, probes: Integers) -> LocalModel:
         """The model about readings (m, d) with probes of indices (m,)."""
-        p = probe_offsets(self.design, self.start)[probes]
+        p = self.start.probes[probes]
         return _local_model(self.design, self.start.a, points, p, self.is_expanded)
 
     @property
@@ -134,7 +134,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     if deficiency:
         raise RankDeficientError(f"the design is rank deficient by {deficiency}")
     readings = observed.readings
-    p = probe_offsets(observed, truth.state)[readings.probe]
+    p = truth.state.probes[readings.probe]
     turned = np.einsum(
         "mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball]
     )
@@ -150,7 +150,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     if solution.status != "converged":
         raise DivergedError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
-    p = probe_offsets(observed, start)[readings.probe]
+    p = start.probes[readings.probe]
     is_expanded = _is_faithful(
         observed, solution.spectrum, solution.factor.layout.model, start, exact
     )
@@ -173,7 +173,7 @@ def reference(design: Design, truth: Truth) -> Reference:
                 np.ascontiguousarray((blocks.residual / weight)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
                 local(exact[plates[chosen]], p[plates[chosen]]),
-                None if observed.free_offsets is None else rows.probe,
+                rows.probe if observed.probes.free.any() else None,
             )
         )
         at += len(chosen)
@@ -239,7 +239,7 @@ def _observed(design: Design) -> Design:
 def _groups(design: Design) -> list[Integers]:
     """Indices into the plates' readings: of one position each, no ball twice, of bounded number."""
     readings = design.readings.select(design.plate_readings)
-    key = readings.position * len(design.ball_names) + readings.ball
+    key = readings.position * len(design.balls.names) + readings.ball
     order = np.argsort(key, kind="stable")
     first = np.searchsorted(key[order], key[order])
     turn = np.empty(len(key), np.int64)
@@ -264,7 +264,7 @@ def _as_slice(ascending: Integers) -> Integers | slice:
 def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool) -> LocalModel:
     """The model about readings x (m, d), with parameters a (n,) and probe offsets p (m, d)."""
     if is_expanded:
-        return expand(design.model, x, a, p, design.free_offsets is not None)
+        return expand(design.model, x, a, p, bool(design.probes.free.any()))
     return Direct(design.model, x, a, p, design.model.error(x, a, p))
 
 
@@ -272,12 +272,12 @@ def _is_faithful(
     design: Design, spectrum: Spectrum, columns: slice, start: State, exact: Array
 ) -> bool:
     """Whether an expansion of the model tells the same as the model itself."""
-    p = probe_offsets(design, start)[design.readings.probe]
+    p = start.probes[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = 1.0 / reading_weights(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, spectrum.root.shape[1])) @ spectrum.root[columns].T
-    offsets = None if design.free_offsets is None else 1e-6 * generator.standard_normal(moved.shape)
+    offsets = 1e-6 * generator.standard_normal(moved.shape) if design.probes.free.any() else None
     expanded, direct = (
         _local_model(design, start.a, exact, p, is_expanded).change(moved, step, offsets)
         for is_expanded in (True, False)

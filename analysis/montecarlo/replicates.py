@@ -124,14 +124,14 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
     drawn = draw(shared, seed, batch)
     design, layout = shared.design, shared.factor.layout
     columns, offset = layout.pose_columns, layout.offset_columns
-    n, d = design.balls.shape
+    n, d = design.balls.places.shape
     k, turns = columns.shape[0], columns.shape[1] - d
     at = Deviations(
         np.zeros((BATCH, d, n)),
         np.zeros((BATCH, k, turns)),
         np.zeros((BATCH, k, d)),
         np.zeros((BATCH, len(shared.start.a))),
-        np.zeros((BATCH, *design.probes.shape)),
+        np.zeros((BATCH, *design.probes.offsets.shape)),
         np.zeros((BATCH, len(layout))),
     )
     passes, converged = np.zeros(BATCH, np.int64), np.zeros(BATCH, bool)
@@ -362,7 +362,7 @@ def _lengths(
     read = slice(None) if not pivoted.any() else np.flatnonzero(~pivoted)
     pivot = design.readings.position[given.first[pivoted]]
     at_ends = given.first, given.second[read]
-    probes = [None if design.free_offsets is None else design.readings.probe[k] for k in at_ends]
+    probes = [design.readings.probe[k] if design.probes.free.any() else None for k in at_ends]
     offsets = [_offsets(at, probe) for probe in probes]
     difference = shared.end_difference.T + (ends[0] + first.change(ends[0], step, offsets[0]))
     difference[:, :, read] -= ends[1] + second.change(ends[1], step, offsets[1])
@@ -372,7 +372,7 @@ def _lengths(
     length = (unit * difference).sum(axis=1)
     white = design.length_whitening
     expected = length_values(design, shared.start) + drawn.lengths
-    is_free = given.free is not None and len(design.length_names) > 0
+    is_free = given.free is not None and len(design.unknown_lengths.names) > 0
     if given.free is not None and is_free:
         changed = at.shared[:, layout.lengths][:, given.free]
         expected = expected + np.where(given.free >= 0, changed, 0.0)
@@ -391,7 +391,7 @@ def _lengths(
         by_shared[:, columns] -= pull[:, :, np.flatnonzero(pivoted)[pivot == k]].sum(axis=2)
     if given.free is not None and is_free:
         tight = white.pulled(residual).T
-        for number in range(len(design.length_names)):
+        for number in range(len(design.unknown_lengths.names)):
             by_shared[:, layout.lengths.start + number] -= tight[:, given.free == number].sum(
                 axis=1
             )

@@ -11,9 +11,8 @@ import numpy as np
 from ballplate.montecarlo.reference import Reference
 from ballplate.montecarlo.replicates import Deviations
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
 from ballplate.simulator.estimation.functions import (
-    Balls,
+    BallPlaces,
     Coordinates,
     Displacements,
     Distances,
@@ -92,7 +91,7 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
     made: dict[bytes, Displaced] = {}
 
     def displaced(places: Places) -> Displaced:
-        if isinstance(places, Balls):
+        if isinstance(places, BallPlaces):
             truly = places.at(at.design, shared.truth.state)
             return Displaced(
                 displacements(at, places), truly, lambda found: found.balls[:, :, places.index]
@@ -148,9 +147,9 @@ def _parameters(
     # Parameters of another true model are no errors of these, which then have no part in the
     # functions.
     a = start.a - real.a if shared.truth.model == design.model else start.a
-    offsets = probe_offsets(design, start) - probe_offsets(design, real)
+    offsets = start.probes - real.probes
     steps = np.zeros((1, len(layout)))
-    steps[:, layout.lengths] = unknown_lengths(design, start) - unknown_lengths(design, real)
+    steps[:, layout.lengths] = start.lengths - real.lengths
     origins, balls = start.origins - real.origins, np.zeros((1, 0, 0))
     error = Deviations(balls, turned[None], origins[None], a[None], offsets[None], steps)
 

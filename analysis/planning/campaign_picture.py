@@ -319,7 +319,7 @@ def _rows(selection: Selection) -> list[_Row]:
     """The chosen ones with their numbers in the drawing, those first that gain most, then the best
     of the others.
     """
-    numbers = {name: k + 1 for k, name in enumerate(selection.plan.design.position_names)}
+    numbers = {name: k + 1 for k, name in enumerate(selection.plan.design.positions.names)}
     rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in selection.gains[:MOST_CHOSEN]]
     if len(selection.gains) > MOST_CHOSEN:
         rows.append(

@@ -15,7 +15,12 @@ from itertools import chain
 from typing import Protocol
 
 import numpy as np
-from ballplate.simulator.estimation.functions import Balls, Distances, MeasuredPoints, point_rows
+from ballplate.simulator.estimation.functions import (
+    BallPlaces,
+    Distances,
+    MeasuredPoints,
+    point_rows,
+)
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -447,9 +452,9 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         parts: list[Pairs | Linear] = []
         for given in kind.functions(drawn.design, drawn.layout):
             assert isinstance(given, Distances)
-            if isinstance(given.places, Balls):
-                plate = drawn.design.artefact_names[
-                    drawn.design.ball_artefact[given.places.index[0]]
+            if isinstance(given.places, BallPlaces):
+                plate = drawn.design.artefacts.names[
+                    drawn.design.balls.artefact[given.places.index[0]]
                 ]
                 placing = information.placing(plate)
                 if not placing:
@@ -487,7 +492,9 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
     """Distances that are determined, between all places or those pairs that have names."""
     of = given.places
     places = of.at(information.drawn.design, information.drawn.state)
-    moved = _of_balls(information, of) if isinstance(of, Balls) else _of_points(information, of)
+    moved = (
+        _of_balls(information, of) if isinstance(of, BallPlaces) else _of_points(information, of)
+    )
     # Without the motion of all places together, no digits are lost where distances are formed.
     displacement, open_ = (without_rigid_motion(places, amount) for amount in moved)
     if given.pairs is None:
@@ -503,7 +510,7 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
     return Linear(rows[kept], length[kept], int((~kept).sum()))
 
 
-def _of_balls(information: Information, places: Balls) -> tuple[Array, Array]:
+def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Array]:
     """Displacements of balls (n, d, z), and those that the pool leaves open, in metres."""
     basis, n, d = information.basis, len(places.index), information.drawn.design.dimension
     amounts = basis.balls[places.index].reshape(n * d, -1)

@@ -82,12 +82,8 @@ def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
     for number, (candidate, base) in enumerate(zip(drawn, found.values(), strict=True)):
         item = _position(candidate)
         own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
-        first = int(
-            np.flatnonzero(
-                design.ball_artefact == list(design.artefact_names).index(item.artefact)
-            )[0]
-        )
-        taken = tuple(_groups(own_readings, first, design.probe_names, experiment, item))
+        first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
+        taken = tuple(_groups(own_readings, first, design.probes.names, experiment, item))
         result.append(_set_up(experiment, candidate, base, taken, candidate.name == name))
     return tuple(result)
 

@@ -345,11 +345,11 @@ def _reduced(rows: Array) -> Array:
 
 def _motions(design: Design) -> Array:
     """Small motions of each plate: orthonormal displacements (n, d, motions) of its balls."""
-    n, d = design.balls.shape
+    n, d = design.balls.places.shape
     parts = []
-    for artefact in np.flatnonzero(design.is_plate):
-        own = np.flatnonzero(design.ball_artefact == artefact)
-        places = design.balls[own]
+    for artefact in design.artefacts.plates:
+        own = design.balls.of(artefact)
+        places = design.balls.places[own]
         shifts = np.broadcast_to(np.eye(d), (len(own), d, d))
         turns = rotation_sensitivity(places - places.mean(axis=0))
         moved = _range(np.concatenate([shifts, turns], axis=2).reshape(len(own) * d, -1))
@@ -366,7 +366,7 @@ def _combinations(drawn: PoolDesign, certificates: list[Rows], all_balls: bool) 
     it has no bearing. Motions of a plate as a whole, which only calibrated co-ordinates show, are
     part of it where there are any.
     """
-    n, d = drawn.design.balls.shape
+    n, d = drawn.design.balls.places.shape
     of_plates = np.repeat(np.isin(np.arange(n), drawn.design.plate_balls), d)
     every, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
     found = _Span(
@@ -547,22 +547,19 @@ def _unplaced(
     own.
     """
     design, found = drawn.design, []
-    n, d = design.balls.shape
-    for number, name in enumerate(design.artefact_names):
-        if all_balls and design.is_plate[number] and _placing(candidates, name):
+    n, d = design.balls.places.shape
+    for number, name in enumerate(design.artefacts.names):
+        if all_balls and design.artefacts.is_plate[number] and _placing(candidates, name):
             continue
         # A standard of which no length has been read is not there.
         placing = frozenset(k for k in _placing(candidates, name) if has_rows[k])
-        own = np.flatnonzero(design.ball_artefact == number)
+        own = design.balls.of(number)
         by_ball = basis.balls[own].reshape(len(own) * d, -1)
         # Of balls that no combination moves there is nothing to hold, and rounding must not be
         # taken for it.
         by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
-        lengths = [
-            k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name
-        ]
         by_length = np.eye(drawn.shared)[
-            [drawn.layout.lengths.start - drawn.own.start + k for k in lengths]
+            drawn.layout.lengths.start - drawn.own.start + design.unknown_lengths.of(number)
         ]
         rows = np.concatenate(
             [

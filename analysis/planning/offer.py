@@ -202,8 +202,8 @@ def open_directions(offered: Offer, information: Information, chosen: Collection
     poses = sum(max(ranks[one.again] - ranks[one.part], 0) for one in left)
     placed = {offered.candidates[one.part].item.artefact for one in left}
     told = {offered.candidates[k].item.artefact for k in chosen if information.has_rows[k]}
-    lengths = [length.rpartition(": ")[0] for length in design.length_names]
-    return poses + sum(name in placed - told for name in lengths)
+    standards = [design.artefacts.names[k] for k in design.unknown_lengths.artefact]
+    return poses + sum(name in placed - told for name in standards)
 
 
 def _balls(candidate: Candidate) -> set[int]:

@@ -111,7 +111,7 @@ def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
     """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
-    count = np.bincount(place, minlength=len(design.position_names))
+    count = np.bincount(place, minlength=len(design.positions.names))
     end = np.cumsum(count)
     chosen = design.plate_readings[np.argsort(place, kind="stable")]
     lengths = _length_rows(drawn)
@@ -208,11 +208,7 @@ def calibration_rows(
         item, RadiusCalibration
     ):
         return _of_calibration(drawn, lay_out(replace(experiment, calibration=(item,), priors=())))
-    named = [
-        k
-        for k, length in enumerate(drawn.design.length_names)
-        if length.rpartition(": ")[0] == item.artefact
-    ]
+    named = drawn.design.unknown_lengths.of(drawn.design.artefacts.names.index(item.artefact))
     if len(named) != 1 or isinstance(item, CoordinateCalibration):
         text = (
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'

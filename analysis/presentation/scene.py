@@ -68,9 +68,10 @@ class Scene:
 def scene(design: Design) -> Scene:
     """The scene of a design; one in two dimensions is seen from above."""
     view, towards = projection(design.dimension)
+    volume = design.machine.volume
     where = locations(design, nominal_state(design), design.readings)
     places = []
-    for k, name in enumerate(design.position_names):
+    for k, name in enumerate(design.positions.names):
         mine = np.flatnonzero(design.readings.position == k)
         if not len(mine):
             continue
@@ -80,13 +81,15 @@ def scene(design: Design) -> Scene:
         used = np.unique(design.readings.probe[mine])
         # All styli at the ball nearest to the middle, where they hide least.
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
-        styli = np.stack([np.stack([middle, middle - design.probes[probe]]) for probe in used])
+        styli = np.stack(
+            [np.stack([middle, middle - design.probes.offsets[probe]]) for probe in used]
+        )
         places.append(
             Place(
                 k + 1,
                 name,
-                design.artefact_names[design.position_artefact[k]],
-                tuple(design.probe_names[probe] for probe in used),
+                design.artefacts.names[design.positions.artefact[k]],
+                tuple(design.probes.names[probe] for probe in used),
                 hull(balls @ view.T),
                 balls[kept] @ view.T,
                 styli @ view.T,
@@ -97,9 +100,9 @@ def scene(design: Design) -> Scene:
     places.sort(key=lambda place: -place.depth)
     tips = tuple(
         (name, view @ offset)
-        for name, offset in zip(design.probe_names, design.probes, strict=True)
+        for name, offset in zip(design.probes.names, design.probes.offsets, strict=True)
     )
-    return Scene(box(design.lower, design.upper), tuple(places), tips)
+    return Scene(box(volume.lower, volume.upper), tuple(places), tips)
 
 
 def box(lower: Array, upper: Array) -> Box:

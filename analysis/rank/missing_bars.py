@@ -24,7 +24,7 @@ AXES = "xyz"
 
 def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
     """What bars and gauges lack, given what changes of the shared parameters (s, k) are open."""
-    if not len(design.lengths) or not open_.shape[1] or not len(design.points):
+    if not len(design.lengths) or not open_.shape[1] or not len(design.evaluation.points):
         return ()
     strains = _open_strains(design, layout, open_)
     if not strains.shape[1]:
@@ -34,7 +34,7 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     overall = _unit_strain(np.eye(design.dimension))
     is_free = unknown and _is_among(overall, strains)
     if is_free:
-        names = " and ".join(design.length_names)
+        names = " and ".join(design.unknown_lengths.names)
         found.append(
             f"no length is known ({names}): the overall scale of the machine stays open until one"
             " is calibrated"
@@ -48,18 +48,27 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     return tuple(found)
 
 
+def relative_changes(design: Design, layout: SharedLayout, directions: Array) -> Array:
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
+    metres.
+    """
+    points = design.evaluation.points
+    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
+    jacobian = design.model.jacobian(points, np.zeros(len(design.model.parameters)), offsets)
+    return without_rigid_motion(points, jacobian @ directions[layout.model])
+
+
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     """Strains (products, k), orthonormal columns, that some open change of the machine's errors
     amounts to.
     """
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
-    fields = without_rigid_motion(design.points, jacobian @ open_[layout.model])
+    points = design.evaluation.points
+    fields = relative_changes(design, layout, open_)
     basis = np.stack(
-        [design.points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
+        [points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
         2,
     )
-    wanted = without_rigid_motion(design.points, basis - basis.mean(axis=0))
+    wanted = without_rigid_motion(points, basis - basis.mean(axis=0))
     flat = fields.reshape(-1, fields.shape[2])
     flat = flat[:, (flat**2).sum(axis=0) > 0.0]
     if not flat.shape[1]:
@@ -88,7 +97,7 @@ def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
     only_gauges = bool(given.to_pivot.all())
     # Any three places lie in a plane.
     few = only_gauges and np.bincount(position).max() <= d
-    with_plates = bool(design.is_plate.any())
+    with_plates = bool(design.artefacts.is_plate.any())
     if with_plates:
         # What else bars would have to do, plates may do.
         normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]

@@ -61,10 +61,10 @@ def _rows(design: Design, u: Array, like: np.ndarray) -> Array:
     """
     given, d = design.lengths, design.dimension
     position = design.readings.position[given.first[like]]
-    pivots = np.zeros((len(u), len(design.position_names), d))
+    pivots = np.zeros((len(u), len(design.positions.names), d))
     pivoted = np.flatnonzero(given.to_pivot[like])
     pivots[pivoted, position[pivoted]] = -u[pivoted]
-    lengths = np.zeros((len(u), len(design.length_names)))
+    lengths = np.zeros((len(u), len(design.unknown_lengths.names)))
     if given.free is not None:
         free = np.flatnonzero(given.free[like] >= 0)
         lengths[free, given.free[like][free]] = -1.0

@@ -19,7 +19,7 @@ from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines
 
 from .canonical import elementary_mixture, principal_directions
-from .missing_bars import reasons
+from .missing_bars import reasons, relative_changes
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01
@@ -225,29 +225,20 @@ def _principal(at: Linearisation) -> tuple[Array, Array]:
     corrected points.
     """
     design, layout, found = at.design, at.layout, at.spectrum
-    if not len(design.points) or found.rank == 0:
+    if not len(design.evaluation.points) or found.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
-    change = _changes(design, layout, at.shared)
+    change = relative_changes(design, layout, at.shared)
     # Two points whose errors are independent differ by the root of two times the error of one, per
     # co-ordinate.
     effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
     return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
 
 
-def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:
-    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
-    metres.
-    """
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
-    return without_rigid_motion(design.points, jacobian @ roots[layout.model])
-
-
 def weak_limit(design: Design, target: Target | None) -> float:
     """The effect, in metres, beyond which a direction is weak."""
     if target is None:
-        return WEAK * float(design.repeatability.max())
-    return float(target.at(0.5 * float(np.linalg.norm(design.upper - design.lower))))
+        return WEAK * float(design.machine.repeatability.max())
+    return float(target.at(0.5 * float(np.linalg.norm(design.machine.volume.size))))
 
 
 def _weak_directions(
@@ -256,12 +247,12 @@ def _weak_directions(
     if not roots.shape[1]:
         return ()
     directions = []
-    of_points = np.sqrt(2.0 * (_changes(design, layout, roots) ** 2).mean(axis=1))
+    of_points = np.sqrt(2.0 * (relative_changes(design, layout, roots) ** 2).mean(axis=1))
     beyond = above(of_points, limit).sum(axis=0)
     for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
-        description = _describe(design, layout, root, np.zeros_like(design.balls))
+        description = _describe(design, layout, root, np.zeros_like(design.balls.places))
         weak = replace(
-            description, artefacts=(), standard_deviation=size, points=len(design.points)
+            description, artefacts=(), standard_deviation=size, points=len(design.evaluation.points)
         )
         directions.append(replace(weak, beyond=count, limit=limit))
     return tuple(directions)
@@ -301,26 +292,26 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
             shift, turn = np.linalg.norm(values[:d]), np.linalg.norm(values[d:])
             along, about = _single_axis(values[:d], " along "), _single_axis(values[d:], " about ")
             positions.append(
-                PositionPart(design.position_names[k], float(shift), float(turn), along, about)
+                PositionPart(design.positions.names[k], float(shift), float(turn), along, about)
             )
     artefacts = []
-    for artefact in np.flatnonzero(design.is_plate):
-        members = np.flatnonzero(design.ball_artefact == artefact)
+    for artefact in design.artefacts.plates:
+        members = design.balls.of(artefact)
         moved = np.sqrt((balls[members] ** 2).sum(axis=1))
         if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
-            touched = tuple(design.ball_names[b] for b in members[above(moved, 0.1 * moved.max())])
-            words = deformation(design.balls[members], balls[members])
+            touched = tuple(design.balls.names[b] for b in members[above(moved, 0.1 * moved.max())])
+            words = deformation(design.balls.places[members], balls[members])
             artefacts.append(
-                ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched)
+                ArtefactPart(design.artefacts.names[artefact], float(moved.max()), words, touched)
             )
     probes = []
     for k, columns in enumerate(layout.offset_columns):
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
         if above(np.abs(values).max(), NEGLIGIBLE * largest):
-            probes.append(PositionPart(design.probe_names[k], float(np.linalg.norm(values)), 0.0))
+            probes.append(PositionPart(design.probes.names[k], float(np.linalg.norm(values)), 0.0))
     lengths = tuple(
         LengthPart(name, float(change))
-        for name, change in zip(design.length_names, shared[layout.lengths], strict=True)
+        for name, change in zip(design.unknown_lengths.names, shared[layout.lengths], strict=True)
         if above(abs(change), NEGLIGIBLE * largest)
     )
     return Direction(

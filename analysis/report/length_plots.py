@@ -58,7 +58,7 @@ def draw_lengths(lengths: LengthMap, path: Path) -> None:
         )
     columns = min(len(levels), IN_A_ROW) if len(levels) != 4 else 2
     rows = -(-len(levels) // columns)
-    span = lengths.design.upper - lengths.design.lower
+    span = lengths.design.machine.volume.size
     side = (WIDTH - LEFT - RIGHT - SCALE - (IN_A_ROW - 1) * BETWEEN) / IN_A_ROW
     side = side if columns == IN_A_ROW else 1.5 * side
     high = float(np.clip(side * span[1] / span[0], 0.4 * side, 1.6 * side))

@@ -221,7 +221,7 @@ def _designs(
 def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> DrawnDesign:
     design = lay_out(experiment)
     drawn = scene(design)
-    sizes = " x ".join(f"{1000 * size:.6g}" for size in design.upper - design.lower)
+    sizes = " x ".join(f"{1000 * size:.6g}" for size in design.machine.volume.size)
     words = f"Volume of {sizes} mm with {len(drawn.places)} positions, which the table below lists."
     caption = (
         "Positions in the volume: balls that are read (circles), and from one ball the styli to the"

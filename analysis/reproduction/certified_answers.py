@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, probe_offsets
+from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.reading_files import read_readings
@@ -54,17 +54,13 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
 
 def _geometry(design: Design, state: State) -> dict[str, Any]:
     """Balls by plate, origins of the positions that are estimated, and probe offsets that are."""
-    plates = [np.flatnonzero(design.ball_artefact == k) for k in np.flatnonzero(design.is_plate)]
-    free = (
-        np.zeros(len(design.probe_names), bool)
-        if design.free_offsets is None
-        else design.free_offsets.any(axis=1)
-    )
-    estimated = [k for k in design.posed_positions if not design.held[k].all()]
+    plates = [design.balls.of(k) for k in design.artefacts.plates]
+    free = design.probes.free.any(axis=1)
+    estimated = [k for k in design.posed_positions if not design.positions.held[k].all()]
     return {
         "balls": [state.balls[balls].tolist() for balls in plates],
         "origins": state.origins[estimated].tolist(),
-        "offsets": probe_offsets(design, state)[free].tolist(),
+        "offsets": state.probes[free].tolist(),
     }
 
 

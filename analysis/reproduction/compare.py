@@ -433,7 +433,7 @@ def compare_remark(shipped: Shipped, remark: Remark) -> ComparedRemark:
         plan = planned(shipped, design)
         for symbol in remark.quantities:
             if other == REPEATABILITY:
-                compared_with = float(plan.design.repeatability[0])
+                compared_with = float(plan.design.machine.repeatability[0])
             else:
                 compared_with = planned(shipped, other).quantities[symbol].average
             ratios.append(plan.quantities[symbol].average / compared_with)

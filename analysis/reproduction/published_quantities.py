@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import Balls, displacements
+from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import rotation_sensitivity
 from ballplate.simulator.estimation.parameters import SharedLayout
@@ -53,7 +53,7 @@ def pose_rows(design: Design, layout: SharedLayout) -> Array:
     rows = np.eye(len(layout))[layout.poses]
     for k in design.posed_positions:
         columns = layout.pose_columns[k]
-        by_rotation = rotation_sensitivity(-design.origins[k][None])[0]
+        by_rotation = rotation_sensitivity(-design.positions.origins[k][None])[0]
         for axis in np.flatnonzero(columns[:d] >= 0):
             for turn in range(pose_size(d) - d):
                 if columns[d + turn] >= 0:
@@ -94,10 +94,10 @@ def first_ball_lengths(at: Linearisation) -> tuple[Array, list[str]]:
     """
     design = at.design
     values, names = [], []
-    for artefact in np.flatnonzero(design.is_plate):
-        own = np.flatnonzero(design.ball_artefact == artefact)
+    for artefact in design.artefacts.plates:
+        own = design.balls.of(artefact)
         pairs = np.stack([np.zeros(len(own) - 1, np.int64), np.arange(1, len(own))], axis=1)
-        tile = pairs_of(displacements(at, Balls(own)), pairs)
+        tile = pairs_of(displacements(at, BallPlaces(own)), pairs)
         values.append(np.where(tile.is_open, np.nan, tile.uncertainties))
         for second in own[1:]:
             names.append(f"ball {design.ball_label(own[0])} to ball {design.ball_label(second)}")

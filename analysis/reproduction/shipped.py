@@ -84,13 +84,12 @@ def fitted_exactly(experiment: Experiment) -> Fit:
     given.
     """
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    machine = true_machine(experiment.true_machine, design.model, *corners)
+    machine = true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     _, x = exact_readings(*on_true_machine(design, machine))
     return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
 
 
 def sums_of_squares(fit: Fit) -> list[float]:
     """S^2 of each iteration in square metres, with weight 1 for a reading."""
-    scale = float(fit.design.repeatability[0]) ** 2
+    scale = float(fit.design.machine.repeatability[0]) ** 2
     return [scale * iteration.sum_of_squares for iteration in fit.solution.iterations]

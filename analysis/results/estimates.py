@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
 from ballplate.simulator.estimation.corrections import corrected_points, correction_rows
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import Linearisation
@@ -201,11 +200,11 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
             own[layout.model],
         )
 
-    turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
+    turned = vector_from_rotation(state.rotations @ design.positions.rotations.transpose(0, 2, 1))
     poses = np.concatenate([state.origins, turned], axis=1)
     words = pose_parameter_names(design.dimension)
     for k, j in np.argwhere(layout.pose_columns >= 0).tolist():
-        is_origin, name = j < design.dimension, f"{design.position_names[k]}: {words[j]}"
+        is_origin, name = j < design.dimension, f"{design.positions.names[k]}: {words[j]}"
         unit: Unit = "m" if is_origin else "rad"
         add(
             "origin" if is_origin else "rotation",
@@ -218,10 +217,10 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     estimated = layout.offset_columns >= 0
     columns = layout.offset_columns[estimated]
     names = [parameters[column].name for column in columns]
-    add("offset", names, ["m"] * len(names), probe_offsets(design, state)[estimated], own[columns])
+    add("offset", names, ["m"] * len(names), state.probes[estimated], own[columns])
 
-    names = list(design.length_names)
-    add("length", names, ["m"] * len(names), unknown_lengths(design, state), own[layout.lengths])
+    names = list(design.unknown_lengths.names)
+    add("length", names, ["m"] * len(names), state.lengths, own[layout.lengths])
 
     d, balls = design.dimension, design.plate_balls
     names = [f"{design.ball_label(ball)}: {letter}" for ball in balls for letter in AXIS_NAMES[:d]]
@@ -230,14 +229,14 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     ball[len(functions) - len(names) :] = np.repeat(balls, d)
     axis = np.where(ball < 0, -1, (np.arange(len(ball)) - len(ball)) % d)
 
-    drawn, count = list(rows), len(design.task_names)
+    drawn, count = list(rows), len(design.tasks.names)
     if count:
         distances = task_distances(design)
         ends = distances.places.at(design, state).reshape(count, 2, d)
         found = linear_functions(at, distances)
         add(
             "task",
-            design.task_names,
+            design.tasks.names,
             ["m"] * count,
             np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1),
             found.shared,

@@ -277,8 +277,8 @@ class Fit(Result):
                 " volume"
             )
             raise ValueError(f"{told}; give points in metres")
-        names = design.probe_names
-        given_probe = names[design.point_probe] if probe is None else probe
+        names = design.probes.names
+        given_probe = names[design.evaluation.probe] if probe is None else probe
         asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
         for name in asked:
             if name not in names:
@@ -295,10 +295,10 @@ class Fit(Result):
         places = self.x[design.plate_readings]
         return tuple(
             Vectors(
-                design.position_names[k],
+                design.positions.names[k],
                 places[mine],
                 residuals[mine],
-                tuple(design.ball_names[ball] for ball in readings.ball[mine]),
+                tuple(design.balls.names[ball] for ball in readings.ball[mine]),
             )
             for k in np.unique(readings.position)
             for mine in [readings.position == k]

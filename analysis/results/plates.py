@@ -63,7 +63,7 @@ def plate_coordinates(
     """
     design, found = at.design, []
     for artefact, axes in axes_of_plates(experiment).items():
-        balls = np.flatnonzero(design.ball_artefact == design.artefact_names.index(artefact))
+        balls = design.balls.of(design.artefacts.names.index(artefact))
         coordinates, rotation = in_plate_axes(at.state.balls[balls], axes)
         across = 1 - axes.axis
         n = len(balls)
@@ -82,7 +82,7 @@ def plate_coordinates(
         variance[others] += (own[others] ** 2).sum(axis=2)
         uncertainty = blank(np.sqrt(variance), opened, np.full(variance.shape, MICROMETRE))
         uncertainty[axes.origin] = uncertainty[axes.ball, across] = 0.0
-        names = tuple(design.ball_names[ball] for ball in balls)
+        names = tuple(design.balls.names[ball] for ball in balls)
         values = np.where(np.isnan(uncertainty), np.nan, coordinates)
         found.append(PlateCoordinates(artefact, axes, names, values, sigma * uncertainty))
     return tuple(found)

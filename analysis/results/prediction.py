@@ -98,7 +98,7 @@ class Prediction(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else.
         """
-        names = ", ".join(self.design.position_names)
+        names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def rows(self) -> list[dict[str, Any]]:

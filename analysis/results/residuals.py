@@ -69,9 +69,9 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
             )
         found.append(
             Residual(
-                design.position_names[design.readings.position[reading]],
+                design.positions.names[design.readings.position[reading]],
                 ball,
-                design.probe_names[design.readings.probe[reading]],
+                design.probes.names[design.readings.probe[reading]],
                 words,
                 float(value[place]),
                 float(standardised[place]),
@@ -81,4 +81,4 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
 
 
 def _ball(design: Design, reading: int) -> str:
-    return design.ball_names[design.readings.ball[reading]]
+    return design.balls.names[design.readings.ball[reading]]

@@ -53,15 +53,17 @@ def error_map(experiment: Experiment) -> ErrorMap:
     machine error.
     """
     design = lay_out(experiment)
-    x, y = (np.linspace(design.lower[k], design.upper[k], POINTS) for k in (0, 1))
+    volume = design.machine.volume
+    x, y = (np.linspace(volume.lower[k], volume.upper[k], POINTS) for k in (0, 1))
     levels: list[tuple[str, float | None]] = [("", None)]
     sides = [y, x]
     if design.dimension == 3:
-        heights = np.linspace(design.lower[2], design.upper[2], len(LEVELS))
+        heights = np.linspace(volume.lower[2], volume.upper[2], len(LEVELS))
         levels = list(zip(LEVELS, heights.tolist(), strict=True))
         sides = [heights, y, x]
     grid = np.stack(np.meshgrid(*sides, indexing="ij")[::-1], axis=-1)
-    design = replace(design, points=grid.reshape(-1, design.dimension))
+    points = grid.reshape(-1, design.dimension)
+    design = replace(design, evaluation=replace(design.evaluation, points=points))
     target = experiment.target_uncertainty
     limit = None if target is None else target.standard
     of_points, pairs = point_pairs(linearise(design), limit)

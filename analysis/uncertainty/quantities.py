@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import (
-    Balls,
+    BallPlaces,
     Coordinates,
     Distances,
     Functions,
@@ -54,16 +54,16 @@ class QuantityKind:
 
 def evaluation_points(design: Design) -> MeasuredPoints:
     """The evaluation points as places, with the probe that they are evaluated with."""
-    return MeasuredPoints(design.points, np.full(len(design.points), design.point_probe))
+    given = design.evaluation
+    return MeasuredPoints(given.points, np.full(len(given.points), given.probe))
 
 
 def task_distances(design: Design) -> Distances:
     """The lengths of the measuring tasks."""
-    ends = MeasuredPoints(
-        design.task_points.reshape(-1, design.dimension), design.task_probes.ravel()
-    )
-    pairs = np.arange(2 * len(design.task_names)).reshape(-1, 2)
-    return Distances(ends, pairs, design.task_names, design.task_targets)
+    given = design.tasks
+    ends = MeasuredPoints(given.points.reshape(-1, design.dimension), given.probes.ravel())
+    pairs = np.arange(2 * len(given.names)).reshape(-1, 2)
+    return Distances(ends, pairs, given.names, given.targets)
 
 
 def _shared(layout: SharedLayout, columns: slice) -> tuple[Functions, ...]:
@@ -90,17 +90,16 @@ def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
     return (Parameters(rows, names, units),) if quoted else ()
 
 
-def _plates(design: Design) -> tuple[Balls, ...]:
+def _plates(design: Design) -> tuple[BallPlaces, ...]:
     """The balls of each plate."""
-    plates = np.flatnonzero(design.is_plate)
-    return tuple(Balls(np.flatnonzero(design.ball_artefact == plate)) for plate in plates)
+    return tuple(BallPlaces(design.balls.of(plate)) for plate in design.artefacts.plates)
 
 
 QUANTITIES: dict[str, QuantityKind] = {
     "U1": QuantityKind(
         "ball co-ordinates",
         lambda design, layout: (
-            (Coordinates(Balls(design.plate_balls)),) if len(design.plate_balls) else ()
+            (Coordinates(BallPlaces(design.plate_balls)),) if len(design.plate_balls) else ()
         ),
     ),
     "U2": QuantityKind(
@@ -131,7 +130,7 @@ QUANTITIES: dict[str, QuantityKind] = {
     "U4": QuantityKind(
         "error function at the evaluation points",
         lambda design, layout: (
-            (Coordinates(evaluation_points(design)),) if len(design.points) else ()
+            (Coordinates(evaluation_points(design)),) if len(design.evaluation.points) else ()
         ),
         effect="error function",
     ),
@@ -148,7 +147,7 @@ QUANTITIES: dict[str, QuantityKind] = {
     "U6": QuantityKind(
         "distances between corrected points",
         lambda design, layout: (
-            (Distances(evaluation_points(design)),) if len(design.points) > 1 else ()
+            (Distances(evaluation_points(design)),) if len(design.evaluation.points) > 1 else ()
         ),
         are_lengths=True,
         effect="distances between corrected points",
@@ -157,7 +156,7 @@ QUANTITIES: dict[str, QuantityKind] = {
     ),
     "tasks": QuantityKind(
         "lengths of measuring tasks",
-        lambda design, layout: (task_distances(design),) if design.task_names else (),
+        lambda design, layout: (task_distances(design),) if design.tasks.names else (),
         are_lengths=True,
         in_replicates=False,
         is_recorded=False,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, probe_offsets
+from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
@@ -171,7 +171,7 @@ def scale_row(at: Linearisation) -> Array:
     """
     points = _points(at.design)
     rows = correction_rows(
-        at.design, at.layout, at.state, points, np.full(len(points), at.design.point_probe)
+        at.design, at.layout, at.state, points, np.full(len(points), at.design.evaluation.probe)
     )
     centred = points - points.mean(axis=0)
     return np.asarray(np.einsum("nd,nds->s", centred, rows) / (centred**2).sum())
@@ -180,7 +180,7 @@ def scale_row(at: Linearisation) -> Array:
 def can_stretch(design: Design, state: State) -> bool:
     """Whether the error model can stretch the volume by the same ratio along all axes."""
     points = _points(design)
-    offsets = np.broadcast_to(probe_offsets(design, state)[design.point_probe], points.shape)
+    offsets = np.broadcast_to(state.probes[design.evaluation.probe], points.shape)
     jacobian = design.model.jacobian(points, state.a, offsets)
     centred = points - points.mean(axis=0)
     columns = (jacobian - jacobian.mean(axis=0)).reshape(centred.size, -1)
@@ -193,9 +193,10 @@ def can_stretch(design: Design, state: State) -> bool:
 
 
 def _points(design: Design) -> Array:
-    if len(design.points) > 1 and np.ptp(design.points, axis=0).max() > 0:
-        return design.points
-    return np.array(list(product(*zip(design.lower, design.upper, strict=True))))
+    points = design.evaluation.points
+    if len(points) > 1 and np.ptp(points, axis=0).max() > 0:
+        return points
+    return np.array(list(product(*zip(*design.machine.volume.corners, strict=True))))
 
 
 def _linearised(experiment: Experiment) -> Linearisation | None:
@@ -224,7 +225,7 @@ def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSumm
     it is open.
     """
     at = _linearised(with_offsets(experiment, uncertainty))
-    if at is None or not len(at.design.points):
+    if at is None or not len(at.design.evaluation.points):
         return None
     pairs = point_pairs(at)[1]
     return None if pairs.undetermined or not pairs.count else pairs

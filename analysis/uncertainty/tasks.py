@@ -65,7 +65,7 @@ def task_uncertainties(at: Linearisation, sigma: float = 1.0) -> tuple[TaskUncer
 
     `sigma` multiplies all stated uncertainties.
     """
-    if not at.design.task_names:
+    if not at.design.tasks.names:
         return ()
     given = task_distances(at.design)
     assert given.pairs is not None

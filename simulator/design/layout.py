@@ -12,6 +12,7 @@ from ..experiment.model import (
     Experiment,
     Prior,
     RadiusCalibration,
+    Volume,
 )
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
@@ -21,9 +22,10 @@ from ..machines.protocol import Array
 from ..machines.settings import build_error_model
 from .arrays import Design
 from .length_standards import standard_lengths
+from .objects import Artefacts, Balls, EvaluationPoints, Flags, Positions, Probes, Tasks
 from .observations import CalibratedCoordinates, CalibratedDistances, Priors, Readings
 
-# Evaluation points of an experiment that names none.
+# EvaluationPoints points of an experiment that names none.
 DEFAULT_POINTS = 200
 DEFAULT_SEED = 1
 
@@ -43,10 +45,7 @@ def lay_out(experiment: Experiment) -> Design:
     3
     """
     machine, d = experiment.machine, experiment.dimension
-    lower, upper = machine.volume.lower, machine.volume.upper
-    model = build_error_model(
-        experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper))
-    )
+    model = build_error_model(experiment.error_model, *machine.volume.corners)
     artefacts = list(experiment.artefacts)
     layouts = [experiment.layouts[name] for name in artefacts]
     sizes = [len(layout.names) for layout in layouts]
@@ -54,12 +53,13 @@ def lay_out(experiment: Experiment) -> Design:
     balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
     for item in experiment.calibration:
         if isinstance(item, RadiusCalibration):
-            own = slice(
-                first_ball[item.artefact],
-                first_ball[item.artefact] + len(experiment.layouts[item.artefact].names),
-            )
+            first = first_ball[item.artefact]
+            own = slice(first, first + len(experiment.layouts[item.artefact].names))
             balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
-    is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
+    is_plate = np.array([one.role == "plate" for one in experiment.artefacts.values()])
+    is_gauge = np.array(
+        [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+    )
     probe_index = {name: k for k, name in enumerate(experiment.probes)}
     places = experiment.positions
     readings = _readings(experiment, first_ball, probe_index)
@@ -67,67 +67,57 @@ def lay_out(experiment: Experiment) -> Design:
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
     distances = _distances(experiment, first_ball)
-    lengths, length_names, drawn = standard_lengths(
+    lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
     coordinates = _coordinates(experiment, first_ball)
-    ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
     points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
-        points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
-    held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
-    for k, place in enumerate(places):
-        if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
-            # A pivot has a place; how the bar turns about it is what the readings say.
-            held[k] = np.arange(pose_size(d)) >= d
+        points = random_points(machine.volume, DEFAULT_POINTS, DEFAULT_SEED)
+    laid = Balls(
+        tuple(name for layout in layouts for name in layout.names),
+        np.repeat(np.arange(len(artefacts)), sizes),
+        balls,
+    )
+    held = _held(laid, position_artefact, rotations, coordinates)
+    # A pivot has a place; how the bar turns about it is what the readings say.
+    held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     return Design(
-        model=model,
-        lower=lower,
-        upper=upper,
-        repeatability=machine.repeatability,
-        probe_names=tuple(experiment.probes),
-        probes=np.array([experiment.probes[name] for name in experiment.probes]),
-        artefact_names=tuple(artefacts),
-        is_plate=is_plate,
-        ball_names=tuple(name for layout in layouts for name in layout.names),
-        ball_artefact=ball_artefact,
-        balls=balls,
-        position_names=tuple(place.name for place in places),
-        position_artefact=position_artefact,
-        rotations=rotations,
-        origins=origins,
-        held=held,
-        readings=readings,
-        distances=distances,
-        coordinates=coordinates,
-        lengths=lengths,
-        points=points,
-        point_probe=probe_index[experiment.evaluation.probe],
-        priors=_priors(experiment, held, len(model.parameters)),
-        free_offsets=_free_offsets(experiment),
-        is_gauge=np.array(
-            [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+        model,
+        machine,
+        Probes(
+            tuple(experiment.probes), np.array(list(experiment.probes.values())), _free(experiment)
         ),
-        length_names=length_names,
-        drawn_lengths=drawn,
-        task_names=tuple(task.name for task in tasks),
-        task_points=np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
-        task_probes=np.array(
-            [[probe_index[name] for name in task.probes] for task in tasks], np.int64
-        ).reshape(-1, 2),
-        task_targets=tuple(task.target for task in tasks),
+        Artefacts(tuple(artefacts), is_plate, is_gauge),
+        laid,
+        Positions(
+            tuple(place.name for place in places), position_artefact, rotations, origins, held
+        ),
+        readings,
+        distances,
+        coordinates,
+        lengths,
+        unknown,
+        EvaluationPoints(points, probe_index[experiment.evaluation.probe]),
+        Tasks(
+            tuple(task.name for task in tasks),
+            np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
+            np.array(
+                [[probe_index[name] for name in task.probes] for task in tasks], np.int64
+            ).reshape(-1, 2),
+            tuple(task.target for task in tasks),
+        ),
+        _priors(experiment, held, len(model.parameters)),
     )
 
 
-def _free_offsets(experiment: Experiment) -> NDArray[np.bool_] | None:
+def _free(experiment: Experiment) -> Flags:
     """Which probe offsets are parameters (l, d)."""
-    if not experiment.offset_uncertainties:
-        return None
     free = [name in experiment.offset_uncertainties for name in experiment.probes]
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
-def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) -> Priors:
+def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
 
     :raises ExperimentError: a prior is about a pose parameter that is held.
@@ -164,10 +154,10 @@ def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) ->
     )
 
 
-def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
+def random_points(volume: Volume, count: int, seed: int) -> Array:
     """Points (count, d) drawn evenly from the volume."""
     generator = np.random.default_rng(np.random.SeedSequence(seed))
-    return np.asarray(lower + (upper - lower) * generator.random((count, len(lower))))
+    return np.asarray(volume.lower + volume.size * generator.random((count, len(volume.lower))))
 
 
 def _readings(
@@ -235,13 +225,11 @@ def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Calibrated
 
 
 def _held(
-    balls: Array,
-    ball_artefact: NDArray[np.int64],
+    balls: Balls,
     position_artefact: NDArray[np.int64],
     rotations: Array,
     coordinates: CalibratedCoordinates,
-    d: int,
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Which pose parameters are held (k, pose size).
 
     An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it.
@@ -249,16 +237,20 @@ def _held(
     distances are known, none with co-ordinates of three balls. Balls on one line leave the turn
     about it open in every pose, a single ball every turn.
     """
+    d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
-        own = np.flatnonzero(ball_artefact == artefact)
-        idle = _idle_turns(balls[own])
+        own = balls.of(artefact)
+        places = balls.places[own]
+        idle = _idle_turns(places)
         for k in positions:
             held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
         chosen = np.isin(coordinates.ball, own)
         fixed = _motion_of_coordinates(
-            balls[coordinates.ball[chosen]] - balls[own].mean(axis=0), coordinates.axis[chosen], d
+            balls.places[coordinates.ball[chosen]] - places.mean(axis=0),
+            coordinates.axis[chosen],
+            d,
         )
         # Turns that no reading shows are dealt with already, in every position.
         free = _null_space(np.concatenate([fixed, idle.T]))
@@ -316,7 +308,7 @@ def _null_space(rows: Array) -> Array:
     return np.asarray(directions[rank:].T)
 
 
-def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+def _pivots(motions: Array, already: Flags | None = None) -> Flags:
     """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first,
     then largest.
     """

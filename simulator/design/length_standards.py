@@ -11,6 +11,7 @@ import numpy as np
 from ..experiment.model import DistanceCalibration, Experiment, RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..machines.protocol import Array, Integers
+from .objects import UnknownLengths
 from .observations import Lengths, Readings
 
 
@@ -39,8 +40,8 @@ def standard_lengths(
     rotations: Array,
     position_artefact: Integers,
     balls: Array,
-) -> tuple[Lengths, tuple[str, ...], Array]:
-    """The lengths of all standards, and names and drawn values of those that are unknown.
+) -> tuple[Lengths, UnknownLengths]:
+    """The lengths of all standards, and those of them that are unknown.
 
     A length standard contributes each of its calibrated distances once for every position and probe
     with which both its balls are read. The error of a certificate is the same in all of them, but
@@ -52,6 +53,7 @@ def standard_lengths(
     artefacts = list(experiment.artefacts)
     rows: list[_Row] = []
     names: list[str] = []
+    standing: list[int] = []
     drawn: list[float] = []
     read: dict[tuple[int, int, int], int] = {}
     standards = [
@@ -78,6 +80,7 @@ def standard_lengths(
 
     def unknown(name: str, what: str, value: float) -> _Row:
         names.append(f"{name}: {what}")
+        standing.append(artefacts.index(name))
         drawn.append(value)
         return _Row(value=value, certificate=(name, 0), free=len(names) - 1)
 
@@ -116,7 +119,10 @@ def standard_lengths(
                 along = rotations[readings.position[k]] @ balls[readings.ball[k]]
                 unit = along / np.sqrt(along @ along)
                 rows.append(replace(kind, first=int(k), direction=tuple(unit)))
-    return _arrays(rows, experiment.dimension), tuple(names), np.array(drawn, float)
+    unknown_lengths = UnknownLengths(
+        tuple(names), np.array(standing, np.int64), np.array(drawn, float)
+    )
+    return _arrays(rows, experiment.dimension), unknown_lengths
 
 
 def _certified_radius(name: str, item: object) -> _Row:

@@ -184,7 +184,7 @@ def _measured(design: Design, points: _Points, pairs: Integers, across_probes: b
     ends, of = np.unique(
         np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True
     )
-    at = np.full((len(design.balls), len(points.position)), -1)
+    at = np.full((len(design.balls.places), len(points.position)), -1)
     at[points.ball, points.place] = np.arange(len(points.ball))
     one, other = np.nonzero(points.position[:, None] == points.position)
     if not across_probes:
@@ -193,7 +193,7 @@ def _measured(design: Design, points: _Points, pairs: Integers, across_probes: b
     pair, place = np.nonzero((first >= 0) & (second >= 0))
     first, second = first[pair, place], second[pair, place]
     # Along the line as drawn, so that weights stay what they are while parameters change.
-    along = _apart(points.x + design.probes[points.probe], first, second)[1]
+    along = _apart(points.x + design.probes.offsets[points.probe], first, second)[1]
     variance = np.einsum("md,md->m", along**2, points.variance[first] + points.variance[second])
     calibrated = of.ravel()[len(pairs) :]
     return _Measured(
@@ -211,7 +211,7 @@ def _apart(places: Array, first: Integers, second: Integers) -> tuple[Array, Arr
 def _all_rows(
     design: Design, x: Array, points: _Points, measured: _Measured, a: Array, rows: _Rows
 ) -> tuple[Array, Array]:
-    p = design.probes[points.probe]
+    p = design.probes.offsets[points.probe]
     length, along = _apart(
         points.x + design.model.error(points.x, a, p), measured.first, measured.second
     )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..design.arrays import Design, State, probe_offsets
+from ..design.arrays import Design, State
 from ..machines.protocol import Array, Integers
 from .observations import offset_sensitivity
 from .parameters import SharedLayout
@@ -16,9 +16,7 @@ def corrected_points(design: Design, state: State, points: Array, probes: Intege
     """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of
     indices (m,), metres.
     """
-    return np.asarray(
-        points + design.model.error(points, state.a, probe_offsets(design, state)[probes])
-    )
+    return np.asarray(points + design.model.error(points, state.a, state.probes[probes]))
 
 
 def correction_rows(
@@ -29,11 +27,11 @@ def correction_rows(
 
     `points` (m, d) are scale readings with probes of indices `probes` (m,).
     """
-    offsets = probe_offsets(design, state)[probes]
+    offsets = state.probes[probes]
     jacobian = design.model.jacobian(points, state.a, offsets)
     rows = np.zeros((*jacobian.shape[:2], len(layout)))
     rows[:, :, layout.model] = jacobian
-    if design.free_offsets is None:
+    if not design.probes.free.any():
         return rows
     by_offset = offset_sensitivity(design.model, points, state.a, offsets)
     for probe in np.unique(probes):

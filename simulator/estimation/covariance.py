@@ -171,7 +171,7 @@ def blank(values: Array, change: Array, size: Array) -> Array:
 @single_threaded
 def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallCovariance:
     """Square root of the covariance of all balls."""
-    n, d = len(design.ball_names), design.dimension
+    n, d = len(design.balls.names), design.dimension
     shared, null = spectrum.root, spectrum.null
     rank, nulls, k = shared.shape[1], null.shape[1], d * len(factor.kept)
     ball = np.zeros((n, d, rank + k))

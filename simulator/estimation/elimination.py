@@ -146,7 +146,7 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
         triangle[d * place : d * place + d, d * place : d * place + d] = own
     triangle[:columns, columns:] = top[is_kept].reshape(columns, s + 1)
     triangle[columns:, columns:] = _square(_triangle(shared), s + 1)
-    place_of = np.zeros(len(design.ball_names), np.int64)
+    place_of = np.zeros(len(design.balls.names), np.int64)
     place_of[kept] = np.arange(len(kept))
     for start in range(0, len(design.distances), DISTANCES_AT_ONCE):
         some = slice(start, start + DISTANCES_AT_ONCE)
@@ -183,7 +183,7 @@ def _differ(design: Design, layout: SharedLayout, state: State) -> bool:
         1.0 / design.distances.uncertainty,
         1.0 / design.coordinates.uncertainty,
         1.0 / given.uncertainty[given.uncertainty > 0.0],
-        1.0 / design.repeatability if given.with_repeatability.any() else np.zeros(0),
+        1.0 / design.machine.repeatability if given.with_repeatability.any() else np.zeros(0),
         known[known > 0.0],
     ]
     largest = max(float(some.max(initial=0.0)) for some in weights)
@@ -202,7 +202,7 @@ def _weighted_alike(design: Design, layout: SharedLayout, state: State) -> Desig
     weights = _prior_weights(design, layout, state)
     return replace(
         design,
-        repeatability=np.ones(design.dimension),
+        machine=replace(design.machine, repeatability=np.ones(design.dimension)),
         readings=replace(
             design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)
         ),
@@ -228,7 +228,7 @@ def _eliminate_graded(
     """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
     d, s = design.dimension, len(layout)
     kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
-    place_of = np.zeros(len(design.ball_names), np.int64)
+    place_of = np.zeros(len(design.balls.names), np.int64)
     place_of[kept] = np.arange(len(kept))
     columns = d * len(kept)
     scale = np.append(layout.scale, 1.0)
@@ -368,11 +368,11 @@ def _batches(
     readings = design.readings
     chosen = design.plate_readings
     chosen = chosen[np.argsort(readings.ball[chosen], kind="stable")]
-    count = np.bincount(readings.ball[chosen], minlength=len(design.ball_names))
+    count = np.bincount(readings.ball[chosen], minlength=len(design.balls.names))
     start = np.cumsum(count) - count
     given = design.coordinates
     by_axis = np.argsort(given.ball, kind="stable")
-    extra = np.bincount(given.ball, minlength=len(design.ball_names))
+    extra = np.bincount(given.ball, minlength=len(design.balls.names))
     extra_start = np.cumsum(extra) - extra
     certificate = coordinate_rows(design, state)
 

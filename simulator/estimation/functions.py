@@ -35,7 +35,7 @@ class Parameters:
 
 
 @dataclass(frozen=True, eq=False)
-class Balls:
+class BallPlaces:
     """Balls of indices `index` (n,), in the frame of their artefact."""
 
     index: Integers
@@ -74,7 +74,7 @@ class MeasuredPoints:
         return corrected_points(design, state, self.points, self.probes)
 
 
-Places = Balls | MeasuredPoints
+Places = BallPlaces | MeasuredPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Dis
     common.
     """
     design, drawn = at.design, at.as_drawn.state
-    if isinstance(places, Balls):
+    if isinstance(places, BallPlaces):
         own, index = at.balls.own[places.index], places.index
         size = np.full((len(index), design.dimension), MICROMETRE)
         where = places.at(design, at.state), places.at(design, drawn)
@@ -225,7 +225,7 @@ def _derivatives(at: Linearisation, state: State, functions: Functions) -> Linea
         by_balls = np.zeros((n, d, 0))
     else:
         by_shared = np.zeros((n, d, len(at.layout)))
-        by_balls = np.zeros((n, d, len(design.balls), d))
+        by_balls = np.zeros((n, d, len(design.balls.places), d))
         by_balls[np.arange(n)[:, None], np.arange(d), places.index[:, None], np.arange(d)] = 1.0
     by_all = np.concatenate([by_shared, by_balls.reshape(n, d, -1)], axis=2)
     if isinstance(functions, Coordinates):

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
-from ..design.arrays import Design, State, probe_offsets, unknown_lengths
+from ..design.arrays import Design, State
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from .covariance import Spectrum, no_spectrum, spectrum
@@ -16,7 +16,7 @@ from .elimination import Factor, eliminate
 from .graded import triangle
 from .initial import initial_state
 from .linearisation import Linearisation, linearise
-from .parameters import shared_layout
+from .parameters import SharedLayout, shared_layout
 from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
 Status = Literal["converged", "not converged", "diverged"]
@@ -100,16 +100,7 @@ def gauss_newton(
             float(np.abs(balls).max(initial=0.0)),
         )
         length = float(np.sqrt(shared @ shared + (balls**2).sum()))
-        state = moved(
-            design,
-            state,
-            layout.pose_columns,
-            shared,
-            balls,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
+        state = moved(state, layout, shared, balls)
         rounding = size > 0.5 * previous and size < 1e-9
         if size < settings.smallest_step or rounding:
             status = "converged"
@@ -161,7 +152,7 @@ def linearised_fit(design: Design, solution: Solution) -> Linearisation:
 def newton_step(design: Design, factor: Factor, spectrum: Spectrum) -> tuple[Array, Array]:
     """The least-squares step: shared parameters (s,) and balls (n, d)."""
     shared = _shared_step(factor, spectrum)
-    balls = np.zeros((len(design.ball_names), design.dimension))
+    balls = np.zeros((len(design.balls.names), design.dimension))
     side = factor.ball_side + factor.ball_shared @ shared
     balls[factor.eliminated] = -solve_balls(factor, side[:, :, None])[:, :, 0]
     if len(factor.kept):
@@ -184,29 +175,19 @@ def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
     return np.asarray(-(determined[:, rest.order] @ steps))
 
 
-def moved(
-    design: Design,
-    state: State,
-    pose_columns: np.ndarray,
-    shared: Array,
-    balls: Array,
-    model: slice,
-    offset_columns: np.ndarray | None = None,
-    lengths: slice | None = None,
-) -> State:
-    """The state after a step; rotations are turned about the machine's axes and stay orthogonal."""
-    d = design.dimension
-    poses = np.where(pose_columns >= 0, shared[np.maximum(pose_columns, 0)], 0.0)
-    turn = rotation_from_vector(poses[:, d:])
-    probes = state.probes
-    if offset_columns is not None and design.free_offsets is not None:
-        step = np.where(offset_columns >= 0, shared[np.maximum(offset_columns, 0)], 0.0)
-        probes = probe_offsets(design, state) + step
+def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> State:
+    """The state after a step of shared parameters (s,) and balls (n, d); rotations are turned about
+    the machine's axes and stay orthogonal.
+    """
+    d = state.origins.shape[1]
+    # What is held takes the zero behind the last.
+    step = np.append(shared, 0.0)
+    poses = step[layout.pose_columns]
     return State(
         state.balls + balls,
-        turn @ state.rotations,
+        rotation_from_vector(poses[:, d:]) @ state.rotations,
         state.origins + poses[:, :d],
-        state.a + shared[model],
-        probes,
-        unknown_lengths(design, state) + shared[lengths] if lengths is not None else state.lengths,
+        state.a + shared[layout.model],
+        state.probes + step[layout.offset_columns],
+        state.lengths + shared[layout.lengths],
     )

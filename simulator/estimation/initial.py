@@ -7,10 +7,12 @@ are joined one after the other to what is known already, so that none of them ne
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..computing.rounding import comparable
-from ..design.arrays import Design, State
+from ..design.arrays import Design, State, nominal_state
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
 from .spheres import fit_sphere
@@ -26,26 +28,28 @@ def initial_state(design: Design, x: Array) -> State:
     Where too few balls join a position to the others, the nominal geometry closes the gap.
     """
     d = design.dimension
-    balls = design.balls.copy()
-    rotations, origins = design.rotations.copy(), design.origins.copy()
+    balls = design.balls.places.copy()
+    rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
     seen = _mean_locations(design, x)
-    for artefact in np.flatnonzero(design.is_plate):
-        members = np.flatnonzero(design.ball_artefact == artefact)
-        places = [int(k) for k in np.flatnonzero(design.position_artefact == artefact)]
+    for artefact in design.artefacts.plates:
+        members = design.balls.of(artefact)
+        places = [int(k) for k in np.flatnonzero(design.positions.artefact == artefact)]
         if len(members) == 1:
             # A single ball has a place in each position and no turn.
             arm = np.einsum("kij,j->ki", rotations[places], balls[members[0]])
             there = seen[places, members[0]]
             origins[places] = np.where(np.isnan(there), origins[places], there - arm)
-            held = [k for k in places if design.held[k, :d].all()]
+            held = [k for k in places if design.positions.held[k, :d].all()]
             if held:
-                origins[held] = design.origins[held]
+                origins[held] = design.positions.origins[held]
                 first = rotations[held[0]].T @ (seen[held[0], members[0]] - origins[held[0]])
                 balls[members[0]] = np.where(np.isnan(first), balls[members[0]], first)
             continue
-        shape, poses = _assemble(seen[places][:, members], design.balls[members], d)
+        shape, poses = _assemble(seen[places][:, members], design.balls.places[members], d)
         turn, shift = _into_frame(design, shape, poses, places, members)
-        balls[members] = np.where(np.isnan(shape), design.balls[members], shape @ turn.T + shift)
+        balls[members] = np.where(
+            np.isnan(shape), design.balls.places[members], shape @ turn.T + shift
+        )
         for place, (rotation, origin) in zip(places, poses, strict=True):
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
@@ -53,29 +57,31 @@ def initial_state(design: Design, x: Array) -> State:
     for k in design.gauge_positions:
         rows = readings.position == k
         if rows.any():
-            origins[k] = fit_sphere(x[rows] + design.probes[readings.probe[rows]], origins[k])[0]
-    return State(
-        balls,
-        rotations,
-        origins,
-        np.zeros(len(design.model.parameters)),
+            origins[k] = fit_sphere(
+                x[rows] + design.probes.offsets[readings.probe[rows]], origins[k]
+            )[0]
+    return replace(
+        nominal_state(design),
+        balls=balls,
+        rotations=rotations,
+        origins=origins,
         lengths=_measured_lengths(design, origins, x),
     )
 
 
-def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
+def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
     """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
     given = design.lengths
-    if given.free is None or not len(design.length_names):
-        return None
-    seen = x + design.probes[design.readings.probe]
+    if given.free is None or not len(design.unknown_lengths.names):
+        return design.unknown_lengths.drawn
+    seen = x + design.probes.offsets[design.readings.probe]
     other = np.where(
         given.to_pivot[:, None],
         origins[design.readings.position[given.first]],
         seen[np.maximum(given.second, 0)],
     )
     length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
-    found = design.drawn_lengths.copy()
+    found = design.unknown_lengths.drawn.copy()
     for number in np.unique(given.free[given.free >= 0]):
         found[number] = length[given.free == number].mean()
     return found
@@ -84,9 +90,9 @@ def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
 def _mean_locations(design: Design, x: Array) -> Array:
     """Where each ball was seen in each position (k, n, d), NaN where it was not."""
     readings = design.readings
-    total = np.zeros((len(design.position_names), len(design.ball_names), design.dimension))
+    total = np.zeros((len(design.positions.names), len(design.balls.names), design.dimension))
     count = np.zeros(total.shape[:2])
-    np.add.at(total, (readings.position, readings.ball), x + design.probes[readings.probe])
+    np.add.at(total, (readings.position, readings.ball), x + design.probes.offsets[readings.probe])
     np.add.at(count, (readings.position, readings.ball), 1.0)
     with np.errstate(invalid="ignore"):
         return np.asarray(total / count[:, :, None])
@@ -149,12 +155,14 @@ def _into_frame(
     members: Integers,
 ) -> tuple[Array, Array]:
     """Motion that takes the assembled shape into the artefact's own frame."""
-    held = [k for k in places if design.held[k].all()]
+    held = [k for k in places if design.positions.held[k].all()]
     if held:
         rotation, origin = poses[places.index(held[0])]
-        turn = design.rotations[held[0]].T @ rotation
-        return turn, design.rotations[held[0]].T @ (origin - design.origins[held[0]])
-    target = design.balls.copy()
+        turn = design.positions.rotations[held[0]].T @ rotation
+        return turn, design.positions.rotations[held[0]].T @ (
+            origin - design.positions.origins[held[0]]
+        )
+    target = design.balls.places.copy()
     given = design.coordinates
     target[given.ball, given.axis] = given.value
     certified = np.isin(members, given.ball)

@@ -103,7 +103,7 @@ def length_estimate(
         of_spheres = np.unique(equations.free[pivoted])
         at, _, _, _ = _solved(equations.gauges(), at, everything[6:])
         # Lengths of bars belong to the second step.
-        bars = np.setdiff1d(np.arange(len(design.length_names)), of_spheres)
+        bars = np.setdiff1d(np.arange(len(design.unknown_lengths.names)), of_spheres)
         second = np.concatenate([everything[:6], 6 + 3 * len(at.pivots) + bars])
         found, root, iterations, converged = _solved(equations, at, second)
     else:
@@ -127,7 +127,7 @@ def length_estimate(
     by_factor = _by_factor()
     is_open = (np.abs(held) > 1e-7 * np.abs(held).max(initial=0.0)).any(axis=1)
     end = 6 + 3 * len(found.pivots)
-    open_centres = np.zeros(design.origins.shape, bool)
+    open_centres = np.zeros(design.positions.origins.shape, bool)
     open_centres[found.pivots] = is_open[6:end].reshape(-1, 3)
     spread = scatter * by_factor @ root[:6] if freedom > 0 else np.full((6, 1), np.nan)
     return LengthSolution(
@@ -205,11 +205,11 @@ class _Unknowns:
 
 def _equations(design: Design, x: Array) -> _Equations:
     given = design.lengths
-    seen = x + design.probes[design.readings.probe]
+    seen = x + design.probes.offsets[design.readings.probe]
     place = seen[given.first]
     place[~given.to_pivot] -= seen[given.second[~given.to_pivot]]
     position = design.readings.position[given.first]
-    number = np.full(len(design.position_names), -1)
+    number = np.full(len(design.positions.names), -1)
     number[design.gauge_positions] = np.arange(len(design.gauge_positions))
     free = np.full(len(given), -1) if given.free is None else given.free
     pivot = np.where(given.to_pivot, number[position], -1)
@@ -223,9 +223,8 @@ def _start(design: Design, x: Array) -> _Unknowns:
     errors.
     """
     state = initial_state(design, x)
-    lengths = design.drawn_lengths if state.lengths is None else state.lengths
     pivots = design.gauge_positions
-    values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), lengths])
+    values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), state.lengths])
     return _Unknowns(values, pivots)
 
 
@@ -332,6 +331,6 @@ def _by_factor() -> Array:
 
 
 def _centres(design: Design, unknowns: _Unknowns) -> Array:
-    centres = np.full(design.origins.shape, np.nan)
+    centres = np.full(design.positions.origins.shape, np.nan)
     centres[unknowns.pivots] = unknowns.values[6 : 6 + 3 * len(unknowns.pivots)].reshape(-1, 3)
     return centres

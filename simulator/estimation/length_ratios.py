@@ -53,8 +53,8 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
     """
     given, readings = design.lengths, design.readings
     known = np.ones(len(given), bool) if given.free is None else given.free < 0
-    seen = x + design.probes[readings.probe]
-    artefact = design.ball_artefact[readings.ball[given.first]]
+    seen = x + design.probes.offsets[readings.probe]
+    artefact = design.balls.artefact[readings.ball[given.first]]
     found = []
     for one in np.unique(artefact):
         mine = np.flatnonzero(artefact == one)
@@ -87,7 +87,7 @@ def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
     found = []
     for k in np.unique(position):
         points = seen[given.first[rows[position == k]]]
-        centre, radius = fit_sphere(points, design.origins[k])
+        centre, radius = fit_sphere(points, design.positions.origins[k])
         away = points - centre
         size = np.sqrt((away**2).sum(axis=1))
         _, values, vh = np.linalg.svd(

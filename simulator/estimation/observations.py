@@ -11,14 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import (
-    Design,
-    State,
-    locations,
-    probe_offsets,
-    reading_uncertainties,
-    unknown_lengths,
-)
+from ..design.arrays import Design, State, locations, reading_uncertainties
 from ..design.observations import Readings
 from ..geometry.motions import pose_size, vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel, Integers
@@ -56,7 +49,7 @@ class BallRows:
 
 def expected_readings(design: Design, state: State, readings: Readings) -> Array:
     """Scale readings (m, d) of a machine without errors, true location less probe offset."""
-    return locations(design, state, readings) - probe_offsets(design, state)[readings.probe]
+    return locations(design, state, readings) - state.probes[readings.probe]
 
 
 def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
@@ -104,7 +97,7 @@ def reading_blocks(
     None.
     """
     d = design.dimension
-    p = probe_offsets(design, state)[readings.probe]
+    p = state.probes[readings.probe]
     rotation = state.rotations[readings.position]
     arm = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
     true = arm + state.origins[readings.position]
@@ -120,7 +113,7 @@ def reading_blocks(
     by_pose[:, range(d), range(d)] = -weight
     by_pose[:, :, d:] = -weight[:, :, None] * rotation_sensitivity(arm)
     by_offset = None
-    if design.free_offsets is not None:
+    if design.probes.free.any():
         by_offset = weight[:, :, None] * offset_sensitivity(design.model, x, state.a, p)
     return ReadingBlocks(residual, -weight[:, :, None] * rotation, by_pose, by_model, by_offset)
 
@@ -189,7 +182,7 @@ def _length_derivative(
         along = measured.unit[end.rows]
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
         rows[end.rows, layout.model] += end.sign * np.einsum("md,mdn->mn", along, by_model)
-        if design.free_offsets is not None:
+        if design.probes.free.any():
             by_offset = offset_sensitivity(design.model, end.points, state.a, end.offsets)
             columns = layout.offset_columns[end.probe]
             np.add.at(
@@ -243,7 +236,7 @@ def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measure
         (-1.0, given.second, np.flatnonzero(~given.to_pivot)),
     ):
         readings = design.readings.select(chosen[rows])
-        p = probe_offsets(design, state)[readings.probe]
+        p = state.probes[readings.probe]
         if x is not None:
             points = x[chosen[rows]]
         else:
@@ -296,9 +289,9 @@ def length_values(design: Design, state: State) -> Array:
     unknown ones.
     """
     given = design.lengths
-    if given.free is None or not len(design.length_names):
+    if given.free is None or not len(design.unknown_lengths.names):
         return given.value
-    return np.where(given.free >= 0, unknown_lengths(design, state)[given.free], given.value)
+    return np.where(given.free >= 0, state.lengths[given.free], given.value)
 
 
 def prior_values(design: Design, state: State) -> Array:
@@ -306,14 +299,14 @@ def prior_values(design: Design, state: State) -> Array:
     given = design.priors
     of_poses = _pose_values(design, state)[given.position, given.component]
     axis = np.minimum(given.component, design.dimension - 1)
-    of_probes = probe_offsets(design, state)[given.probe, axis]
+    of_probes = state.probes[given.probe, axis]
     of_model = given.by_model @ state.a if len(given) else np.zeros(0)
     return np.where(given.position >= 0, of_poses, np.where(given.probe >= 0, of_probes, of_model))
 
 
 def _pose_values(design: Design, state: State) -> Array:
     """Origins and rotations against the nominal pose (k, pose size)."""
-    turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
+    turned = vector_from_rotation(state.rotations @ design.positions.rotations.transpose(0, 2, 1))
     return np.concatenate([state.origins, turned], axis=1)
 
 

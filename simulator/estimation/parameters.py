@@ -45,33 +45,33 @@ def shared_layout(design: Design) -> SharedLayout:
     """Lay out the shared parameters of a design."""
     q, d = pose_size(design.dimension), design.dimension
     names = pose_parameter_names(d)
-    columns = np.full((len(design.position_names), q), -1, np.int64)
+    columns = np.full((len(design.positions.names), q), -1, np.int64)
     parameters: list[Parameter] = []
     for k in design.posed_positions:
-        own = design.balls[design.ball_artefact == design.position_artefact[k]]
+        own = design.balls.places[design.balls.artefact == design.positions.artefact[k]]
         arm = max(float(np.ptp(own, axis=0).max(initial=0.0)), 1e-3)
-        for j in np.flatnonzero(~design.held[k]):
+        for j in np.flatnonzero(~design.positions.held[k]):
             columns[k, j] = len(parameters)
             turning = j >= d
             parameters.append(
                 Parameter(
-                    f"{design.position_names[k]}: {names[j]}",
+                    f"{design.positions.names[k]}: {names[j]}",
                     "rad" if turning else "m",
                     "pose",
-                    f"{names[j]} of position {design.position_names[k]}",
+                    f"{names[j]} of position {design.positions.names[k]}",
                     arm if turning else 1.0,
                 )
             )
     start = len(parameters)
     parameters += design.model.parameters
     model = slice(start, len(parameters))
-    offsets = np.full(design.probes.shape, -1, np.int64)
-    for probe, axis in np.argwhere(design.free_offsets) if design.free_offsets is not None else ():
+    offsets = np.full(design.probes.offsets.shape, -1, np.int64)
+    for probe, axis in np.argwhere(design.probes.free):
         offsets[probe, axis] = len(parameters)
-        name, letter = design.probe_names[probe], AXIS_NAMES[axis]
+        name, letter = design.probes.names[probe], AXIS_NAMES[axis]
         meaning = f"offset {letter} of probe {name}"
         parameters.append(Parameter(f"probe {name}: offset {letter}", "m", "offset", meaning))
-    lengths = slice(len(parameters), len(parameters) + len(design.length_names))
-    parameters += [Parameter(name, "m", "length", name) for name in design.length_names]
+    lengths = slice(len(parameters), len(parameters) + len(design.unknown_lengths.names))
+    parameters += [Parameter(name, "m", "length", name) for name in design.unknown_lengths.names]
     scale = np.array([1.0 / p.effect for p in parameters])
     return SharedLayout(tuple(parameters), columns, model, scale, offsets, lengths)

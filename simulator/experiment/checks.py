@@ -84,7 +84,7 @@ def _check_model(
         if machine is None:
             return True
         try:
-            build_error_model(settings, *_corners(machine))
+            build_error_model(settings, *machine.volume.corners)
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
     elif isinstance(settings, MetricSettings):
@@ -106,7 +106,7 @@ def _check_model(
     elif (
         isinstance(settings, MachineFileSettings)
         and machine is not None
-        and not build_error_model(settings, *_corners(machine)).parameters
+        and not build_error_model(settings, *machine.volume.corners).parameters
     ):
         text = (
             f"{settings.file} states no error that could be estimated; give polynomials or tables"
@@ -189,7 +189,7 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         or problems.has_below(_TRUE_MODEL)
     ):
         return
-    corners = _corners(machine)
+    corners = machine.volume.corners
     try:
         true_machine(truth, build_error_model(settings, *corners), *corners)
     except TruthError as error:
@@ -235,10 +235,6 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
 
 
 _TRUE_MODEL = ("true_machine", "error_model")
-
-
-def _corners(machine: Machine) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(map(float, machine.volume.lower)), tuple(map(float, machine.volume.upper))
 
 
 def check_names(position_count: int, problems: Problems) -> None:
@@ -458,7 +454,7 @@ def check_size(
         name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
     }
     pivots = [one for one in positions.values() if one.artefact in gauges]
-    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     shared = errors + pose_size(d) * poses + d * (len(pivots) + len(offset_uncertainties))
     if shared > MOST_SHARED:
         text = (
@@ -491,7 +487,7 @@ def check_derivatives(
     # Errors are at most as many as parameters are, so that they need seldom be counted.
     if count * d * MOST_SHARED <= MOST_DERIVATIVES:
         return
-    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     if count * d * errors > MOST_DERIVATIVES:
         text = (
             f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at"

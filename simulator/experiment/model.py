@@ -39,9 +39,19 @@ class Volume:
     upper: Floats
 
     @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The lower and the upper corner, as numbers."""
+        return tuple(self.lower.tolist()), tuple(self.upper.tolist())
+
+    @property
+    def size(self) -> Floats:
+        """Lengths (d,) of the sides."""
+        return np.asarray(self.upper - self.lower)
+
+    @property
     def of_readings(self) -> tuple[Floats, Floats]:
         """Limits (d,) of scale readings, a thousandth of the volume outside it."""
-        slightly = SLIGHTLY * (self.upper - self.lower)
+        slightly = SLIGHTLY * self.size
         return self.lower - slightly, self.upper + slightly
 
 

@@ -34,9 +34,8 @@ def resolve_priors(
         return ()
     if dimension_of(settings) not in (machine.dimension, None):
         return ()
-    lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
     try:
-        model = build_error_model(settings, lower, upper)
+        model = build_error_model(settings, *machine.volume.corners)
     except CustomModelError:
         # Told already, with the error model.
         return ()

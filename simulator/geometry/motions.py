@@ -1,4 +1,6 @@
-"""Small rotations as vectors, and the rigid motion that fits two sets of points best."""
+"""Rigid motions: their parameters, small rotations as vectors, and the motion that fits two sets of
+points best.
+"""
 
 from __future__ import annotations
 

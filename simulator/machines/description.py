@@ -352,7 +352,7 @@ def _at_reference(
     first, second = {"EC0Y": (0, 1), "EB0Z": (0, 2), "EA0Z": (1, 2)}[squareness.name]
     sign = -1.0 if squareness.name == "EB0Z" else 1.0
     a = np.array([float(f.rotation) for f in model.chain.functions] + values)
-    a[len(model.chain.functions) :] *= [not f.name.startswith("thermal") for f in model.fields]
+    a[len(model.chain.functions) :] *= [one.unit == "rad" for one in model.fields]
     tilt = 0.0
     for along, across in ((first, second), (second, first)):
         t = np.linspace(0.0, 1.0, REDUCTION_POINTS)

@@ -164,10 +164,7 @@ def drawn_values(
     about another model's parameters are drawn about what the file states.
     """
     true: list[float] = []
-    names = list(experiment.artefacts)
-    first_ball = {
-        name: int(np.flatnonzero(design.ball_artefact == names.index(name))[0]) for name in names
-    }
+    first_ball = {name: int(design.balls.of(k)[0]) for k, name in enumerate(design.artefacts.names)}
     for item in experiment.calibration:
         balls = truth.balls[first_ball[item.artefact] :]
         if isinstance(item, DistanceCalibration):

@@ -6,14 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import (
-    Design,
-    State,
-    locations,
-    nominal_state,
-    probe_offsets,
-    reading_uncertainties,
-)
+from ..design.arrays import Design, State, locations, nominal_state, reading_uncertainties
 from ..design.joint_lengths import FLAT
 from ..design.observations import Priors, Readings
 from ..estimation.observations import distance_rows, prior_values
@@ -29,10 +22,7 @@ def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State
     """The design as drawn on the true machine, whose error model may be another than the
     design's.
     """
-    drawn = nominal_state(design)
-    return replace(design, model=machine.model), State(
-        drawn.balls, drawn.rotations, drawn.origins, machine.a
-    )
+    return replace(design, model=machine.model), replace(nominal_state(design), a=machine.a)
 
 
 def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
@@ -59,7 +49,7 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
     readings = design.readings.expanded()
-    p = probe_offsets(design, truth)[readings.probe]
+    p = truth.probes[readings.probe]
     return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
 
 
@@ -86,7 +76,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     gauge the places of its ball; lengths that share balls move these together. Lengths without
     certificates are as drawn.
     """
-    balls = design.balls.copy()
+    balls = design.balls.places.copy()
     tied = distance_rows(design, nominal_state(design))
     known = design.coordinates
     stated = design.dimension * known.ball + known.axis
@@ -103,7 +93,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     balls += np.divide(pull, stiffness, out=np.zeros(balls.size), where=stiffness > 0).reshape(
         balls.shape
     )
-    among = np.zeros(len(design.balls), np.int64)
+    among = np.zeros(len(design.balls.places), np.int64)
     among[ends] = np.arange(len(ends))
     together = ~np.concatenate([np.zeros(len(tied.residual), bool), alone])
     if len(tied.residual):
@@ -129,7 +119,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     pivoted = given.select(given.to_pivot)
     for certificate in np.unique(pivoted.certificate):
         k = int(np.flatnonzero(pivoted.certificate == certificate)[0])
-        own = design.ball_artefact == design.ball_artefact[design.readings.ball[pivoted.first[k]]]
+        own = design.balls.artefact == design.balls.artefact[design.readings.ball[pivoted.first[k]]]
         true = pivoted.value[k] + pivoted.uncertainty[k] * generator.standard_normal()
         balls[own] *= true / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
     given = given.select(~given.to_pivot)
@@ -137,7 +127,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     pairs, first = np.unique(ends, axis=1, return_index=True)
     ball, times = np.unique(pairs, return_counts=True)
     # Of artefacts whose lengths share balls.
-    shared = np.isin(design.ball_artefact[pairs[0]], design.ball_artefact[ball[times > 1]])
+    shared = np.isin(design.balls.artefact[pairs[0]], design.balls.artefact[ball[times > 1]])
     if shared.any():
         of_shared = given.select(first[shared])
         wanted = of_shared.value + of_shared.uncertainty * generator.standard_normal(len(of_shared))

@@ -54,13 +54,14 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
     By less than a thousandth of the volume a reading is outside if an artefact was not set up just
     as drawn.
     """
-    beyond = np.maximum(design.lower - x, x - design.upper)
-    far = np.flatnonzero((beyond > SLIGHTLY * (design.upper - design.lower)).any(axis=1))
+    volume = design.machine.volume
+    beyond = np.maximum(volume.lower - x, x - volume.upper)
+    far = np.flatnonzero((beyond > SLIGHTLY * volume.size).any(axis=1))
     if not len(far):
         return ()
     i = int(far[beyond[far].max(axis=1).argmax()])
     axis = int(beyond[i].argmax())
-    how = "below" if x[i, axis] < design.lower[axis] else "above"
+    how = "below" if x[i, axis] < volume.lower[axis] else "above"
     readings = design.readings
     where = f" (line {marks[i].line})" if marks else ""
     count = "1 reading is" if len(far) == 1 else f"{len(far)} readings are"
@@ -68,8 +69,8 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
         (
             f"{count} outside the measuring volume, and the error model is extrapolated there;"
             f" furthest is ball {design.ball_label(int(readings.ball[i]))} in position"
-            f" {design.position_names[readings.position[i]]} with probe"
-            f" {design.probe_names[readings.probe[i]]}, at {'xyz'[axis]} ="
+            f" {design.positions.names[readings.position[i]]} with probe"
+            f" {design.probes.names[readings.probe[i]]}, at {'xyz'[axis]} ="
             f" {_shown(float(x[i, axis]))}, {_shown(float(beyond[i, axis]))} {how} it{where};"
             " correct machine.volume, or the readings"
         ),
@@ -77,7 +78,7 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
 
 
 def _of_length(design: Design, one: LengthRatio) -> str:
-    name = design.artefact_names[one.artefact]
+    name = design.artefacts.names[one.artefact]
     what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
     word = "stated" if one.is_known else "drawn"
     stated = f"the {word} {format_length(one.stated)}" if one.is_radius else f"the {word} ones"
@@ -94,8 +95,8 @@ def _of_length(design: Design, one: LengthRatio) -> str:
 
 def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) -> Message:
     first = marks[int(np.flatnonzero(design.readings.position == wrong.position)[0])]
-    name = design.position_names[wrong.position]
-    artefact = design.artefact_names[design.position_artefact[wrong.position]]
+    name = design.positions.names[wrong.position]
+    artefact = design.artefacts.names[design.positions.artefact[wrong.position]]
     if wrong.turned:
         text = (
             f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the"
@@ -113,10 +114,10 @@ def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) ->
 def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> Message:
     readings, i = design.readings, wrong.reading
     ball = design.ball_label(int(readings.ball[i]))
-    position = design.position_names[readings.position[i]]
+    position = design.positions.names[readings.position[i]]
     far = _shown(float(np.sqrt(wrong.misfit @ wrong.misfit)))
     if wrong.undecided:
-        elsewhere = design.position_names[readings.position[wrong.partner]]
+        elsewhere = design.positions.names[readings.position[wrong.partner]]
         text = (
             f"ball {ball} in position {position} stands {far} from where it stands in position"
             f" {elsewhere}, line {marks[wrong.partner].line}; correct or remove one of the two"
@@ -133,7 +134,10 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
         else:
             text += "correct its name, or remove the line"
     elif wrong.other_probe >= 0:
-        probe, other = design.probe_names[readings.probe[i]], design.probe_names[wrong.other_probe]
+        probe, other = (
+            design.probes.names[readings.probe[i]],
+            design.probes.names[wrong.other_probe],
+        )
         text = (
             f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the"
             " name of the probe"

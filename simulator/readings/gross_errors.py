@@ -104,12 +104,12 @@ def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], li
 
 def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
-    seen = x + design.probes[readings.probe]
+    seen = x + design.probes.offsets[readings.probe]
     pitch = _pitches(design)
     found, positions = _against_drawing(design, seen, pitch)
     lost = np.isin(readings.position, [wrong.position for wrong in positions])
     wrong = ~found.agreeing & ~lost
-    shape = design.balls
+    shape = design.balls.places
     pairs: list[tuple[int, int]] = []
     if not positions:
         found, shape, wrong, pairs = _against_readings(design, x, seen, pitch, found, wrong)
@@ -128,11 +128,13 @@ def _pitches(design: Design) -> Array:
     """
     from scipy.spatial import cKDTree
 
-    pitch = np.full(len(design.balls), np.inf)
-    for artefact in np.unique(design.ball_artefact):
-        own = np.flatnonzero(design.ball_artefact == artefact)
+    pitch = np.full(len(design.balls.places), np.inf)
+    for artefact in np.unique(design.balls.artefact):
+        own = design.balls.of(artefact)
         if len(own) > 1:
-            pitch[own] = cKDTree(design.balls[own]).query(design.balls[own], 2)[0][:, 1]
+            pitch[own] = cKDTree(design.balls.places[own]).query(design.balls.places[own], 2)[0][
+                :, 1
+            ]
     return pitch
 
 
@@ -140,12 +142,12 @@ def _against_drawing(
     design: Design, seen: Array, pitch: Array
 ) -> tuple[_Motions, list[WrongPosition]]:
     readings = design.readings
-    rotations, origins = design.rotations.copy(), design.origins.copy()
+    rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
     agreeing = np.ones(len(readings), bool)
     wrong = []
     for k in np.unique(readings.position):
         rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls[readings.ball[rows]]
+        nominal = design.balls.places[readings.ball[rows]]
         if len(np.unique(readings.ball[rows])) < 2:
             origins[k] = (seen[rows] - nominal @ rotations[k].T).mean(axis=0)
             continue
@@ -154,7 +156,7 @@ def _against_drawing(
         count = int(agreeing[rows].sum())
         if 2 * count <= len(rows):
             wrong.append(WrongPosition(int(k), "", count, len(rows)))
-        elif design.is_plate[design.position_artefact[k]] and not _in_line(nominal):
+        elif design.artefacts.is_plate[design.positions.artefact[k]] and not _in_line(nominal):
             turned = _turned_onto_itself(design, int(k), rotations[k], pitch)
             if turned:
                 wrong.append(WrongPosition(int(k), turned, count, len(rows)))
@@ -173,9 +175,9 @@ def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: A
     """
     from scipy.spatial import cKDTree
 
-    own = np.flatnonzero(design.ball_artefact == design.position_artefact[position])
-    balls = design.balls[own]
-    turn = design.rotations[position].T @ rotation
+    own = design.balls.of(design.positions.artefact[position])
+    balls = design.balls.places[own]
+    turn = design.positions.rotations[position].T @ rotation
     centre = balls.mean(axis=0)
     apart, nearest = cKDTree(balls).query((balls - centre) @ turn.T + centre)
     if (nearest == np.arange(len(own))).all() or (apart > AGAINST_DRAWING * pitch[own]).any():
@@ -205,12 +207,12 @@ def _against_readings(
     # A ball without any reading keeps its place in the drawing.
     start = initial_state(replace(design, readings=readings.select(right)), x[right])
     rotations, origins, shape = start.rotations.copy(), start.origins.copy(), start.balls.copy()
-    for k in np.flatnonzero(~design.is_plate[design.position_artefact]):
+    for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]):
         rotations[k], origins[k] = found.rotations[k], found.origins[k]
     off_drawing = np.zeros(len(readings))
     for k in np.unique(readings.position):
         rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls[readings.ball[rows]]
+        nominal = design.balls.places[readings.ball[rows]]
         off_drawing[rows] = distances(nominal, seen[rows], found.rotations[k], found.origins[k])
     limit = (
         AGAINST_READINGS * pitch[readings.ball]
@@ -246,7 +248,7 @@ def _against_readings(
                 break
             wrong |= fresh
             suspect = np.zeros(len(readings), bool)
-        for k in np.flatnonzero(design.is_plate[design.position_artefact]):
+        for k in design.plate_positions:
             rows = np.flatnonzero((readings.position == k) & ~wrong & ~suspect)
             if len(np.unique(readings.ball[rows])) > design.dimension:
                 places = shape[readings.ball[rows]]
@@ -260,9 +262,7 @@ def _against_readings(
 
 def _offset_uncertainties(design: Design) -> Array:
     """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
-    if design.free_offsets is None:
-        return np.zeros(len(design.probes))
-    variance = np.where(design.free_offsets, np.inf, 0.0)
+    variance = np.where(design.probes.free, np.inf, 0.0)
     known = np.flatnonzero(design.priors.probe >= 0)
     probe, axis = design.priors.probe[known], design.priors.component[known]
     variance[probe, axis] = design.priors.uncertainty[known] ** 2
@@ -304,10 +304,10 @@ def _explained(
     named: list[WrongReading] = []
     local = _in_frame(motions, readings.position, seen)
     other_ball = np.full(len(readings), -1)
-    for artefact in np.unique(design.ball_artefact[readings.ball[wrong]]):
-        own = np.flatnonzero(design.ball_artefact == artefact)
+    for artefact in np.unique(design.balls.artefact[readings.ball[wrong]]):
+        own = design.balls.of(artefact)
         tree = cKDTree(shape[own])
-        rows = wrong[design.ball_artefact[readings.ball[wrong]] == artefact]
+        rows = wrong[design.balls.artefact[readings.ball[wrong]] == artefact]
         apart, nearest = tree.query(local[rows])
         ball = own[nearest]
         misfit = np.sqrt(((local[rows] - shape[readings.ball[rows]]) ** 2).sum(axis=1))
@@ -329,7 +329,9 @@ def _explained(
         should = motions.rotations[position] @ shape[ball_of] + motions.origins[position]
         misfit_of = seen[i] - should
         size = float(np.sqrt(misfit_of @ misfit_of))
-        with_probe = np.sqrt(((misfit_of + design.probes - design.probes[probe]) ** 2).sum(axis=1))
+        with_probe = np.sqrt(
+            ((misfit_of + design.probes.offsets - design.probes.offsets[probe]) ** 2).sum(axis=1)
+        )
         with_probe[probe] = np.inf
         other_probe = int(with_probe.argmin())
         if with_probe[other_probe] > min(EXPLAINED * size, AGAINST_DRAWING * pitch[ball_of]):

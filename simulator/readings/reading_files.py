@@ -52,7 +52,7 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
     writer.writerow(
         ["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])]
     )
-    positions, balls, probes = design.position_names, design.ball_names, design.probe_names
+    positions, balls, probes = design.positions.names, design.balls.names, design.probes.names
     for ball, position, probe, row in zip(
         readings.ball, readings.position, readings.probe, (1e3 * x).tolist(), strict=True
     ):
@@ -75,7 +75,7 @@ def read_readings(
     """
     texts = ["position", "ball", "probe"]
     columns, d = column_names(path), design.dimension
-    if len(design.probe_names) == 1 and "probe" not in columns:
+    if len(design.probes.names) == 1 and "probe" not in columns:
         texts.remove("probe")
     messages: list[Message] = []
     rows = read_table(path, texts, AXES[:d], ["u"], problems=messages)
@@ -116,11 +116,11 @@ def read_readings(
 
 def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[Message]]:
     """Indices (rows, 3) of ball, position and probe, and the messages about names unknown."""
-    positions = {name: k for k, name in enumerate(design.position_names)}
-    probes = {name: k for k, name in enumerate(design.probe_names)}
+    positions = {name: k for k, name in enumerate(design.positions.names)}
+    probes = {name: k for k, name in enumerate(design.probes.names)}
     balls = [
-        {design.ball_names[b]: int(b) for b in np.flatnonzero(design.ball_artefact == artefact)}
-        for artefact in range(len(design.artefact_names))
+        {design.balls.names[b]: int(b) for b in design.balls.of(artefact)}
+        for artefact in range(len(design.artefacts.names))
     ]
     # Rows of the same names, of which there are many, are looked up once.
     places: dict[tuple[str, ...], tuple[int, int, int]] = {}
@@ -132,13 +132,13 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
             unknown.setdefault(MORE_ERRORS, []).append(row)
             break
         if row.texts not in places:
-            position, ball, probe = (*row.texts, design.probe_names[0])[:3]
+            position, ball, probe = (*row.texts, design.probes.names[0])[:3]
             texts = wrong.setdefault(row.texts, [])
             own: dict[str, int] = {}
             if position not in positions:
                 texts.append(f'unknown position "{position}"; {hint(position, positions)}')
             else:
-                own = balls[design.position_artefact[positions[position]]]
+                own = balls[design.positions.artefact[positions[position]]]
                 texts += [] if ball in own else [f'unknown ball "{ball}"; {hint(ball, own)}']
                 texts += (
                     [] if probe in probes else [f'unknown probe "{probe}"; {hint(probe, probes)}']
@@ -162,8 +162,9 @@ def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
     """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in
     another unit.
     """
-    size = float((design.upper - design.lower).max())
-    return np.asarray((x < design.lower - size) | (x > design.upper + size))
+    volume = design.machine.volume
+    size = float(volume.size.max())
+    return np.asarray((x < volume.lower - size) | (x > volume.upper + size))
 
 
 def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> None:
@@ -197,7 +198,7 @@ def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Desi
         for row in found[allowed : allowed + 10]:
             text = (
                 f'ball "{design.ball_label(ball)}" is repeated in position'
-                f' "{design.position_names[position]}" with probe "{design.probe_names[probe]}"'
+                f' "{design.positions.names[position]}" with probe "{design.probes.names[probe]}"'
                 f" (first in line {found[0].mark.line}); remove the line, or state repeats:"
                 f" {len(found)} for that position in the experiment"
             )
@@ -219,7 +220,7 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
     if planned.uncertainty is None:
         return None
     of_key = dict(zip(_key(planned), planned.uncertainty, strict=True))
-    return np.array([of_key.get(key, design.repeatability) for key in _key(readings)])
+    return np.array([of_key.get(key, design.machine.repeatability) for key in _key(readings)])
 
 
 def _compare(
@@ -230,8 +231,8 @@ def _compare(
     def name(key: tuple[int, int, int]) -> str:
         position, ball, probe = key
         return (
-            f"{design.position_names[position]}: ball {design.ball_label(ball)} with"
-            f" {design.probe_names[probe]}"
+            f"{design.positions.names[position]}: ball {design.ball_label(ball)} with"
+            f" {design.probes.names[probe]}"
         )
 
     def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> list[int]:
@@ -268,7 +269,7 @@ def _combine_standards(
     A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of
     its own, since its ball need not be where it was before.
     """
-    on_plate = design.is_plate[design.ball_artefact[readings.ball]]
+    on_plate = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
     groups: dict[tuple[int, int, int], list[int]] = {}
     keys = _key(readings)
     of_gauge = np.isin(readings.position, design.gauge_positions)
@@ -329,15 +330,15 @@ def _with_radii(
     given = design.lengths
     planned = np.flatnonzero(given.to_pivot)
     # Of the same gauge all are alike.
-    of_gauge = design.ball_artefact[design.readings.ball[given.first[planned]]]
-    own = design.ball_artefact[readings.ball[carried]]
+    of_gauge = design.balls.artefact[design.readings.ball[given.first[planned]]]
+    own = design.balls.artefact[readings.ball[carried]]
     gauges, first = np.unique(of_gauge, return_index=True)
     like = planned[first[np.searchsorted(gauges, own)]]
-    seen = x[carried] + design.probes[readings.probe[carried]]
+    seen = x[carried] + design.probes.offsets[readings.probe[carried]]
     direction = np.empty_like(seen)
     for k in np.unique(readings.position[carried]):
         rows = readings.position[carried] == k
-        away = seen[rows] - fit_sphere(seen[rows], design.origins[k])[0]
+        away = seen[rows] - fit_sphere(seen[rows], design.positions.origins[k])[0]
         direction[rows] = away / np.sqrt((away**2).sum(axis=1))[:, None]
         drawn = given.direction[planned[of_gauge == own[rows][0]]]
         nearest = drawn[cKDTree(drawn).query(direction[rows])[1]]

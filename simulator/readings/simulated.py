@@ -51,9 +51,8 @@ def simulated_readings(
     :raises ExperimentError: the true machine's errors are so large that there is no reading.
     """
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     chosen = experiment.seed if seed is None else seed
     generator = None if exact else np.random.default_rng(np.random.SeedSequence(chosen))

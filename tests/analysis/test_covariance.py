@@ -30,6 +30,7 @@ from tests.estimation.test_against_dense import (
 )
 from tests.estimation.test_priors_and_offsets import SPHERE, all_residuals, with_bar
 from tests.reference import dense
+from tests.reference.designs import altered
 
 Real = NDArray[np.float64]
 
@@ -102,13 +103,15 @@ def test_covariances_are_those_of_the_dense_reference(
 ) -> None:
     """Machine, poses, balls, tasks and corrected points together, of full rank and deficient."""
     design = with_points(make(), 6)
-    ends = design.points[:6].reshape(3, 2, 3)
-    design = replace(
+    ends = design.evaluation.points[:6].reshape(3, 2, 3)
+    design = altered(
         design,
-        task_names=("a", "b", "c"),
-        task_points=ends,
-        task_probes=np.full((3, 2), design.point_probe),
-        task_targets=(None,) * 3,
+        tasks={
+            "names": ("a", "b", "c"),
+            "points": ends,
+            "probes": np.full((3, 2), design.evaluation.probe),
+            "targets": (None,) * 3,
+        },
     )
     problem = dense.planned(design, coefficients, 5)
     reference = dense.linearised(problem)
@@ -128,7 +131,12 @@ def test_covariances_are_those_of_the_dense_reference(
     assert_same(found.covariance(), expected, 1e-6)
 
     points = dense.jacobian(asked["U4"], problem.parameters)
-    corrected = correct(at, design.points, np.full(len(design.points), design.point_probe), 3.0)
+    corrected = correct(
+        at,
+        design.evaluation.points,
+        np.full(len(design.evaluation.points), design.evaluation.probe),
+        3.0,
+    )
     of_points = 9.0 * covariance_of(points, reference)
     assert_same(corrected.covariance, of_points, 1e-6)
     for k, block in enumerate(corrected.blocks):
@@ -152,17 +160,9 @@ def by_differences(at: Linearisation) -> tuple[Real, Real]:
     count, d = len(layout), design.dimension
 
     def at_step(step: Real) -> State:
-        balls = np.zeros(design.balls.shape)
+        balls = np.zeros(design.balls.places.shape)
         balls[design.plate_balls] = step[count:].reshape(-1, d)
-        columns = (
-            layout.pose_columns,
-            step[:count],
-            balls,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
-        return moved(design, at.state, *columns)
+        return moved(at.state, layout, step[:count], balls)
 
     def values(step: Real) -> Real:
         return estimated_functions(replace(at, state=at_step(step)), monomials=False).values
@@ -214,11 +214,11 @@ def assert_scatter(design: Design, asked: tuple[str, ...], trials: int) -> None:
     them says.
     """
     generator, limit = np.random.default_rng(2), 5.0
-    nominal, probes = nominal_state(design), np.full(2, design.point_probe)
+    nominal, probes = nominal_state(design), np.full(2, design.evaluation.probe)
     truth = replace(nominal, a=2e-6 * generator.standard_normal(len(nominal.a)))
     at_truth = replace(linearise(design), state=truth)
     true_values = estimated_functions(at_truth, monomials=True).choose(asked).values
-    true_points = correct(at_truth, design.points[:2], probes, 1.0).points
+    true_points = correct(at_truth, design.evaluation.points[:2], probes, 1.0).points
     values, points = [], []
     for _ in range(trials):
         drawn = noisy_certificate(design, truth, generator)
@@ -228,7 +228,7 @@ def assert_scatter(design: Design, asked: tuple[str, ...], trials: int) -> None:
         assert solution.status == "converged"
         at = linearised_fit(observed.design, solution)
         found = estimated_functions(at, monomials=True).choose(asked)
-        corrected = correct(at, design.points[:2], probes, 1.0)
+        corrected = correct(at, design.evaluation.points[:2], probes, 1.0)
         values.append(found.values - true_values)
         points.append((corrected.points - true_points).ravel())
     for errors, covariance in (
@@ -301,17 +301,17 @@ def test_correlations_are_between_minus_one_and_one(fitted: Fit) -> None:
 
 
 def test_corrected_points_have_the_errors_of_the_estimated_machine(fitted: Fit) -> None:
-    points = fitted.design.points[:5]
+    points = fitted.design.evaluation.points[:5]
     found = fitted.correct(points)
-    probes = np.full(5, fitted.design.point_probe)
-    offsets = fitted.design.probes[probes]
+    probes = np.full(5, fitted.design.evaluation.probe)
+    offsets = fitted.design.probes.offsets[probes]
     np.testing.assert_allclose(
         found.points,
         points + fitted.design.model.error(points, fitted.solution.state.a, offsets),
         rtol=1e-15,
     )
     assert found.standard_uncertainties.max() <= fitted.quantities["U4"].maximum * (1.0 + 1e-9)
-    names = [fitted.design.probe_names[k] for k in probes]
+    names = [fitted.design.probes.names[k] for k in probes]
     np.testing.assert_array_equal(fitted.correct(points, names).covariance, found.covariance)
     turned = fitted.correct(points, ["left", "right", "left", "left", "left"])
     assert not np.allclose(turned.points, found.points, atol=1e-12)

@@ -21,7 +21,14 @@ from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
+from tests.reference.designs import (
+    altered,
+    corner_sides,
+    grid,
+    neighbours,
+    plate_design,
+    six_positions,
+)
 
 seeds = st.integers(0, 2**31)
 
@@ -38,7 +45,7 @@ def small_design(seed: int = 0, calibration: str = "sides") -> Design:
         position_coefficients=4,
         rotation_coefficients=4,
     )
-    return replace(design, points=np.random.default_rng(seed).random((12, 3)))
+    return altered(design, evaluation={"points": np.random.default_rng(seed).random((12, 3))})
 
 
 def judged(
@@ -63,14 +70,16 @@ def test_u5_and_u6_do_not_depend_on_the_frame(seed: int) -> None:
     expected, _, _ = judged(design)
     turn = rotation_from_vector(generator.uniform(-2, 2, (1, 3)))[0]
     shift = generator.uniform(-1, 1, 3)
-    held = np.zeros_like(design.held)
+    held = np.zeros_like(design.positions.held)
     held[generator.integers(len(held))] = True
-    moved = replace(
+    moved = altered(
         design,
-        balls=design.balls @ turn.T + shift,
-        rotations=design.rotations @ turn.T,
-        origins=design.origins - (design.rotations @ turn.T) @ shift,
-        held=held,
+        balls={"places": design.balls.places @ turn.T + shift},
+        positions={
+            "rotations": design.positions.rotations @ turn.T,
+            "origins": design.positions.origins - (design.positions.rotations @ turn.T) @ shift,
+            "held": held,
+        },
     )
     found, _, _ = judged(moved)
     assert_same(found["U5"], expected["U5"])
@@ -83,21 +92,25 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
     generator = np.random.default_rng(seed)
     design = small_design(seed)
     expected, _, _ = judged(design)
-    ball_order = generator.permutation(len(design.balls))
+    ball_order = generator.permutation(len(design.balls.places))
     new_ball = np.argsort(ball_order)
-    position_order = generator.permutation(len(design.rotations))
+    position_order = generator.permutation(len(design.positions.rotations))
     new_position = np.argsort(position_order)
     mixed = generator.permutation(len(design.readings))
     readings = design.readings.select(mixed)
     found, _, _ = judged(
-        replace(
+        altered(
             design,
-            balls=design.balls[ball_order],
-            ball_names=tuple(design.ball_names[i] for i in ball_order),
-            rotations=design.rotations[position_order],
-            origins=design.origins[position_order],
-            held=design.held[position_order],
-            position_names=tuple(design.position_names[i] for i in position_order),
+            balls={
+                "places": design.balls.places[ball_order],
+                "names": tuple(design.balls.names[i] for i in ball_order),
+            },
+            positions={
+                "rotations": design.positions.rotations[position_order],
+                "origins": design.positions.origins[position_order],
+                "held": design.positions.held[position_order],
+                "names": tuple(design.positions.names[i] for i in position_order),
+            },
             readings=replace(
                 readings, ball=new_ball[readings.ball], position=new_position[readings.position]
             ),
@@ -117,9 +130,9 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
 def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
     design = small_design(1, calibration)
     expected, _, _ = judged(design)
-    scaled = replace(
+    scaled = altered(
         design,
-        repeatability=factor * design.repeatability,
+        machine={"repeatability": factor * design.machine.repeatability},
         distances=replace(design.distances, uncertainty=factor * design.distances.uncertainty),
         coordinates=replace(
             design.coordinates, uncertainty=factor * design.coordinates.uncertainty
@@ -141,9 +154,9 @@ def test_an_added_reading_never_raises_a_variance(seed: int, calibration: str) -
     readings = design.readings
     extra = replace(
         readings,
-        ball=np.append(readings.ball, generator.integers(len(design.balls))),
-        position=np.append(readings.position, generator.integers(len(design.rotations))),
-        probe=np.append(readings.probe, generator.integers(len(design.probes))),
+        ball=np.append(readings.ball, generator.integers(len(design.balls.places))),
+        position=np.append(readings.position, generator.integers(len(design.positions.rotations))),
+        probe=np.append(readings.probe, generator.integers(len(design.probes.offsets))),
         repeats=np.append(readings.repeats, generator.integers(1, 4)),
     )
     after, spread_after, _ = judged(replace(design, readings=extra))
@@ -169,6 +182,8 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         drawn.rotations,
         drawn.origins,
         1e-5 * generator.standard_normal(len(design.model.parameters)),
+        drawn.probes,
+        drawn.lengths,
     )
     _, spread, layout = judged(design)
     trials = 60
@@ -222,9 +237,9 @@ def test_share_of_distances_within_the_target() -> None:
     design = small_design(7)
     at = linearise(design)
     values = []
-    for i, j in itertools.combinations(range(len(design.points)), 2):
-        pair = replace(design, points=design.points[[i, j]])
-        length = float(np.linalg.norm(design.points[i] - design.points[j]))
+    for i, j in itertools.combinations(range(len(design.evaluation.points)), 2):
+        pair = altered(design, evaluation={"points": design.evaluation.points[[i, j]]})
+        length = float(np.linalg.norm(design.evaluation.points[i] - design.evaluation.points[j]))
         values.append((uncertainties(replace(at, design=pair))["U6"].maximum, length))
     cases = (
         (2e-7, 0.0, 1.0, 1.0),

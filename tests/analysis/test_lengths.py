@@ -162,7 +162,7 @@ def test_groups_are_what_counting_one_by_one_gives(tmp_path: Path, deficient: bo
     for k in range(len(found.edges) - 1):
         own = (lengths > found.edges[k] + 1e-9) & (lengths <= found.edges[k + 1] + 1e-9)
         check_group(found.by_length, k, u[own], ratio[own], 1.5)
-    extent = found.design.upper - found.design.lower
+    extent = found.design.machine.volume.size
     names = np.array([direction_of((found.points[j] - found.points[i]) / extent) for i, j in ends])
     for k, name in enumerate(found.directions):
         check_group(found.by_direction, k, u[names == name], ratio[names == name], 1.5)

@@ -27,8 +27,8 @@ ENTRY = """\
         lambda design, layout: (
             Distances(
                 MeasuredPoints(
-                    np.stack(np.meshgrid(*zip(design.lower, design.upper)), axis=-1).reshape(-1, design.dimension),
-                    np.full(2**design.dimension, design.point_probe),
+                    np.stack(np.meshgrid(*zip(*design.machine.volume.corners)), axis=-1).reshape(-1, design.dimension),
+                    np.full(2**design.dimension, design.evaluation.probe),
                 ),
                 np.array([(i, 2**design.dimension - 1 - i) for i in range(2 ** (design.dimension - 1))]),
                 tuple(f"diagonal {i + 1}" for i in range(2 ** (design.dimension - 1))),
@@ -140,13 +140,13 @@ def diagonals() -> np.ndarray:
     design = lay_out(quickstart())
     problem = dense.planned(design, 5, 5)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (
-        design.upper - design.lower
+        design.machine.volume.size
     )
-    offsets = np.tile(design.probes[design.point_probe], (8, 1))
+    offsets = np.tile(design.probes.offsets[design.evaluation.probe], (8, 1))
 
     def lengths(step: dense.Values) -> dense.Values:
         places = dense.corrected(
-            problem, design.lower + corners, dense.unpack(problem, step)[3], offsets
+            problem, design.machine.volume.lower + corners, dense.unpack(problem, step)[3], offsets
         )
         return dense.length(places[:4] - places[:3:-1])
 

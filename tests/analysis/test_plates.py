@@ -44,7 +44,7 @@ def experiment(tmp_path: Path, variant: str = "three positions", **changes: obje
 
 def observed(drawn: Experiment, seed: int) -> ObservedReadings:
     design = lay_out(drawn)
-    corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(drawn.true_machine, design.model, *corners)
     )
@@ -56,8 +56,8 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
     """Standard uncertainties (n, 2) by complex steps and one pseudo-inverse, written down from the
     definitions.
     """
-    state, held = found.solution.state, design.held
-    n = len(design.balls)
+    state, held = found.solution.state, design.positions.held
+    n = len(design.balls.places)
     start = np.concatenate([state.balls.ravel(), np.zeros((~held).sum()), state.a])
 
     def parts(p: NDArray[np.complex128]) -> tuple[NDArray[np.complex128], ...]:
@@ -78,7 +78,7 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
         between = balls[d.first] - balls[d.second]
         return np.concatenate(
             [
-                ((corrected - true) / design.repeatability).ravel(),
+                ((corrected - true) / design.machine.repeatability).ravel(),
                 (np.sqrt((between**2).sum(axis=1)) - d.value) / d.uncertainty,
                 (balls[k.ball, k.axis] - k.value) / k.uncertainty,
             ]
@@ -133,7 +133,7 @@ def test_uncertainties_are_the_scatter_of_simulated_fits(tmp_path: Path) -> None
     drawn = experiment(tmp_path)
     design = lay_out(drawn)
     axes = axes_of_plates(drawn)["plate"]
-    true, _ = in_plate_axes(design.balls, axes)
+    true, _ = in_plate_axes(design.balls.places, axes)
     trials, errors = 400, []
     for seed in range(trials):
         seen = observed(drawn, seed)

@@ -28,6 +28,7 @@ from ballplate.uncertainty.scale import (
 )
 
 from tests.reference import dense
+from tests.reference.designs import altered
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace(
@@ -73,11 +74,11 @@ def dense_lengths(experiment: Experiment, offset_uncertainty: float) -> tuple[fl
     zero = np.zeros(problem.parameters)
     rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     parts = []
-    for probe, axis in itertools.product(range(1, len(design.probes)), range(3)):
-        offsets = design.probes.copy()
+    for probe, axis in itertools.product(range(1, len(design.probes.offsets)), range(3)):
+        offsets = design.probes.offsets.copy()
         size = 1e-3
         offsets[probe, axis] += size
-        other = replace(problem, design=replace(design, probes=offsets))
+        other = replace(problem, design=altered(design, probes={"offsets": offsets}))
         change = (dense.residuals(other, zero) - dense.residuals(problem, zero)) / size
         of_plates = len(design.readings.ball) * 3
         assert not change[of_plates:].any()
@@ -89,8 +90,8 @@ def dense_lengths(experiment: Experiment, offset_uncertainty: float) -> tuple[fl
     points = dense.jacobian(dense.quantities(problem)["U4"], problem.parameters).reshape(
         -1, 3, problem.parameters
     )
-    first, second = dense.pairs_of(len(design.points))
-    apart = design.points[first] - design.points[second]
+    first, second = dense.pairs_of(len(design.evaluation.points))
+    apart = design.evaluation.points[first] - design.evaluation.points[second]
     by_length = np.einsum("md,mdp->mp", apart, points[first] - points[second])
     scale = by_length.sum(axis=0) / (apart**2).sum()
     lengths = found.of(by_length / np.linalg.norm(apart, axis=1)[:, None])
@@ -119,8 +120,8 @@ def test_scale_is_the_mean_relative_change_of_distances(tmp_path: Path) -> None:
     at = linearise(design)
     layout, state, row = at.layout, at.state, scale_row(at)
     step = 1e-6 * np.random.default_rng(3).normal(size=len(state.a))
-    points = design.points
-    offsets = np.broadcast_to(design.probes[design.point_probe], points.shape)
+    points = design.evaluation.points
+    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
     moved = points + design.model.error(points, step, offsets)
     pairs = list(itertools.combinations(range(len(points)), 2))
     changes = [

@@ -222,15 +222,19 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
     layout, state = shared_layout(design), nominal_state(design)
     root = spectrum(eliminate(design, layout, state)).root
     rows = correction_rows(
-        design, layout, state, design.points, np.full(len(design.points), design.point_probe)
+        design,
+        layout,
+        state,
+        design.evaluation.points,
+        np.full(len(design.evaluation.points), design.evaluation.probe),
     )
     told = []
     for column in range(root.shape[1]):
         change = rows @ root[:, column]
         # Less the rigid motion that fits best, by a dense least-squares fit.
-        turns = np.stack([np.cross(axis, design.points) for axis in np.eye(3)], axis=-1)
+        turns = np.stack([np.cross(axis, design.evaluation.points) for axis in np.eye(3)], axis=-1)
         motions = np.concatenate(
-            [np.tile(np.eye(3), (len(design.points), 1, 1)), turns], axis=2
+            [np.tile(np.eye(3), (len(design.evaluation.points), 1, 1)), turns], axis=2
         ).reshape(-1, 6)
         left = change.ravel() - motions @ np.linalg.lstsq(motions, change.ravel(), rcond=None)[0]
         at_points = np.sqrt(2 * (left.reshape(-1, 3) ** 2).mean(axis=1))

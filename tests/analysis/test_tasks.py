@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.results.study import predict
-from ballplate.simulator.design.arrays import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
@@ -22,6 +22,7 @@ from ballplate.uncertainty.quantities import task_distances
 from ballplate.uncertainty.summaries import uncertainties
 
 from tests.analysis.test_invariants import judged, small_design
+from tests.reference.designs import altered
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 TASKS = """\
@@ -70,7 +71,7 @@ def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path
     assert data["tasks"]["bore distance"]["within_target"] is False
     lines = planned.lines()
     assert any(line.startswith("bore distance") and line.endswith("no") for line in lines)
-    assert len(planned.design.points) == 200
+    assert len(planned.design.evaluation.points) == 200
 
 
 def length_of(ends: np.ndarray) -> np.ndarray:
@@ -80,7 +81,7 @@ def length_of(ends: np.ndarray) -> np.ndarray:
 
 def changed(design: Design, layout: SharedLayout, state: State, step: np.ndarray) -> State:
     """The state with the machine's parameters and estimated offsets changed by a step (s,)."""
-    offsets = probe_offsets(design, state).copy()
+    offsets = state.probes.copy()
     free = layout.offset_columns >= 0
     offsets[free] += step[layout.offset_columns[free]]
     return replace(state, a=state.a + step[layout.model], probes=offsets)
@@ -121,16 +122,18 @@ def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> No
 def test_undetermined_tasks_are_told_as_such() -> None:
     """Without a calibrated distance no length is known, whatever the task."""
     design = small_design()
-    design = replace(
+    design = altered(
         design,
         distances=replace(
             design.distances, **{name: v[:0] for name, v in vars(design.distances).items()}
         ),
-        probes=np.zeros_like(design.probes),
-        task_names=("edge", "none"),
-        task_points=np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]]]),
-        task_probes=np.zeros((2, 2), int),
-        task_targets=(None, None),
+        probes={"offsets": np.zeros_like(design.probes.offsets)},
+        tasks={
+            "names": ("edge", "none"),
+            "points": np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]]]),
+            "probes": np.zeros((2, 2), int),
+            "targets": (None, None),
+        },
     )
     quantity = judged(design)[0]["tasks"]
     assert (quantity.count, quantity.undetermined, quantity.within_target) == (2, 2, None)
@@ -139,10 +142,10 @@ def test_undetermined_tasks_are_told_as_such() -> None:
 
 def test_share_within_counts_only_tasks_with_a_target(tmp_path: Path) -> None:
     at = linearise(lay_out(with_tasks(tmp_path)))
-    targets = at.design.task_targets
+    targets = at.design.tasks.targets
 
     def share(*targets: Target | None) -> float | None:
-        changed = replace(at.design, task_targets=targets)
+        changed = altered(at.design, tasks={"targets": targets})
         return uncertainties(replace(at, design=changed))["tasks"].within_target
 
     assert share(targets[0], None, None) == 0.0

@@ -116,14 +116,15 @@ def by_scipy(shared: Reference, k: int) -> State:
         own = sorted({p for _, p in match})
         turn = sum(1 for g in earlier if g.ball == group.ball)
         rows = [
-            match[ball, own[turn]] for ball in np.arange(len(design.balls))[group.ball].tolist()
+            match[ball, own[turn]]
+            for ball in np.arange(len(design.balls.places))[group.ball].tolist()
         ]
         x[rows] += drawn.moved[k][:, group.rows].T
     pairs = design.distances
     real = shared.truth.state.balls
     apart = np.sqrt(((real[pairs.first] - real[pairs.second]) ** 2).sum(axis=1))
     observed = replace(design, distances=replace(pairs, value=apart + drawn.distances[k]))
-    n, d = design.balls.shape
+    n, d = design.balls.places.shape
     columns = layout.pose_columns
 
     def state_of(v: Array) -> State:
@@ -134,6 +135,8 @@ def by_scipy(shared: Reference, k: int) -> State:
             rotation_from_vector(poses[:, d:]) @ start.rotations,
             start.origins + poses[:, :d],
             start.a + shared_part[layout.model],
+            start.probes,
+            start.lengths,
         )
 
     def residuals(v: Array) -> Array:

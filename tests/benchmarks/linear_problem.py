@@ -35,7 +35,7 @@ class LinearProblem:
 
     @property
     def balls(self) -> int:
-        return len(self.design.balls)
+        return len(self.design.balls.places)
 
     @property
     def shared(self) -> int:
@@ -94,8 +94,10 @@ def figures(problem: LinearProblem, found: Estimate) -> Figures:
     own = np.diag(found.balls) if has_pairs else np.diagonal(found.balls, axis1=1, axis2=2)
     reported = design.model.reported().matrix
     of_model = found.shared[layout.model, layout.model]
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    jacobian = design.model.jacobian(design.points, np.zeros(len(of_model)), offsets)
+    offsets = np.broadcast_to(
+        design.probes.offsets[design.evaluation.probe], design.evaluation.points.shape
+    )
+    jacobian = design.model.jacobian(design.evaluation.points, np.zeros(len(of_model)), offsets)
     flat = jacobian.reshape(-1, len(of_model))
     of_points = flat @ of_model @ flat.T
     result = {
@@ -107,11 +109,15 @@ def figures(problem: LinearProblem, found: Estimate) -> Figures:
         "U4": summary(np.sqrt(np.diag(of_points))),
     }
     if has_pairs:
-        result["U5"] = summary(pair_uncertainties(design.balls, found.balls.reshape(n, 3, n, 3)))
+        result["U5"] = summary(
+            pair_uncertainties(design.balls.places, found.balls.reshape(n, 3, n, 3))
+        )
     # The corrected points of a machine without errors are the points, moved by the same probe
     # offset.
-    count = len(design.points)
-    result["U6"] = summary(pair_uncertainties(design.points, of_points.reshape(count, 3, count, 3)))
+    count = len(design.evaluation.points)
+    result["U6"] = summary(
+        pair_uncertainties(design.evaluation.points, of_points.reshape(count, 3, count, 3))
+    )
     return result
 
 

@@ -318,7 +318,7 @@ def test_the_radius_in_scale_readings_is_told_where_the_scale_is_open(
     """The sphere of least distances, by another library's solver; the radius itself stays open."""
     arguments = ["fit", GAUGE, KNOWN[1], "--variant", "radius unknown", "--estimator", estimator]
     rows = np.loadtxt(KNOWN[1], delimiter=",", skiprows=1, usecols=(3, 4, 5)) * 1e-3
-    points = rows + lay_out(load(Path(GAUGE))[0]).probes[0]
+    points = rows + lay_out(load(Path(GAUGE))[0]).probes.offsets[0]
 
     def off(unknown: np.ndarray) -> np.ndarray:
         return np.linalg.norm(points - unknown[:3], axis=1) - unknown[3]

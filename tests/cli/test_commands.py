@@ -94,7 +94,7 @@ def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert [line.split()[0] for line in lines if line[:1] == "U"] == list(SYMBOLS)
     # Lengths and angles have rows of their own, and points their place.
     assert not any("um, urad" in line for line in lines)
-    points = lay_out(load(QUICKSTART)[0]).points
+    points = lay_out(load(QUICKSTART)[0]).evaluation.points
     places = dict(re.findall(r"(point [0-9]+) at \(([0-9., ]+)\) mm", "\n".join(lines)))
     named = re.findall(
         r"point [0-9]+", "\n".join(line for line in lines if line[:2] in ("U4", "U6"))

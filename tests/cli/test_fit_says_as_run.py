@@ -55,7 +55,7 @@ def told(of: Prediction | Fit) -> tuple[object, ...]:
 def fitted(experiment: Experiment, seed: int | None) -> tuple[Fit, State]:
     """The fit of simulated readings, without noise where there is no seed, and the truth."""
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(experiment.true_machine, design.model, *corners)
     )
@@ -132,7 +132,7 @@ def test_fewer_readings_than_planned_are_judged_as_they_are(tmp_path: Path) -> N
     )
     expected = predict(some).verdict.deficiency
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(experiment.true_machine, design.model, *corners)
     )

@@ -95,7 +95,7 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
         )
         design = lay_out(load(path)[0])
         balls = locations(design, nominal_state(design), design.readings)
-        x = balls - design.probes[design.readings.probe]
+        x = balls - design.probes.offsets[design.readings.probe]
         expected = bool((x >= -1e-9).all() and (x <= 1 + 1e-9).all())
         path.write_text(narrow)
         if expected:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from tests.reference import dense
 from tests.reference.designs import (
     SIGMA,
+    altered,
     corner_sides,
     four_positions,
     grid,
@@ -40,8 +41,12 @@ RELATIVE = 1e-9
 def with_points(design: Design, count: int = 15) -> Design:
     """The design with random evaluation points in its volume, read with a tip on the side."""
     unit = np.random.default_rng(7).random((count, 3))
-    return replace(
-        design, points=design.lower + unit * (design.upper - design.lower), point_probe=1
+    return altered(
+        design,
+        evaluation={
+            "points": design.machine.volume.lower + unit * design.machine.volume.size,
+            "probe": 1,
+        },
     )
 
 
@@ -127,7 +132,7 @@ def with_length_standard(design: Design, projected: bool) -> Design:
         full[:, 0] = direction
         full[:, 2] *= np.sign(np.linalg.det(full))
         rotations.append(full)
-    ball, position = len(design.balls), len(design.position_names)
+    ball, position = len(design.balls.places), len(design.positions.names)
     readings, start = design.readings, len(design.readings)
     count = len(places)
     joined = Readings(
@@ -140,18 +145,27 @@ def with_length_standard(design: Design, projected: bool) -> Design:
     # The stated direction is a little off the bar's, so that projections differ from distances.
     stated = directions + 0.1 * np.roll(directions, 1, axis=1)
     stated /= np.sqrt((stated**2).sum(axis=1))[:, None]
-    return replace(
+    return altered(
         design,
-        artefact_names=(*design.artefact_names, "bar"),
-        is_plate=np.append(design.is_plate, False),
-        ball_names=(*design.ball_names, "left", "right"),
-        ball_artefact=np.append(design.ball_artefact, [len(design.is_plate)] * 2),
-        balls=np.concatenate([design.balls, [[half, 0.0, 0.0], [-half, 0.0, 0.0]]]),
-        position_names=(*design.position_names, *(f"bar {k}" for k in range(count))),
-        position_artefact=np.append(design.position_artefact, [len(design.is_plate)] * count),
-        rotations=np.concatenate([design.rotations, rotations]),
-        origins=np.concatenate([design.origins, places]),
-        held=np.concatenate([design.held, np.zeros((count, 6), bool)]),
+        artefacts={
+            "names": (*design.artefacts.names, "bar"),
+            "is_plate": np.append(design.artefacts.is_plate, False),
+            "is_gauge": np.zeros(2, bool),
+        },
+        balls={
+            "names": (*design.balls.names, "left", "right"),
+            "artefact": np.append(design.balls.artefact, [len(design.artefacts.is_plate)] * 2),
+            "places": np.concatenate([design.balls.places, [[half, 0.0, 0.0], [-half, 0.0, 0.0]]]),
+        },
+        positions={
+            "names": (*design.positions.names, *(f"bar {k}" for k in range(count))),
+            "artefact": np.append(
+                design.positions.artefact, [len(design.artefacts.is_plate)] * count
+            ),
+            "rotations": np.concatenate([design.positions.rotations, rotations]),
+            "origins": np.concatenate([design.positions.origins, places]),
+            "held": np.concatenate([design.positions.held, np.zeros((count, 6), bool)]),
+        },
         readings=joined,
         lengths=Lengths(
             first=index,
@@ -187,20 +201,27 @@ def two_artefacts() -> Design:
         [placed("z", 0.5, (0.3, 0.1), 1, 0.4), placed("x", 0.4, (0.2, 0.4), 3, 0.4)],
         coordinates=(0, 2, 6, 8),
     )
-    balls, positions = len(large.balls), len(large.position_names)
+    balls, positions = len(large.balls.places), len(large.positions.names)
     first, second = large.readings, extra.readings
-    return replace(
+    return altered(
         large,
-        artefact_names=("large", "small"),
-        is_plate=np.array([True, True]),
-        ball_names=large.ball_names + extra.ball_names,
-        ball_artefact=np.repeat([0, 1], [balls, len(small)]),
-        balls=np.concatenate([large.balls, small]),
-        position_names=(*large.position_names, "s0", "s1"),
-        position_artefact=np.repeat([0, 1], [positions, 2]),
-        rotations=np.concatenate([large.rotations, extra.rotations]),
-        origins=np.concatenate([large.origins, extra.origins]),
-        held=np.concatenate([large.held, extra.held]),
+        artefacts={
+            "names": ("large", "small"),
+            "is_plate": np.array([True, True]),
+            "is_gauge": np.zeros(2, bool),
+        },
+        balls={
+            "names": large.balls.names + extra.balls.names,
+            "artefact": np.repeat([0, 1], [balls, len(small)]),
+            "places": np.concatenate([large.balls.places, small]),
+        },
+        positions={
+            "names": (*large.positions.names, "s0", "s1"),
+            "artefact": np.repeat([0, 1], [positions, 2]),
+            "rotations": np.concatenate([large.positions.rotations, extra.positions.rotations]),
+            "origins": np.concatenate([large.positions.origins, extra.positions.origins]),
+            "held": np.concatenate([large.positions.held, extra.positions.held]),
+        },
         readings=Readings(
             np.concatenate([first.ball, second.ball + balls]),
             np.concatenate([first.position, second.position + positions]),
@@ -377,14 +398,24 @@ def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], 
     random = np.random.default_rng(3)
     nominal = nominal_state(design)
     # What is held stays where it is; the plates stand free.
-    turn = 0.02 * random.standard_normal((len(design.origins), 3)) * ~design.held[:, 3:]
-    shift = 1e-3 * random.standard_normal(design.origins.shape) * ~design.held[:, :3]
+    turn = (
+        0.02
+        * random.standard_normal((len(design.positions.origins), 3))
+        * ~design.positions.held[:, 3:]
+    )
+    shift = (
+        1e-3
+        * random.standard_normal(design.positions.origins.shape)
+        * ~design.positions.held[:, :3]
+    )
     # What the first pose shows of the balls counts as their frame: small errors only.
     state = State(
         nominal.balls + 1e-5 * random.standard_normal(nominal.balls.shape),
         rotation_from_vector(turn) @ nominal.rotations,
         nominal.origins + shift,
         1e-4 * random.standard_normal(nominal.a.shape),
+        nominal.probes,
+        nominal.lengths,
     )
     scatter = random.standard_normal((len(design.readings), 3))
     x = expected_readings(design, nominal, design.readings) + 1e-4 * scatter

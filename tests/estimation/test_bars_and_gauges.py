@@ -45,7 +45,7 @@ def shipped(file: str, variant: str) -> Experiment:
 
 
 def truth_of(experiment: Experiment, design: Design) -> tuple[Design, State]:
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     return on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
 
 
@@ -101,7 +101,7 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
     experiment = changed(tmp_path, "bryan-gauge", **BOTH)
     design = lay_out(experiment)
     layout = shared_layout(design)
-    assert design.length_names == ("bar: length", "short: radius")
+    assert design.unknown_lengths.names == ("bar: length", "short: radius")
     assert [p.name for p in layout.parameters[layout.poses]] == [
         f"{name}: origin {axis}" for name in ("left", "right", "middle") for axis in "xyz"
     ]
@@ -110,11 +110,8 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
     generator = np.random.default_rng(1)
 
     def residual(step: np.ndarray) -> np.ndarray:
-        still = np.zeros_like(design.balls)
-        arguments = (step, still, layout.model, layout.offset_columns, layout.lengths)
-        return length_shared_rows(
-            design, layout, moved(design, state, layout.pose_columns, *arguments), x
-        )[0]
+        still = np.zeros_like(design.balls.places)
+        return length_shared_rows(design, layout, moved(state, layout, step, still), x)[0]
 
     state = replace(nominal_state(design), a=1e-4 * generator.standard_normal(6))
     expected = central_difference(residual, np.zeros(len(layout)), 1e-6)
@@ -171,7 +168,7 @@ def test_the_fit_is_the_one_of_scipy(variant: str, tmp_path: Path) -> None:
         if file == "bar-bell":
             lengths = [np.linalg.norm(axes @ (x[2 * k] - x[2 * k + 1])) for k in range(12)]
         else:
-            centres = design.origins + unknown[7:].reshape(pivots, 3)
+            centres = design.positions.origins + unknown[7:].reshape(pivots, 3)
             lengths = [
                 np.linalg.norm(axes @ p - centres[k])
                 for k, p in zip(readings.position, x, strict=True)
@@ -275,7 +272,7 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
     design = lay_out(twice)
     readings, x = exact_readings(*truth_of(twice, design))
     # The second time the ball stands 20 mm to the side of the first on the same sphere.
-    centre = design.origins[0]
+    centre = design.positions.origins[0]
     aside = x[1::2] + 0.02 * np.cross(x[1::2] - centre, [0.0, 0.0, 1.0])
     x[1::2] = centre + 0.3 * (aside - centre) / np.linalg.norm(aside - centre, axis=1)[:, None]
     with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
@@ -327,7 +324,7 @@ def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path
     metric = np.eye(3)
     metric[np.triu_indices(3)] += found.factors
     metric = np.triu(metric) + np.triu(metric, 1).T
-    seen = x + design.probes[design.readings.probe]
+    seen = x + design.probes.offsets[design.readings.probe]
     bar = seen[design.lengths.first[0]] - seen[design.lengths.second[0]]
     # Nothing else depends on it, so that its own equation holds.
     assert found.lengths[0] ** 2 == pytest.approx(bar @ metric @ bar, rel=1e-14)
@@ -337,8 +334,8 @@ def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path
 def test_true_gauges_have_the_certified_radius(tmp_path: Path) -> None:
     design = lay_out(changed(tmp_path, "bryan-gauge", **BOTH))
     drawn = np.linalg.norm(true_artefacts(design, np.random.default_rng(1)), axis=1)
-    of_gauge = design.ball_artefact == 1
+    of_gauge = design.balls.artefact == 1
     assert (
         len(set(drawn[of_gauge].round(12))) == 1 and 1e-7 < abs(drawn[of_gauge][0] - 0.3001) < 1e-5
     )
-    np.testing.assert_allclose(drawn[design.ball_artefact == 2], 0.2, rtol=1e-12)
+    np.testing.assert_allclose(drawn[design.balls.artefact == 2], 0.2, rtol=1e-12)

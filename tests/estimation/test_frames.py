@@ -60,7 +60,7 @@ def dense(design: Design) -> np.ndarray:
     """Derivatives of readings and certificates by balls, by all six parameters of every pose, and
     by the machine.
     """
-    n, k, readings = len(design.balls), len(design.position_names), design.readings
+    n, k, readings = len(design.balls.places), len(design.positions.names), design.readings
     blocks = reading_blocks(design, nominal_state(design), readings, None)
     rows = np.zeros((len(readings), 3, 3 * n + 6 * k + len(design.model.parameters)))
     for i, (ball, position) in enumerate(zip(readings.ball, readings.position, strict=True)):
@@ -85,7 +85,7 @@ def test_what_is_held_takes_no_observation_away(
     )
     design = lay_out(experiment)
     whole = dense(design)
-    poses = 3 * len(design.balls) + np.flatnonzero(design.held)
+    poses = 3 * len(design.balls.places) + np.flatnonzero(design.positions.held)
     held = np.delete(whole, poses, axis=1)
 
     def rank(matrix: np.ndarray) -> int:

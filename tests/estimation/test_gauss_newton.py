@@ -21,21 +21,26 @@ from ballplate.simulator.readings.generate import (
     scale_readings,
 )
 
-from tests.reference.designs import corner_sides, grid, plate_design, six_positions
+from tests.reference.designs import altered, corner_sides, grid, plate_design, six_positions
 
 
 def truth_of(design: Design, seed: int = 3, errors: float = 1e-5) -> State:
     """A machine with errors, a plate that is not as drawn, in poses that are not as drawn."""
     generator = np.random.default_rng(seed)
-    poses = len(design.position_names)
+    poses = len(design.positions.names)
     turn = rotation_from_vector(1e-2 * generator.standard_normal((poses, 3)))
     shift = 1e-3 * generator.standard_normal((poses, 3))
-    turn[design.held.all(axis=1)], shift[design.held.all(axis=1)] = np.eye(3), 0.0
+    turn[design.positions.held.all(axis=1)], shift[design.positions.held.all(axis=1)] = (
+        np.eye(3),
+        0.0,
+    )
     return State(
-        design.balls + 1e-5 * generator.standard_normal(design.balls.shape),
-        turn @ design.rotations,
-        design.origins + shift,
+        design.balls.places + 1e-5 * generator.standard_normal(design.balls.places.shape),
+        turn @ design.positions.rotations,
+        design.positions.origins + shift,
         errors * generator.standard_normal(len(design.model.parameters)),
+        design.probes.offsets,
+        design.unknown_lengths.drawn,
     )
 
 
@@ -98,13 +103,15 @@ def test_starting_values_do_not_need_the_nominal_poses() -> None:
     truth = truth_of(design)
     readings, x = exact_readings(design, replace(truth, a=0 * truth.a))
     seen = readings.ball % 6 != readings.position
-    wrong = rotation_from_vector(np.tile([[0.3, -0.9, 1.1]], (6, 1))) @ design.rotations
-    wrong[0] = design.rotations[0]
-    design = replace(
+    wrong = rotation_from_vector(np.tile([[0.3, -0.9, 1.1]], (6, 1))) @ design.positions.rotations
+    wrong[0] = design.positions.rotations[0]
+    design = altered(
         design,
         readings=readings.select(seen),
-        rotations=wrong,
-        origins=design.origins + [[0]] + 0.2 * (wrong[:, 0] != wrong[0, 0]),
+        positions={
+            "rotations": wrong,
+            "origins": design.positions.origins + [[0]] + 0.2 * (wrong[:, 0] != wrong[0, 0]),
+        },
     )
     start = initial_state(design, x[seen])
     np.testing.assert_allclose(start.rotations, truth.rotations, rtol=0, atol=1e-10)
@@ -113,7 +120,7 @@ def test_starting_values_do_not_need_the_nominal_poses() -> None:
 
 def test_positions_that_share_too_few_balls_are_joined_by_the_nominal_plate() -> None:
     design = design_with("coordinates")
-    truth = replace(truth_of(design), balls=design.balls)
+    truth = replace(truth_of(design), balls=design.balls.places)
     readings, x = exact_readings(design, replace(truth, a=0 * truth.a))
     # Even balls in the first three positions, odd ones in the others: the two groups share none.
     seen = readings.ball % 2 == readings.position // 3
@@ -149,20 +156,22 @@ def test_readings_are_exact_to_rounding() -> None:
     design = design_with("distances", full=True)
     truth = truth_of(design, errors=1e-3)
     readings, x = exact_readings(design, truth)
-    p = design.probes[readings.probe]
+    p = design.probes.offsets[readings.probe]
     back = x + design.model.error(x, truth.a, p)
     true = np.einsum("mij,mj->mi", truth.rotations[readings.position], truth.balls[readings.ball])
     np.testing.assert_allclose(back, true + truth.origins[readings.position], rtol=0, atol=5e-16)
 
 
 def test_noise_has_the_stated_size_and_seed() -> None:
-    design = replace(design_with("distances"), repeatability=np.array([1e-7, 2e-7, 4e-7]))
+    design = altered(
+        design_with("distances"), machine={"repeatability": np.array([1e-7, 2e-7, 4e-7])}
+    )
     truth = truth_of(design)
     _, exact = exact_readings(design, truth)
     _, x = noisy_readings(design, truth, np.random.default_rng(8))
     _, again = noisy_readings(design, truth, np.random.default_rng(8))
     np.testing.assert_array_equal(x, again)
-    spread = (x - exact).std(axis=0) / design.repeatability
+    spread = (x - exact).std(axis=0) / design.machine.repeatability
     assert np.all(np.abs(spread - 1) < 4 / np.sqrt(2 * len(x)))
 
 

@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import compare, in_reference_basis
 from tests.reference import dense
+from tests.reference.designs import altered
 from tests.reference.standards import POSES, bar, experiment, flat, spatial
 
 Real = NDArray[np.float64]
@@ -124,15 +125,21 @@ def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) 
     """
     design = lay_out(CASES[name](tmp_path))
     random, nominal = np.random.default_rng(3), nominal_state(design)
-    of_plate = np.zeros((len(design.balls), 1))
+    of_plate = np.zeros((len(design.balls.places), 1))
     of_plate[design.plate_balls] = 1.0
-    turn = 1e-3 * random.standard_normal((len(design.origins), 3)) * ~design.held[:, 3:]
+    turn = (
+        1e-3
+        * random.standard_normal((len(design.positions.origins), 3))
+        * ~design.positions.held[:, 3:]
+    )
     state = State(
         nominal.balls + 1e-5 * of_plate * random.standard_normal(nominal.balls.shape),
         rotation_from_vector(turn) @ nominal.rotations,
         nominal.origins
-        + 1e-4 * random.standard_normal(nominal.origins.shape) * ~design.held[:, :3],
+        + 1e-4 * random.standard_normal(nominal.origins.shape) * ~design.positions.held[:, :3],
         1e-5 * random.standard_normal(nominal.a.shape),
+        nominal.probes,
+        nominal.lengths,
     )
     scatter = random.standard_normal((len(design.readings), 3))
     x = expected_readings(design, nominal, design.readings) + 1e-6 * scatter
@@ -287,20 +294,20 @@ def physical(
     from what it truly is; the design has a reading for each of the readings drawn.
     """
     design = lay_out(made)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(made.true_machine, design.model, *corners)
     )
     balls = truth.balls.copy()
-    balls[~design.is_plate[design.ball_artefact]] += 2e-5 * generator.standard_normal(3)
+    balls[~design.artefacts.is_plate[design.balls.artefact]] += 2e-5 * generator.standard_normal(3)
     off = 2e-5 * generator.standard_normal(balls.shape)
     # What is drawn in line or in a plane stays there.
-    standard = np.flatnonzero(~design.is_plate[design.ball_artefact])
-    extent = np.ptp(design.balls[standard], axis=0) > 0.0
+    standard = np.flatnonzero(~design.artefacts.is_plate[design.balls.artefact])
+    extent = np.ptp(design.balls.places[standard], axis=0) > 0.0
     balls[standard] += off[standard] * extent
     truth = replace(truth, balls=balls)
     _, exact = exact_readings(on_truth, truth)
-    x = exact + design.repeatability * generator.standard_normal(exact.shape)
+    x = exact + design.machine.repeatability * generator.standard_normal(exact.shape)
     given = design.lengths
     ends = [balls[design.readings.ball[k]] for k in (given.first, given.second)]
     error = generator.standard_normal(int(given.certificate.max()) + 1)[given.certificate]
@@ -368,7 +375,11 @@ def test_estimators_of_distances_take_the_same_lengths(
 
 def without_plate(design: Design) -> Design:
     """Only the lengths count; the plate's readings stay, of no artefact that is estimated."""
-    return replace(design, is_plate=np.zeros_like(design.is_plate), held=np.ones_like(design.held))
+    return altered(
+        design,
+        artefacts={"is_plate": np.zeros_like(design.artefacts.is_plate)},
+        positions={"held": np.ones_like(design.positions.held)},
+    )
 
 
 def weighted(design: Design, x: Real) -> tuple[Real, Real]:
@@ -381,7 +392,7 @@ def weighted(design: Design, x: Real) -> tuple[Real, Real]:
     )
 
     def off(a: Real) -> Real:
-        seen = x + design.model.error(x, a, design.probes[design.readings.probe])
+        seen = x + design.model.error(x, a, design.probes.offsets[design.readings.probe])
         return 1e6 * (np.linalg.norm(seen[given.first] - seen[given.second], axis=1) - given.value)
 
     a = np.zeros(len(design.model.parameters))
@@ -406,7 +417,7 @@ def test_length_equations_of_shared_balls(
     equations = independent * len(POSES)
     assert (found.equations, found.degrees_of_freedom) == (equations, equations - 6)
     given = design.lengths
-    seen = x + design.probes[design.readings.probe]
+    seen = x + design.probes.offsets[design.readings.probe]
     difference = seen[given.first] - seen[given.second]
     rows = np.stack(
         [difference[:, i] * difference[:, j] for i in range(3) for j in range(3)], axis=1

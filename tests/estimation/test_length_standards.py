@@ -60,7 +60,7 @@ def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions:
     found = predict(experiment)
     assert found.verdict.deficiency == 0
     design = lay_out(experiment)
-    plate = design.balls[design.is_plate[design.ball_artefact]]
+    plate = design.balls.places[design.artefacts.is_plate[design.balls.artefact]]
     longest = max(float(np.linalg.norm(one - other)) for one in plate for other in plate)
     assert 0.999 <= found.quantities["U5"].maximum / (20e-6 * longest / 0.4) < 1.001
 

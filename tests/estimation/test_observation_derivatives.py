@@ -44,8 +44,8 @@ def perturbed(design: Design, seed: int = 3) -> State:
     generator = np.random.default_rng(seed)
     layout = shared_layout(design)
     shared = 1e-3 * generator.standard_normal(len(layout))
-    balls = 1e-2 * generator.standard_normal(design.balls.shape)
-    return moved(design, nominal_state(design), layout.pose_columns, shared, balls, layout.model)
+    balls = 1e-2 * generator.standard_normal(design.balls.places.shape)
+    return moved(nominal_state(design), layout, shared, balls)
 
 
 def test_readings(design: Design) -> None:
@@ -55,10 +55,10 @@ def test_readings(design: Design) -> None:
     blocks = reading_blocks(design, state, chosen, x)
 
     def residual(shared: np.ndarray, balls: np.ndarray) -> np.ndarray:
-        there = moved(design, state, layout.pose_columns, shared, balls, layout.model)
+        there = moved(state, layout, shared, balls)
         return reading_blocks(design, there, chosen, x).residual
 
-    zero, still = np.zeros(len(layout)), np.zeros(design.balls.shape)
+    zero, still = np.zeros(len(layout)), np.zeros(design.balls.places.shape)
     by_shared = central_difference(lambda s: residual(s, still), zero, STEP)
     assert_derivative(blocks.by_model, by_shared[:, :, layout.model], RELATIVE)
     columns = layout.pose_columns[chosen.position]
@@ -83,10 +83,10 @@ def test_calibration(design: Design, rows) -> None:  # type: ignore[no-untyped-d
     found = rows(design, state)
     given = design.distances if rows is distance_rows else design.coordinates
     expected = central_difference(
-        lambda b: rows(design, replace(state, balls=b.reshape(design.balls.shape))).residual,
+        lambda b: rows(design, replace(state, balls=b.reshape(design.balls.places.shape))).residual,
         state.balls.ravel(),
         STEP,
-    ).reshape(len(given), *design.balls.shape)
+    ).reshape(len(given), *design.balls.places.shape)
     dense = np.zeros_like(expected)
     rows_at = np.arange(len(given))
     if rows is distance_rows:

@@ -115,11 +115,10 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     shared = 1e-3 * generator.standard_normal(len(layout))
     balls = (
         1e-3
-        * generator.standard_normal(design.balls.shape)
-        * design.is_plate[design.ball_artefact][:, None]
+        * generator.standard_normal(design.balls.places.shape)
+        * design.artefacts.is_plate[design.balls.artefact][:, None]
     )
-    arguments = (layout.pose_columns, shared, balls, layout.model, layout.offset_columns)
-    state = moved(design, nominal_state(design), *arguments)
+    state = moved(nominal_state(design), layout, shared, balls)
     _, x = exact_readings(
         replace(
             design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))
@@ -131,17 +130,9 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     count = len(layout)
 
     def residual(step: np.ndarray) -> np.ndarray:
-        of_balls = np.zeros(design.balls.shape)
+        of_balls = np.zeros(design.balls.places.shape)
         of_balls[members] = step[count:].reshape(-1, 3)
-        there = moved(
-            design,
-            state,
-            layout.pose_columns,
-            step[:count],
-            of_balls,
-            layout.model,
-            layout.offset_columns,
-        )
+        there = moved(state, layout, step[:count], of_balls)
         return all_residuals(design, there, x)
 
     size = np.concatenate([np.minimum(layout.scale, 1.0), np.ones(3 * len(members))]) * 1e-4
@@ -288,7 +279,7 @@ def test_offsets_come_back(written: Callable[[str], Path], tmp_path: Path) -> No
     truth = replace(
         nominal_state(design),
         a=true_parameters(experiment.true_machine, design.model),
-        probes=design.probes + shift,
+        probes=design.probes.offsets + shift,
     )
     # The certificate of probe "left" must be right for exact data to fit exactly.
     priors = design.priors
@@ -316,7 +307,7 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
     truth = replace(
         nominal_state(drawn),
         a=true_parameters(experiment.true_machine, drawn.model),
-        probes=drawn.probes,
+        probes=drawn.probes.offsets,
     )
     sums, deviations = [], []
     for seed in range(25):
@@ -330,7 +321,6 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
         layout = shared_layout(design)
         spread = linearised_fit(design, found).of_shared(np.eye(len(layout)))
         columns = layout.offset_columns[1:]
-        assert found.state.probes is not None
-        deviations.append((found.state.probes - drawn.probes)[1:] / spread[columns])
+        deviations.append((found.state.probes - drawn.probes.offsets)[1:] / spread[columns])
     assert np.mean(sums) == pytest.approx(freedom, abs=4 * np.sqrt(2 * freedom / len(sums)))
     assert 0.7 < np.std(deviations) < 1.3

@@ -56,7 +56,7 @@ def test_groups_of_readings_with_their_own(tmp_path: Path) -> None:
     design = lay_out(load(written(tmp_path, TEXT.replace(old, groups + "\n  - {name: x high")))[0])
     weights = reading_weights(design, design.readings)
     left = (design.readings.position == 2) & (
-        design.readings.probe == list(design.probe_names).index("left")
+        design.readings.probe == list(design.probes.names).index("left")
     )
     np.testing.assert_allclose(weights[left], np.tile([1e7, 5e6, 1 / 3e-7], (25, 1)))
     np.testing.assert_allclose(weights[~left], 5e6)

@@ -19,7 +19,14 @@ from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 
 from tests.estimation.test_gauss_newton import exactly_calibrated, truth_of
-from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
+from tests.reference.designs import (
+    altered,
+    corner_sides,
+    grid,
+    neighbours,
+    plate_design,
+    six_positions,
+)
 
 ALL = np.array(list(combinations(range(16), 2)))
 
@@ -55,8 +62,8 @@ def objective(
 ) -> float:
     """What the estimator minimises, term by term."""
     readings = design.readings
-    corrected = x + design.model.error(x, a, design.probes[readings.probe])
-    rough = x + design.probes[readings.probe]
+    corrected = x + design.model.error(x, a, design.probes.offsets[readings.probe])
+    rough = x + design.probes.offsets[readings.probe]
     places = sorted(
         {(int(k), int(p)) for k, p in zip(readings.position, readings.probe, strict=True)}
     )
@@ -88,7 +95,7 @@ def objective(
             along = rough[first] - rough[second]
             along = along / np.linalg.norm(along)
             lengths.append(float(np.linalg.norm(corrected[first] - corrected[second])))
-            variances.append(float(2 * (along**2 @ design.repeatability**2)))
+            variances.append(float(2 * (along**2 @ design.machine.repeatability**2)))
         certified = known.get((i, j))
         if estimator == "distances":
             values, spread = list(lengths), list(variances)
@@ -139,7 +146,9 @@ def test_without_a_calibrated_distance_the_scale_is_open(estimator: AlternativeN
     design = replace(
         design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
     )
-    truth = replace(truth_of(design), a=np.zeros(len(design.model.parameters)), balls=design.balls)
+    truth = replace(
+        truth_of(design), a=np.zeros(len(design.model.parameters)), balls=design.balls.places
+    )
     readings, x = exact_readings(design, truth)
     found = alternative_estimate(replace(design, readings=readings), x, ALL, estimator)
     assert found.deficiency == 1
@@ -150,7 +159,7 @@ def test_without_a_calibrated_distance_the_scale_is_open(estimator: AlternativeN
 def test_repeated_readings_are_combined() -> None:
     design, x = observed(small())
     twice = replace(design, readings=design.readings.select(np.repeat(np.arange(len(x)), 2)))
-    smaller = replace(design, repeatability=design.repeatability / np.sqrt(2))
+    smaller = altered(design, machine={"repeatability": design.machine.repeatability / np.sqrt(2)})
     a, b = (
         alternative_estimate(twice, np.repeat(x, 2, axis=0), ALL),
         alternative_estimate(smaller, x, ALL),

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.reference import dense
-from tests.reference.designs import corner_sides, grid, plate_design, six_positions
+from tests.reference.designs import altered, corner_sides, grid, plate_design, six_positions
 
 Real = NDArray[np.float64]
 
@@ -55,7 +55,9 @@ def design_of(positions: tuple[int, ...], certificate: str, repeatability: float
     n = len(design.model.parameters)
     none, empty = np.zeros(0, np.int64), np.zeros(0)
     priors = Priors((), none, none, none, np.zeros((0, n)), empty, empty)
-    return replace(design, priors=priors, points=np.random.default_rng(3).random((6, 3)))
+    return altered(
+        design, priors=priors, evaluation={"points": np.random.default_rng(3).random((6, 3))}
+    )
 
 
 def with_known(design: Design, known: Known) -> Design:
@@ -72,7 +74,7 @@ def with_known(design: Design, known: Known) -> Design:
             )
         return _with_prior(design, -1, -1, row, u)
     if known.kind == "pose":
-        free = np.argwhere(~design.held)
+        free = np.argwhere(~design.positions.held)
         # Of what is held nothing can be known.
         position, component = free[draw.integers(len(free))].tolist() if len(free) else (-1, -1)
         return _with_prior(design, position, component, np.zeros(len(design.model.parameters)), u)
@@ -80,7 +82,7 @@ def with_known(design: Design, known: Known) -> Design:
         readings = design.readings
         uncertainty = readings.uncertainty
         if uncertainty is None:
-            uncertainty = np.tile(design.repeatability, (len(readings), 1))
+            uncertainty = np.tile(design.machine.repeatability, (len(readings), 1))
         uncertainty = uncertainty.copy()
         at = int(draw.integers(0, len(readings))), int(draw.integers(0, 3))
         uncertainty[at] = min(u, uncertainty[at])
@@ -88,7 +90,7 @@ def with_known(design: Design, known: Known) -> Design:
     if known.kind == "distance":
         first, second = draw.choice(9, 2, replace=False).tolist()
         old = design.distances
-        value = np.sqrt(((design.balls[first] - design.balls[second]) ** 2).sum())
+        value = np.sqrt(((design.balls.places[first] - design.balls.places[second]) ** 2).sum())
         return replace(
             design,
             distances=CalibratedDistances(
@@ -106,7 +108,7 @@ def with_known(design: Design, known: Known) -> Design:
         coordinates=CalibratedCoordinates(
             np.append(given.ball, ball),
             np.append(given.axis, axis),
-            np.append(given.value, design.balls[ball, axis]),
+            np.append(given.value, design.balls.places[ball, axis]),
             np.append(given.uncertainty, u),
         ),
     )
@@ -116,7 +118,9 @@ def _with_prior(
     design: Design, position: int, component: int, row: Real, uncertainty: float
 ) -> Design:
     old = design.priors
-    value = design.origins[position, component] if position >= 0 and component < 3 else 0.0
+    value = (
+        design.positions.origins[position, component] if position >= 0 and component < 3 else 0.0
+    )
     return replace(
         design,
         priors=Priors(
@@ -133,9 +137,9 @@ def _with_prior(
 
 def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     """The dense reference's problem, its rows without their uncertainties, and these."""
-    alike = replace(
+    alike = altered(
         design,
-        repeatability=np.ones(3),
+        machine={"repeatability": np.ones(3)},
         distances=replace(design.distances, uncertainty=np.ones(len(design.distances))),
         coordinates=replace(design.coordinates, uncertainty=np.ones(len(design.coordinates))),
     )
@@ -143,7 +147,7 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     uncertainty = design.readings.uncertainty
     if uncertainty is None:
-        uncertainty = np.tile(design.repeatability, (len(design.readings), 1))
+        uncertainty = np.tile(design.machine.repeatability, (len(design.readings), 1))
     priors = np.zeros((len(design.priors), problem.parameters))
     start = problem.parameters - len(problem.a)
     known = design.priors

@@ -340,7 +340,7 @@ def test_certified_coordinates_of_many_balls(tmp_path: Path) -> None:
     )
     (tmp_path / "e.yaml").write_text(text)
     design = lay_out(load(tmp_path / "e.yaml")[0])
-    off = true_artefacts(design, np.random.default_rng(1)) - design.balls
+    off = true_artefacts(design, np.random.default_rng(1)) - design.balls.places
     assert 0.99 < off.std() / 0.2e-6 < 1.01 and abs(off.mean()) < 0.01e-6
 
 

@@ -43,7 +43,7 @@ def written(folder: Path, x: str = X, y: str = Y, more: str = "") -> Path:
 
 def machine_of(experiment: Experiment) -> TrueMachine:
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     return true_machine(experiment.true_machine, design.model, *corners)
 
 
@@ -83,10 +83,10 @@ def test_readings_of_a_measured_machine(tmp_path: Path) -> None:
     design = lay_out(experiment)
     on_truth, truth = on_true_machine(design, machine_of(experiment))
     readings, x = exact_readings(on_truth, truth)
-    p = design.probes[readings.probe]
+    p = design.probes.offsets[readings.probe]
     corrected = x + on_truth.model.error(x, truth.a, p)
     np.testing.assert_allclose(
-        corrected, design.balls[readings.ball] + [0.1, 0.1, 0.1], rtol=0, atol=1e-15
+        corrected, design.balls.places[readings.ball] + [0.1, 0.1, 0.1], rtol=0, atol=1e-15
     )
     assert np.abs(x + p - corrected).max() > 1e-6
 

@@ -174,7 +174,7 @@ def test_as_much_of_the_first_pose_is_held_as_the_certificate_leaves_open(
 ) -> None:
     (experiment,) = load(written(tmp_path, f"calibration: [{certificate}]\n"))
     design = lay_out(experiment)
-    assert design.held.sum(axis=1).tolist() == [held, 0, 0]
+    assert design.positions.held.sum(axis=1).tolist() == [held, 0, 0]
 
 
 def test_priors_of_poses_free_nothing(tmp_path: Path) -> None:
@@ -183,7 +183,7 @@ def test_priors_of_poses_free_nothing(tmp_path: Path) -> None:
     )
     prior = "priors: [{{parameter: '{}: origin x', standard_uncertainty: 1 um}}]\n"
     (experiment,) = load(written(tmp_path, certificate + prior.format("two")))
-    assert lay_out(experiment).held.sum(axis=1).tolist() == [6, 0, 0]
+    assert lay_out(experiment).positions.held.sum(axis=1).tolist() == [6, 0, 0]
     (experiment,) = load(written(tmp_path, certificate + prior.format("one")))
     with pytest.raises(ExperimentError) as raised:
         lay_out(experiment)

@@ -264,12 +264,12 @@ def dense_columns(design: Design) -> np.ndarray:
     blocks = reading_blocks(design, state, design.readings, x)
     m, d = blocks.residual.shape
     layout = shared_layout(design)
-    rows = np.zeros((m, d, design.balls.size + len(layout)))
+    rows = np.zeros((m, d, design.balls.places.size + len(layout)))
     for i in range(m):
         ball, place = design.readings.ball[i], layout.pose_columns[design.readings.position[i]]
         rows[i, :, d * ball : d * ball + d] = blocks.by_ball[i]
-        rows[i][:, design.balls.size + place[place >= 0]] = blocks.by_pose[i][:, place >= 0]
-        rows[i, :, design.balls.size + layout.model.start :] = blocks.by_model[i]
+        rows[i][:, design.balls.places.size + place[place >= 0]] = blocks.by_pose[i][:, place >= 0]
+        rows[i, :, design.balls.places.size + layout.model.start :] = blocks.by_model[i]
     tied = distance_rows(design, state)
     below = np.zeros((len(tied.residual), rows.shape[2]))
     for row, (one, other, along) in enumerate(

@@ -12,19 +12,28 @@ from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_bat
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations import CalibratedCoordinates, Lengths, Priors, Readings
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.experiment.model import Machine, Volume
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
 
-from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
+from tests.reference.designs import (
+    altered,
+    corner_sides,
+    grid,
+    neighbours,
+    plate_design,
+    six_positions,
+)
 
 
 def truth(design: Design, seed: int = 1, size: float = 2e-6) -> Truth:
     """Artefacts and poses a little off the drawing, on a machine with errors."""
     generator = np.random.default_rng(seed)
     drawn = nominal_state(design)
-    free = (~design.held[:, : design.dimension]).all(axis=1)
+    free = (~design.positions.held[:, : design.dimension]).all(axis=1)
     turn = rotation_from_vector(
-        1e-4 * generator.standard_normal((len(free), design.held.shape[1] - design.dimension))
+        1e-4
+        * generator.standard_normal((len(free), design.positions.held.shape[1] - design.dimension))
     )
     state = State(
         drawn.balls + 1e-5 * generator.standard_normal(drawn.balls.shape),
@@ -33,10 +42,12 @@ def truth(design: Design, seed: int = 1, size: float = 2e-6) -> Truth:
         size
         * generator.standard_normal(len(drawn.a))
         / [p.effect for p in design.model.parameters],
+        drawn.probes,
+        drawn.lengths,
     )
-    if design.free_offsets is not None:
-        moved = 1e-5 * design.free_offsets * generator.standard_normal(design.probes.shape)
-        state = replace(state, probes=design.probes + moved)
+    if design.probes.free.any():
+        moved = 1e-5 * design.probes.free * generator.standard_normal(design.probes.offsets.shape)
+        state = replace(state, probes=design.probes.offsets + moved)
     return Truth(state, design.model)
 
 
@@ -65,21 +76,30 @@ def with_length_standard(projected: bool) -> Design:
     """A step gauge of two marks beside the plate, in two places."""
     design = small()
     ends = np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0]])
-    n, k, m = len(design.balls), len(design.position_names), len(design.readings)
+    n, k, m = len(design.balls.places), len(design.positions.names), len(design.readings)
     direction = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     turned = np.array([np.eye(3), [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
-    return replace(
+    return altered(
         design,
-        artefact_names=("plate", "bar"),
-        is_plate=np.array([True, False]),
-        ball_names=(*design.ball_names, "left", "right"),
-        ball_artefact=np.append(design.ball_artefact, [1, 1]),
-        balls=np.concatenate([design.balls, ends]),
-        position_names=(*design.position_names, "bar x", "bar y"),
-        position_artefact=np.append(design.position_artefact, [1, 1]),
-        rotations=np.concatenate([design.rotations, turned]),
-        origins=np.concatenate([design.origins, [[0.1, 0.5, 0.5], [0.5, 0.1, 0.5]]]),
-        held=np.concatenate([design.held, np.ones((2, 6), bool)]),
+        artefacts={
+            "names": ("plate", "bar"),
+            "is_plate": np.array([True, False]),
+            "is_gauge": np.zeros(2, bool),
+        },
+        balls={
+            "names": (*design.balls.names, "left", "right"),
+            "artefact": np.append(design.balls.artefact, [1, 1]),
+            "places": np.concatenate([design.balls.places, ends]),
+        },
+        positions={
+            "names": (*design.positions.names, "bar x", "bar y"),
+            "artefact": np.append(design.positions.artefact, [1, 1]),
+            "rotations": np.concatenate([design.positions.rotations, turned]),
+            "origins": np.concatenate(
+                [design.positions.origins, [[0.1, 0.5, 0.5], [0.5, 0.1, 0.5]]]
+            ),
+            "held": np.concatenate([design.positions.held, np.ones((2, 6), bool)]),
+        },
         readings=Readings(
             np.append(design.readings.ball, [n, n + 1, n, n + 1]),
             np.append(design.readings.position, [k, k, k + 1, k + 1]),
@@ -104,7 +124,7 @@ def with_unknown_probes(lengths: bool) -> Design:
     and an origin.
     """
     design = with_length_standard(False) if lengths else small()
-    free = np.ones(design.probes.shape, bool)
+    free = np.ones(design.probes.offsets.shape, bool)
     free[0] = False
     of_model = np.zeros((15, len(design.model.parameters)))
     of_model[13, 3] = 1.0
@@ -113,10 +133,10 @@ def with_unknown_probes(lengths: bool) -> Design:
     if lengths:
         # The ends of the standard with probes of unknown offset.
         readings = replace(readings, probe=np.append(readings.probe[:-4], [0, 1, 2, 3]))
-    return replace(
+    return altered(
         design,
         readings=readings,
-        free_offsets=free,
+        probes={"free": free},
         priors=Priors(
             (*(f"offset {k}" for k in range(12)), "origin", "function", "turn"),
             np.append(np.full(12, -1), [2, -1, 3]),
@@ -136,26 +156,25 @@ def plane() -> Design:
     ball, position = np.tile(np.arange(16), 3), np.repeat(np.arange(3), 16)
     design = small()
     certified = np.repeat(np.arange(16), 2)
-    return replace(
+    return altered(
         design,
         model=MetricModel(scale="x"),
-        lower=np.zeros(2),
-        upper=np.ones(2),
-        repeatability=np.array([2e-7, 4e-7]),
-        probe_names=("tip",),
-        probes=np.zeros((1, 2)),
-        balls=balls,
-        position_names=("a", "b", "c"),
-        position_artefact=np.zeros(3, np.int64),
-        rotations=turns,
-        origins=np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.3]]),
-        held=np.zeros((3, 3), bool),
+        machine=Machine(Volume(np.zeros(2), np.ones(2)), np.array([2e-7, 4e-7])),
+        probes={"names": ("tip",), "offsets": np.zeros((1, 2)), "free": np.zeros((1, 2), bool)},
+        balls={"places": balls},
+        positions={
+            "names": ("a", "b", "c"),
+            "artefact": np.zeros(3, np.int64),
+            "rotations": turns,
+            "origins": np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.3]]),
+            "held": np.zeros((3, 3), bool),
+        },
         readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
         distances=small(pairs=False).distances,
         coordinates=CalibratedCoordinates(
             certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)
         ),
-        points=np.zeros((0, 2)),
+        evaluation={"points": np.zeros((0, 2))},
     )
 
 
@@ -167,7 +186,7 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
     plates = design.plate_readings
     for group in shared.groups:
         readings = design.readings.select(plates)
-        balls = np.arange(len(design.balls))[group.ball]
+        balls = np.arange(len(design.balls.places))[group.ball]
         own = plates[(readings.position == group.position) & np.isin(readings.ball, balls)]
         # A ball's repeats stand in the groups of a position in the order of the readings.
         earlier = [
@@ -176,7 +195,9 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
             if g.position == group.position and g.rows.start < group.rows.start
         ]
         for place, ball in enumerate(balls):
-            turn = sum(int((np.arange(len(design.balls))[g.ball] == ball).sum()) for g in earlier)
+            turn = sum(
+                int((np.arange(len(design.balls.places))[g.ball] == ball).sum()) for g in earlier
+            )
             row = own[design.readings.ball[own] == ball][turn]
             x[row] += drawn.moved[k, :, group.rows.start + place]
     given = design.lengths
@@ -208,8 +229,7 @@ def assert_agree(shared: Reference, found: Estimates, state: State, squares: flo
     assert_close(start.balls + own.balls[k].T, state.balls, own.balls)
     assert_close(start.origins + own.origins[k], state.origins, own.origins)
     assert_close(start.a + own.a[k], state.a, own.a)
-    if state.probes is not None and start.probes is not None:
-        assert_close(start.probes + own.offsets[k], state.probes, own.offsets)
+    assert_close(start.probes + own.offsets[k], state.probes, own.offsets)
     turned = rotation_from_vector(own.rotations[k]) @ start.rotations
     assert_close(turned, state.rotations, own.rotations)
     assert found.sum_of_squares[k] == pytest.approx(squares, rel=1e-6)
@@ -278,6 +298,6 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
 
 def test_a_deficient_design_has_no_replicates() -> None:
     design = replace(small(), distances=small(pairs=False).distances)
-    design = replace(design, probes=np.zeros_like(design.probes))
+    design = altered(design, probes={"offsets": np.zeros_like(design.probes.offsets)})
     with pytest.raises(RankDeficientError, match="deficient"):
         reference(design, truth(design))

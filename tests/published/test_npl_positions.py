@@ -230,8 +230,8 @@ def test_the_shipped_design_has_what_was_found(plate: Plate) -> None:
         corner, first, second, behind = pair
         for n, (place, turns) in enumerate(((corner, first), (3 - corner, second))):
             rotation, origin = plate.pose(plane, LEVELS[n], CORNERS[place], turns, behind)
-            np.testing.assert_allclose(design.rotations[2 * k + n], rotation, atol=1e-12)
-            np.testing.assert_allclose(design.origins[2 * k + n], origin, atol=1e-12)
+            np.testing.assert_allclose(design.positions.rotations[2 * k + n], rotation, atol=1e-12)
+            np.testing.assert_allclose(design.positions.origins[2 * k + n], origin, atol=1e-12)
 
 
 def test_what_was_found_stands_out_among_its_neighbours(plate: Plate) -> None:

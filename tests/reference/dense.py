@@ -158,16 +158,22 @@ class Problem:
     @property
     def plate_balls(self) -> list[int]:
         design = self.design
-        return [b for b in range(len(design.balls)) if design.is_plate[design.ball_artefact[b]]]
+        return [
+            b
+            for b in range(len(design.balls.places))
+            if design.artefacts.is_plate[design.balls.artefact[b]]
+        ]
 
     @property
     def free_poses(self) -> list[tuple[int, int]]:
         """Position and place among (origin, rotation vector) of every free pose parameter."""
         design = self.design
         plates = [
-            k for k in range(len(design.origins)) if design.is_plate[design.position_artefact[k]]
+            k
+            for k in range(len(design.positions.origins))
+            if design.artefacts.is_plate[design.positions.artefact[k]]
         ]
-        return [(k, j) for k in plates for j in range(6) if not design.held[k, j]]
+        return [(k, j) for k in plates for j in range(6) if not design.positions.held[k, j]]
 
     @cached_property
     def length_root(self) -> Real:
@@ -188,7 +194,7 @@ def planned(design: Any, position_coefficients: int, rotation_coefficients: int)
     readings = design.readings
     true = np.array(
         [
-            design.rotations[k] @ design.balls[b] + design.origins[k]
+            design.positions.rotations[k] @ design.balls.places[b] + design.positions.origins[k]
             for b, k in zip(readings.ball, readings.position, strict=True)
         ]
     )
@@ -196,10 +202,10 @@ def planned(design: Any, position_coefficients: int, rotation_coefficients: int)
     return Problem(
         design,
         functions,
-        true - design.probes[readings.probe],
-        design.rotations,
-        design.origins,
-        design.balls,
+        true - design.probes.offsets[readings.probe],
+        design.positions.rotations,
+        design.positions.origins,
+        design.balls.places,
         np.zeros(sum(f.free for f in functions)),
     )
 
@@ -225,7 +231,8 @@ def unpack(problem: Problem, step: Values) -> tuple[Values, Values, Values, Valu
 
 def corrected(problem: Problem, x: Real, a: Values, p: Real) -> Values:
     """Corrected points x + e(x, a, p)."""
-    return x + machine_error(problem.functions, problem.design.lower, problem.design.upper, x, a, p)
+    volume = problem.design.machine.volume
+    return x + machine_error(problem.functions, volume.lower, volume.upper, x, a, p)
 
 
 def length(difference: Values) -> Values:
@@ -237,10 +244,10 @@ def residuals(problem: Problem, step: Values) -> Values:
     """The whole residual vector, each row in units of its standard uncertainty."""
     design, readings = problem.design, problem.design.readings
     balls, rotations, origins, a = unpack(problem, step)
-    points = corrected(problem, problem.scales, a, design.probes[readings.probe])
+    points = corrected(problem, problem.scales, a, design.probes.offsets[readings.probe])
     true = np.einsum("mij,mj->mi", rotations[readings.position], balls[readings.ball])
-    misfit = (points - true - origins[readings.position]) / design.repeatability
-    of_plates = design.is_plate[design.ball_artefact[readings.ball]]
+    misfit = (points - true - origins[readings.position]) / design.machine.repeatability
+    of_plates = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
     # Repeats stand as rows of their own.
     rows = list(np.repeat(misfit[of_plates], readings.repeats[of_plates], axis=0).ravel())
     given = design.distances
@@ -274,14 +281,14 @@ def length_covariance(design: Any) -> Real:
     A length whose repeatability is ignored has nothing in common with any other.
     """
     given = design.lengths
-    m, d = len(given.first), len(design.repeatability)
+    m, d = len(given.first), len(design.machine.repeatability)
     noise = np.zeros((m, d * len(design.readings)))
     for i in range(m):
         if not given.with_repeatability[i]:
             continue
         for sign, end in ((1.0, given.first[i]), (-1.0, given.second[i])):
             own = design.readings.uncertainty
-            u = (design.repeatability if own is None else own[end]) / np.sqrt(
+            u = (design.machine.repeatability if own is None else own[end]) / np.sqrt(
                 design.readings.repeats[end]
             )
             noise[i, d * end : d * end + d] += sign * given.direction[i] * u
@@ -375,14 +382,16 @@ def quantities(problem: Problem) -> dict[str, Callable[[Values], Values]]:
 
     def points(step: Values) -> Values:
         a = unpack(problem, step)[3]
-        offsets = np.tile(design.probes[design.point_probe], (len(design.points), 1))
-        return corrected(problem, design.points, a, offsets)
+        offsets = np.tile(
+            design.probes.offsets[design.evaluation.probe], (len(design.evaluation.points), 1)
+        )
+        return corrected(problem, design.evaluation.points, a, offsets)
 
     def ball_distances(step: Values) -> Values:
         balls = unpack(problem, step)[0]
         found = []
-        for plate in np.flatnonzero(design.is_plate):
-            own = balls[design.ball_artefact == plate]
+        for plate in np.flatnonzero(design.artefacts.is_plate):
+            own = balls[design.balls.artefact == plate]
             first, second = pairs_of(len(own))
             found.append(length(own[first] - own[second]))
         return np.concatenate(found)

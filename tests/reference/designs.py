@@ -6,15 +6,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.objects import (
+    Artefacts,
+    Balls,
+    EvaluationPoints,
+    Positions,
+    Probes,
+    Tasks,
+    UnknownLengths,
+)
 from ballplate.simulator.design.observations import (
     CalibratedCoordinates,
     CalibratedDistances,
     Lengths,
     Readings,
 )
+from ballplate.simulator.experiment.model import Machine, Volume
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from numpy.typing import NDArray
@@ -153,21 +164,21 @@ def plate_design(
         model=kinematic_model(
             ARRANGEMENTS["MB2"], position_coefficients, rotation_coefficients, lower, upper
         ),
-        lower=np.array(lower),
-        upper=np.array(upper),
-        repeatability=np.array(repeatability),
-        probe_names=tuple(TIPS),
-        probes=np.array(list(TIPS.values())),
-        artefact_names=("plate",),
-        is_plate=np.array([True]),
-        ball_names=tuple(f"b{i}" for i in range(len(balls))),
-        ball_artefact=np.zeros(len(balls), np.int64),
-        balls=balls,
-        position_names=tuple(f"p{k}" for k in range(len(positions))),
-        position_artefact=np.zeros(len(positions), np.int64),
-        rotations=np.array([pose.rotation for pose in positions]),
-        origins=np.array([pose.origin for pose in positions]),
-        held=held,
+        machine=Machine(Volume(np.array(lower), np.array(upper)), np.array(repeatability)),
+        probes=Probes(
+            tuple(TIPS), np.array(list(TIPS.values())), np.zeros((len(TIPS), len(lower)), bool)
+        ),
+        artefacts=Artefacts(("plate",), np.array([True]), np.array([False])),
+        balls=Balls(
+            tuple(f"b{i}" for i in range(len(balls))), np.zeros(len(balls), np.int64), balls
+        ),
+        positions=Positions(
+            tuple(f"p{k}" for k in range(len(positions))),
+            np.zeros(len(positions), np.int64),
+            np.array([pose.rotation for pose in positions]),
+            np.array([pose.origin for pose in positions]),
+            held,
+        ),
         readings=Readings(ball, position, probe, np.ones(len(ball), np.int64)),
         distances=CalibratedDistances(
             first,
@@ -180,6 +191,22 @@ def plate_design(
             certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
         ),
         lengths=no_lengths(),
+        unknown_lengths=UnknownLengths((), np.zeros(0, np.int64), np.zeros(0)),
+        evaluation=EvaluationPoints(np.zeros((0, 3)), 0),
+        tasks=Tasks((), np.zeros((0, 2, 3)), np.zeros((0, 2), np.int64), ()),
+    )
+
+
+def altered(design: Design, **changes: Any) -> Design:
+    """The design with other fields, or parts of it with the other fields that a dictionary
+    states.
+    """
+    return replace(
+        design,
+        **{
+            name: replace(getattr(design, name), **other) if isinstance(other, dict) else other
+            for name, other in changes.items()
+        },
     )
 
 
@@ -199,4 +226,4 @@ def grid_experiment(n: int, points: int = 200, position_coefficients: int = 5) -
     design = plate_design(
         balls, six_positions(), corner_sides(balls), position_coefficients=position_coefficients
     )
-    return replace(design, points=np.random.default_rng(1).random((points, 3)))
+    return altered(design, evaluation={"points": np.random.default_rng(1).random((points, 3))})

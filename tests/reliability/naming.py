@@ -76,7 +76,7 @@ class World:
         """Size of a bias of which a unit changes scale readings by `change` (m, d), such as is
         found so often.
         """
-        rows = (change / self.design.repeatability).ravel()
+        rows = (change / self.design.machine.repeatability).ravel()
         return self._detectable(
             np.concatenate([rows, np.zeros(len(self.search.left.residual) - len(rows))])
         )
@@ -119,12 +119,14 @@ def swapped_ball(world: World, data: DataSet, generator: Generator) -> DataSet:
     """From one position on another ball is in its place, somewhere else on the plate."""
     readings = data.readings
     k, ball = (
-        int(generator.integers(1, len(world.design.position_names))),
+        int(generator.integers(1, len(world.design.positions.names))),
         int(generator.integers(25)),
     )
     later = (readings.ball == ball) & (readings.position >= k)
     change = np.zeros_like(data.x)
-    change[later] = (world.design.rotations @ direction(generator))[readings.position[later]]
+    change[later] = (world.design.positions.rotations @ direction(generator))[
+        readings.position[later]
+    ]
     first = int(np.flatnonzero(later)[0])
     return biased(world, data, change, Cause("moved", (first,)), generator)
 
@@ -144,7 +146,7 @@ def slip(where: str) -> Draw:
         rows = np.flatnonzero(readings.position == k)
         half = len(rows) // 2
         start = half if where != "elsewhere" else int(generator.integers(4, len(rows) - 4))
-        places = data.x + world.design.probes[readings.probe]
+        places = data.x + world.design.probes.offsets[readings.probe]
         arm = places - places[rows].mean(axis=0)
         moved = np.zeros(len(data.x), bool)
         moved[rows[start:]] = True
@@ -175,7 +177,7 @@ def certificate(world: World, data: DataSet, generator: Generator) -> DataSet:
 def expansion(positions: int) -> Draw:
     def draw(world: World, data: DataSet, generator: Generator) -> DataSet:
         some = np.sort(generator.choice(6, positions, replace=False))
-        places = data.x + world.design.probes[data.readings.probe]
+        places = data.x + world.design.probes.offsets[data.readings.probe]
         change = np.zeros_like(data.x)
         for k in some:
             rows = data.readings.position == k
@@ -188,7 +190,9 @@ def expansion(positions: int) -> Draw:
 def noise(world: World, data: DataSet, generator: Generator) -> DataSet:
     k = int(generator.integers(6))
     rows = data.readings.position == k
-    more = np.sqrt(8.0) * generator.standard_normal(data.x.shape) * world.design.repeatability
+    more = (
+        np.sqrt(8.0) * generator.standard_normal(data.x.shape) * world.design.machine.repeatability
+    )
     return replace(data, x=data.x + rows[:, None] * more, cause=Cause("scatter", (k,)))
 
 
@@ -250,7 +254,7 @@ def tilted_axes(world: World, data: DataSet, generator: Generator) -> DataSet:
     """
     along, about = int(generator.integers(3)), int(generator.integers(3))
     angle = 10e-6 * share(generator) * data.x[:, along]
-    turn = np.cross(np.eye(3)[about], data.x + world.design.probes[data.readings.probe])
+    turn = np.cross(np.eye(3)[about], data.x + world.design.probes.offsets[data.readings.probe])
     return replace(data, x=data.x - angle[:, None] * turn)
 
 

@@ -13,7 +13,7 @@ import pytest
 from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
-from ballplate.simulator.design.arrays import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
 from ballplate.simulator.estimation.hat import row_places, whitened_residuals
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import certified_coordinates, repeats, with_length_standard
 from tests.reference import dense
+from tests.reference.designs import altered
 from tests.reliability.designs import MIXED, PLANE, PLATE, experiment
 
 Real = NDArray[np.float64]
@@ -78,18 +79,9 @@ def dense_jacobian(design: Design) -> Real:
     balls, s = design.plate_balls, len(layout)
 
     def residuals(step: Real) -> Real:
-        shift = np.zeros_like(design.balls)
+        shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
-        there = moved(
-            design,
-            state,
-            layout.pose_columns,
-            step[:s],
-            shift,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
+        there = moved(state, layout, step[:s], shift)
         return whitened_residuals(design, layout, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
@@ -181,7 +173,7 @@ def test_repeats_and_lengths_that_share_a_certificate() -> None:
     np.testing.assert_allclose(result.redundancy[places.distances], 1.0 - hat[-7:-3], atol=1e-9)
     # A bias of one length, and of the certificate that two of them share.
     given = design.lengths
-    noise = (design.repeatability**2 * given.direction**2).sum(axis=1)
+    noise = (design.machine.repeatability**2 * given.direction**2).sum(axis=1)
     ends = 1.0 / design.readings.repeats[given.first] + 1.0 / design.readings.repeats[given.second]
     same = given.certificate[:, None] == given.certificate
     covariance = (
@@ -233,7 +225,7 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         later = (readings.ball == readings.ball[subject]) & (
             readings.position >= readings.position[subject]
         )
-        balls = design.balls.copy()
+        balls = design.balls.places.copy()
         balls[readings.ball[subject]] += step
         displaced = expected_readings(design, replace(state, balls=balls), readings)
         x[later] = displaced[later]
@@ -242,19 +234,19 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
     elif kind == "turn":
         vector = size * (np.eye(3)[axis] if design.dimension == 3 else np.ones(1))
         rows = np.flatnonzero(here)
-        places = x[rows] + design.probes[readings.probe[rows]]
+        places = x[rows] + design.probes.offsets[readings.probe[rows]]
         centre = places.mean(axis=0)
         turned = centre + (places - centre) @ rotation_from_vector(vector[None])[0].T
         late = rows >= given.start[k]
         x[rows[late]] += (turned - places)[late]
     elif kind == "expansion":
         rows = np.flatnonzero(here)
-        places = x[rows] + probe_offsets(design, state)[readings.probe[rows]]
+        places = x[rows] + state.probes[readings.probe[rows]]
         x[rows] += size * (places - places.mean(axis=0))
     elif kind == "probe":
-        probes = design.probes.copy()
+        probes = design.probes.offsets.copy()
         probes[subject] += step
-        return replace(design, probes=probes), x
+        return altered(design, probes={"offsets": probes}), x
     elif kind in ("distance", "coordinate", "prior"):
         field = {"distance": "distances", "coordinate": "coordinates", "prior": "priors"}[kind]
         items = getattr(design, field)
@@ -270,7 +262,7 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
             x,
         )
     elif kind == "scale":
-        of_plate = design.artefact_names[subject] == "plate"
+        of_plate = design.artefacts.names[subject] == "plate"
         assert of_plate
         larger = {
             field: replace(
@@ -300,7 +292,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
         sides = []
         for sign in (1.0, -1.0):
             biased, x = changed(design, given, k, 1e-6 * sign)
-            sides.append(whitened_residuals(biased, layout, state, x))
+            sides.append(whitened_residuals(biased, layout, nominal_state(biased), x))
         expected = (sides[0] - sides[1]) / 2e-6
         np.testing.assert_allclose(
             matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k]
@@ -318,8 +310,10 @@ def _some(indices: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 def distances_of(design: Design, state: State) -> tuple[Real, Real]:
     """Distances between all balls of the plate, and between all corrected evaluation points."""
     balls = state.balls[design.plate_balls]
-    offsets = np.broadcast_to(probe_offsets(design, state)[design.point_probe], design.points.shape)
-    points = design.points + design.model.error(design.points, state.a, offsets)
+    offsets = np.broadcast_to(state.probes[design.evaluation.probe], design.evaluation.points.shape)
+    points = design.evaluation.points + design.model.error(
+        design.evaluation.points, state.a, offsets
+    )
     found = []
     for places in (balls, points):
         first, second = np.triu_indices(len(places), 1)
@@ -344,10 +338,10 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_pa
         for k in _some(given.of_kind(kind), 2)
     ]
     for k in chosen:
-        if given.kind[k] == "scale" and given.design.artefact_names[given.subject[k]] != "plate":
+        if given.kind[k] == "scale" and given.design.artefacts.names[given.subject[k]] != "plate":
             continue
         biased, x = changed(design, given, k, size)
-        found = gauss_newton(biased, x, start)
+        found = gauss_newton(biased, x, nominal_state(biased))
         assert found.status == "converged"
         for symbol, was, now in zip(
             ("U5", "U6"), before, distances_of(biased, found.state), strict=True

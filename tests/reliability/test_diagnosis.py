@@ -114,7 +114,7 @@ def drawn(
     """
     given = experiment(folder, text)
     design = lay_out(given)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(given.true_machine, design.model, *corners)
     )
@@ -122,7 +122,7 @@ def drawn(
     noise = np.random.default_rng(seed).standard_normal(x.shape)
     noise[readings.position == LOUD] *= loud
     noise[:, 0] += waves * np.sin(x[:, 0] / 0.04)
-    observed = observe(design, readings, x + share * design.repeatability * noise)
+    observed = observe(design, readings, x + share * design.machine.repeatability * noise)
     return observed.design, observed.x
 
 

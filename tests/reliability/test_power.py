@@ -78,7 +78,7 @@ def basis_of(design: Design) -> Real:
     """The columns Q (rows, rank) of the hat matrix's root, dense."""
     linear = linearise(design)
     width, d = linear.balls.common.shape[2], design.dimension
-    basis = np.zeros((len(row_places(design)), width + d * len(design.balls)))
+    basis = np.zeros((len(row_places(design)), width + d * len(design.balls.places)))
     for some in hat_rows(linear, None):
         basis[some.rows, :width] = some.common
         at = np.flatnonzero(some.ball >= 0)
@@ -143,7 +143,7 @@ def biased(
     step = size * np.eye(design.dimension)[max(axis, 0) % design.dimension]
     number = np.repeat(np.arange(len(planned)), planned.repeats)
     here = readings.position == subject
-    places = x + design.probes[readings.probe]
+    places = x + design.probes.offsets[readings.probe]
     if kind == "reading":
         x[number == subject] += step
     elif kind == "ball":
@@ -199,7 +199,7 @@ class Fits:
     def __init__(self, folder: Path, text: str) -> None:
         self.experiment = experiment(folder, text)
         self.design = lay_out(self.experiment)
-        corners = tuple(self.design.lower.tolist()), tuple(self.design.upper.tolist())
+        corners = self.design.machine.volume.corners
         machine = true_machine(self.experiment.true_machine, self.design.model, *corners)
         self.on_truth, self.truth = on_true_machine(self.design, machine)
 

@@ -33,7 +33,7 @@ def fitted(text: str, folder: Path) -> tuple[Design, State, Real]:
     """A design with noisy readings, and the estimate from them."""
     given = experiment(folder, text)
     design = lay_out(given)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(given.true_machine, design.model, *corners)
     )
@@ -51,18 +51,9 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
     s = len(layout)
 
     def residuals(step: Real) -> Real:
-        shift = np.zeros_like(design.balls)
+        shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
-        there = moved(
-            design,
-            state,
-            layout.pose_columns,
-            step[:s],
-            shift,
-            layout.model,
-            layout.offset_columns,
-            layout.lengths,
-        )
+        there = moved(state, layout, step[:s], shift)
         return whitened_residuals(design, layout, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])

@@ -87,7 +87,7 @@ def test_a_bar_along_an_axis_shows_a_ball_along_that_axis_alone(tmp_path: Path) 
     given = reliability_of(design).patterns
     axes: dict[str, set[int]] = {}
     for k in given.of_kind("end").tolist():
-        place = design.position_names[design.readings.position[given.subject[k]]]
+        place = design.positions.names[design.readings.position[given.subject[k]]]
         axes.setdefault(place, set()).add(int(given.axis[k]))
     assert [axes[f"standard {k}"] for k in range(3)] == [{0}, {1}, {2}]
     # In the others the three are multiples of one another, and the largest stands for all.
@@ -116,7 +116,7 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     made = experiment(tmp_path, bar(4), KNOWN)
     design, start = lay_out(made), nominal_state(lay_out(made))
     x = expected_readings(design, start, design.readings)
-    x = x + design.repeatability * np.random.default_rng(3).standard_normal(x.shape)
+    x = x + design.machine.repeatability * np.random.default_rng(3).standard_normal(x.shape)
     wrong = int(np.setdiff1d(np.arange(len(x)), design.plate_readings)[1])
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)

@@ -70,7 +70,7 @@ def test_a_notebook_shows_a_figure(planar: Fit) -> None:
 def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
     prediction = bp.check(bp.quickstart())
     names = [text.get_text() for text in prediction.plot().axes[0].texts]
-    assert set(prediction.design.position_names) <= set(names)
+    assert set(prediction.design.positions.names) <= set(names)
     pool = {"candidates": [PLACES | {"probes": ["down"]}]}
     campaign = bp.plan(bp.quickstart().with_(pool=pool), positions=7)
     assert repr(campaign).startswith("<Campaign of quickstart: 7 of ") and len(repr(campaign)) < 100

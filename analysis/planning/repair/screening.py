@@ -54,10 +54,8 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
 
 def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
     design = base.at.design
-    own = np.flatnonzero(design.ball_artefact == design.artefact_names.index(item.artefact))[
-        item.pairs
-    ]
-    along = design.balls[own[:, 0]] - design.balls[own[:, 1]]
+    own = design.balls.of(design.artefacts.names.index(item.artefact))[item.pairs]
+    along = design.balls.places[own[:, 0]] - design.balls.places[own[:, 1]]
     along[:, item.dimensions :] = 0.0
     along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]
     moved = base.at.ball_null[own]
