@@ -8,7 +8,6 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, locations, nominal_state
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 # The eye: turned about z, then raised, in degrees.
 TURN, RISE = -35.0, 24.0
@@ -171,6 +170,9 @@ def hull(points: Array) -> Array:
     >>> hull(np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])).tolist()
     [[0.0, 0.0], [1.0, 1.0]]
     """
+    # Takes long to load, which checking a file must not.
+    from scipy.spatial import ConvexHull, QhullError
+
     ordered = np.unique(points, axis=0)
     try:
         corners = ordered[ConvexHull(ordered).vertices] if len(ordered) > 2 else ordered

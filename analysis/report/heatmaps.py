@@ -59,8 +59,8 @@ def heat_maps(results: ReportedSweep) -> list[Heat]:
 
 def _heat(results: ReportedSweep, i: int, j: int, measure: Measure) -> Heat:
     rows, columns = results.axes[i], results.axes[j]
-    row_of, row_labels = _grouped(rows)
-    column_of, column_labels = _grouped(columns)
+    row_of, column_of = rows.groups(MOST_VALUES), columns.groups(MOST_VALUES)
+    row_labels, column_labels = _labels(rows, row_of), _labels(columns, column_of)
     shape = len(row_labels), len(column_labels)
     open_ = partly_open(results, measure.symbol)
     figures = np.where(results.done, results.figure(measure.figure), np.nan)
@@ -118,20 +118,13 @@ def _members(place: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
     return np.split(order, np.searchsorted(place[order], np.arange(1, count)))
 
 
-def _grouped(axis: ReportAxis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
-    """Place of each value in the map, and the labels there: neighbouring values together where
-    there are many.
-    """
-    count = len(axis.labels)
-    if count <= MOST_VALUES:
-        return np.arange(count), axis.short_labels
+def _labels(axis: ReportAxis, group: NDArray[np.int64]) -> tuple[str, ...]:
+    """Labels of values, or of groups of neighbouring ones where there are many."""
+    if len(axis.labels) <= MOST_VALUES:
+        return axis.short_labels
     numbers = np.array(axis.numbers)
-    order = np.argsort(np.argsort(numbers, kind="stable"), kind="stable")
-    group = order * MOST_VALUES // count
     ends = [(numbers[group == k].min(), numbers[group == k].max()) for k in range(MOST_VALUES)]
-    return group, tuple(
-        f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends
-    )
+    return tuple(f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends)
 
 
 def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.error_maps.volumetric_errors import Volumetric
-from ballplate.report import volumetric
-from ballplate.report.svg import save
+from ballplate.presentation.svg import save
+from ballplate.report import volumetric_plots
 from ballplate.simulator.experiment.machine_file import load_machine
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -40,10 +40,10 @@ def test_names_and_ends_of_axes_stand_apart_inside_the_picture(
         drawn.append(("", figure.bbox))
         return save(figure, tmp_path / "grid.svg", arguments[-1])
 
-    monkeypatch.setattr(volumetric, "save", measured)
+    monkeypatch.setattr(volumetric_plots, "save", measured)
     machine = Volumetric(load_machine(path, []))
     found = machine.errors(machine.grid((2, 2, 2)))
-    volumetric.draw_grid(found, machine.diagonals(), (2, 2, 2), None, tmp_path / "grid.svg")
+    volumetric_plots.draw_grid(found, machine.diagonals(), (2, 2, 2), None, tmp_path / "grid.svg")
     *texts, (_, whole) = drawn
     assert sorted(text for text, _ in texts) == sorted(
         ["x, mm", "y, mm", "z, mm", "0", "0", "0", "800", "600", str(height)]

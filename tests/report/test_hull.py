@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.report.scene import hull
+from ballplate.presentation.scene import hull
 
 
 @pytest.mark.parametrize("seed", range(20))
