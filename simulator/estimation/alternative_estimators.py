@@ -41,6 +41,9 @@ from .covariance import EXACT, MICROMETRE
 from .gauss_newton import GaussNewtonSettings, Iteration, Status
 from .observations import length_rows
 
+# Share of a distance as read below which an estimate is no machine's.
+COLLAPSE_LIMIT = 0.5
+
 AlternativeName = Literal["distances", "cresto", "kruth"]
 
 
@@ -82,8 +85,8 @@ class _Points:
 
 @dataclass(frozen=True)
 class _Measured:
-    """Distances between two points of the same position (m,): pair (m,), points, and variance of
-    each.
+    """Distances between two points of the same position (m,): pair (m,), points, distance as read,
+    and variance of each.
 
     `calibrated`, `value` and `uncertainty` (c,) tell pairs whose distance is known. Sorted by pair,
     then place.
@@ -92,6 +95,7 @@ class _Measured:
     pair: Integers
     first: Integers
     second: Integers
+    length: Array
     variance: Array
     pairs: int
     calibrated: Integers
@@ -134,7 +138,7 @@ def alternative_estimate(
         count = len(residual)
         total = float(residual @ residual)
         record.append(Iteration(length, total))
-        if not np.isfinite(total):
+        if not (np.isfinite(total) and np.isfinite(derivative).all()):
             status = "diverged"
             break
         triangle = np.asarray(
@@ -193,11 +197,11 @@ def _measured(design: Design, points: _Points, pairs: Integers, across_probes: b
     pair, place = np.nonzero((first >= 0) & (second >= 0))
     first, second = first[pair, place], second[pair, place]
     # Along the line as drawn, so that weights stay what they are while parameters change.
-    along = _apart(points.x + design.probes.offsets[points.probe], first, second)[1]
+    length, along = _apart(points.x + design.probes.offsets[points.probe], first, second)
     variance = np.einsum("md,md->m", along**2, points.variance[first] + points.variance[second])
     calibrated = of.ravel()[len(pairs) :]
     return _Measured(
-        pair, first, second, variance, len(ends), calibrated, given.value, given.uncertainty
+        pair, first, second, length, variance, len(ends), calibrated, given.value, given.uncertainty
     )
 
 
@@ -205,7 +209,7 @@ def _apart(places: Array, first: Integers, second: Integers) -> tuple[Array, Arr
     """Lengths (m,) and directions (m, d) of the differences of two places each."""
     difference = places[first] - places[second]
     length = np.sqrt((difference**2).sum(axis=1))
-    return length, difference / length[:, None]
+    return length, difference / np.maximum(length, np.finfo(float).tiny)[:, None]
 
 
 def _all_rows(
@@ -217,6 +221,9 @@ def _all_rows(
     )
     jacobian = design.model.jacobian(points.x, a, p)
     by_model = np.einsum("md,mdn->mn", along, jacobian[measured.first] - jacobian[measured.second])
+    if (length < COLLAPSE_LIMIT * measured.length).any():
+        # Without a known length a machine that shrinks everything to a point fits best of all.
+        length = np.full_like(length, np.nan)
     found = [rows(measured, length, by_model)]
     if len(design.lengths):
         found.append(length_rows(design, replace(nominal_state(design), a=a), x))

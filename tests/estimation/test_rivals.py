@@ -156,6 +156,21 @@ def test_without_a_calibrated_distance_the_scale_is_open(estimator: AlternativeN
     assert {design.model.parameters[k].function for k in largest} == {"EXX", "EYY", "EZZ"}
 
 
+def test_a_machine_that_shrinks_everything_to_a_point_is_no_estimate() -> None:
+    """Without any known length the sum of squares of all distances is least where all are zero."""
+    design, x = observed(small())
+    design = replace(
+        design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
+    )
+    count = len(design.model.parameters)
+    parameters = [one.name for one in design.model.parameters]
+    point = np.zeros(count)
+    for name in ("EXX", "EYY", "EZZ"):
+        point[next(k for k, one in enumerate(parameters) if one.startswith(name))] = -0.999
+    found = alternative_estimate(design, x, ALL, start=point)
+    assert found.status == "diverged"
+
+
 def test_repeated_readings_are_combined() -> None:
     design, x = observed(small())
     twice = replace(design, readings=design.readings.select(np.repeat(np.arange(len(x)), 2)))
