@@ -120,7 +120,8 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | Non
         length = round_number(_longest(groups) or 1e-6)
         told = f"{1e6 * length:g} µm, magnified {times:,.0f} times"
         scale_bar(axes, 1e3 * length * times, -42.0 / height, told)
-        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -48.0 / height), borderaxespad=0.0)
+        if any(group.label for group in groups):
+            axes.legend(loc="upper left", bbox_to_anchor=(0.0, -48.0 / height), borderaxespad=0.0)
         return save(figure, path, f"{title}: residuals as vectors, magnified {times:g} times")
 
 
