@@ -34,6 +34,7 @@ DESCRIPTION = (
 )
 
 
+# In one piece: one option after the other, with its help.
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="measured points (CSV)")
     data = parser.add_argument_group("points")
