@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.inputs.yamltree import GivenText, read_text
 
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
@@ -120,6 +120,37 @@ def check(experiment: Experiment | PathLike) -> Prediction:
     from .results import study
 
     return study.check(_experiment(experiment), with_scale=True)
+
+
+def repair(path: PathLike, variant: str | None = None) -> str:
+    """The text of an experiment file after the cheapest changes that determine everything, of one
+    variant or of each; the rest of it is as it was, line ends included.
+
+    The text of a file that leaves nothing undetermined is returned as it is. Nothing is written.
+
+    :raises ExperimentError: the file is wrong; no changes were found, or they cannot be written
+        without changing what stands about them.
+
+    >>> before = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").splitlines()
+    >>> set(repair("designs/npl/6.1.1.yaml", variant="B").splitlines()).difference(before)
+    {'    positions[z low].quarter_turns: 1'}
+    """
+    from .planning.repair.mending import mended, to_write
+    from .planning.repair.repair_search import repairs
+    from .results import study
+    from .simulator.experiment.load import with_pool
+
+    text = read_text(Path(path))
+    for one in load_all(path) if variant is None else [load(path, variant)]:
+        judged = study.check(one).verdict
+        if not judged.deficiency:
+            continue
+        found = to_write(repairs(with_pool(one)), judged)
+        if found is None:
+            words = "no changes were found after which nothing is undetermined"
+            raise ExperimentError([one.message((), words)])
+        text = mended(text, Path(path), one.name, found)
+    return text
 
 
 def run(

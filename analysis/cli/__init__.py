@@ -33,18 +33,18 @@ def parser() -> argparse.ArgumentParser:
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
         epilog=(
-            "Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be"
-            " used, 70 an error of the program itself, 130 and 143 interrupted."
+            "Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot"
+            " be used, 70 an internal error, 130 or 143 interrupted."
         ),
     )
-    top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
+    top.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     top.add_argument(
         "--print-completion",
         action=PrintCompletion,
         choices=SHELLS,
         help=(
-            "print a script with which a shell completes commands, options, choices and names of"
-            " files, and leave"
+            "print a script for a shell that completes commands, options, choices and file"
+            " names, and exit"
         ),
     )
     commands = top.add_subparsers(

@@ -4,34 +4,37 @@ from __future__ import annotations
 
 import os
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_formats, percentage
+from .interruption import signatures, written
 from .outputs import UsageError
 from .telling import warn
 
 if TYPE_CHECKING:
-    from .check_files import CheckedDesign
+    from ..planning.requirements.goals import Goal
+    from .check_files import CheckedDesign, CheckedFile
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
-HELP = "judge whether designs determine all their parameters"
+HELP = "check whether designs determine all their parameters"
 DESCRIPTION = (
-    "Judge the rank of each design, and tell which share of lengths is within its target"
-    " and what carries its scale. The exit status is 0 if every deficiency is the one that"
-    " the file expects (none, where it says nothing), every --goal is met and, with"
-    " --fail-weak, nothing is weakly determined, otherwise 1; it is 3 if a file cannot be"
-    " used, and the others are then checked nevertheless."
+    "Determine the rank of each design, the share of lengths within its target, and"
+    " what carries its scale. The exit status is 0 if every rank deficiency is the one"
+    " that the file expects (by default none), every --goal is met and, with --fail-"
+    "weak, nothing is weakly determined; otherwise it is 1. It is 3 if a file cannot be"
+    " used; the other files are still checked."
 )
 
 
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     parser.epilog = (
-        "FILE may be a pattern such as designs/**/*.yaml, in which ** stands for any folders; files"
-        " in folders named sweeps or machines are then left out."
+        "FILE may be a pattern such as designs/**/*.yaml, where ** matches any number of"
+        " folders; files in folders named sweeps or machines are then left out."
     )
     add_formats(
         parser,
@@ -44,8 +47,24 @@ def add_options(parser: ArgumentParser) -> None:
         "--suggest",
         action="store_true",
         help=(
-            "tell the cheapest changes after which nothing is undetermined or weakly determined,"
+            "suggest the cheapest changes that leave nothing undetermined or weakly determined,"
             " each verified"
+        ),
+    )
+    parser.add_argument(
+        "--fix",
+        action="store_true",
+        help=(
+            "write the first repair that --suggest finds for a deficient design into its file,"
+            " keep the rest of the file as it is, and check the file again"
+        ),
+    )
+    parser.add_argument(
+        "--diff",
+        action="store_true",
+        help=(
+            "print what --fix would change as a unified diff, and write nothing; the exit"
+            " status is 1 if there is a change"
         ),
     )
     parser.add_argument(
@@ -53,68 +72,97 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         help=(
-            "what a design must reach, too, as in ballplate reach: lengths (U6 within"
-            " target_uncertainty), tasks, or a quantity such as "
-            '"U6 average 0.5 um"; may be repeated'
+            "goal that a design must also meet, as for ballplate reach: lengths (U6 within"
+            ' target_uncertainty), tasks, or a quantity such as "U6 average 0.5 um"; may be'
+            " repeated"
         ),
     )
     parser.add_argument(
         "--share",
         metavar="95%",
         type=percentage,
-        help="of the lengths that are to be within, with --goal lengths",
+        help="share of the lengths that must be within the target, with --goal lengths",
     )
     parser.add_argument(
         "--fail-weak",
         action="store_true",
-        help="let a design with a weakly determined direction fail, too",
+        help="also fail a design with a weakly determined direction",
     )
     parser.add_argument(
         "--no-modules",
         action="store_true",
-        help="refuse files with an error model in Python, which is code that loading them runs",
+        help="refuse files with an error model in Python, because loading them runs its code",
     )
 
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..planning.requirements.goals import GoalError, parse_goal
     from .check_files import Wanted, check_files
-    from .common import print_json, print_lines
-    from .excerpts import print_errors
+    from .common import print_json
     from .file_patterns import matching_files
-    from .github import advice_lines, annotation_lines
     from .junit import junit_report
+    from .progress import progress
 
-    workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
-    try:
-        with_share = {"lengths": options.share}
-        goals = tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
-    except GoalError as error:
-        raise UsageError(error) from None
-    if options.share is not None and "lengths" not in options.goal:
-        raise UsageError("--share goes with --goal lengths; add it")
-    files = []
-    wanted = Wanted(goals, options.fail_weak, options.suggest, not options.no_modules)
-    for checked in check_files(matching_files(options.files), options.variant, wanted):
-        files.append(checked)
-        warn(checked.doubts)
-        if options.format == "github":
-            for line in annotation_lines(checked, workspace):
-                print(line, flush=True)
-        elif options.format == "text":
-            for design in checked.designs:
-                print_lines([*design.plan.lines(), *advice_lines(design)])
-        if options.format in ("text", "json"):
-            print_errors(checked.messages, options)
+    goals = _goals(options)
+    is_repairing = options.fix or options.diff
+    if options.diff and options.format != "text":
+        raise UsageError(f"--diff does not go with --format {options.format}; leave one out")
+    wanted = Wanted(
+        goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
+    )
+    paths = matching_files(options.files)
+    if options.fix and not options.diff:
+        options.interruption.kept = partial(written, signatures(paths))
+    files, statuses = [], [AS_EXPECTED]
+    with progress(options) as shown:
+        for checked in check_files(paths, options.variant, wanted, shown.show):
+            shown.step_aside()
+            if is_repairing:
+                from .mending import with_repairs
+
+                checked, status = with_repairs(checked, wanted, options)
+                statuses.append(status)
+            files.append(checked)
+            _print(checked, options)
     if options.format == "junit":
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([one.plan.to_dict() | _asked(one, options.suggest) for one in designs])
+        print_json([one.plan.to_dict() | _asked(one, wanted.repairs) for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
-    return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED
+    if not all(checked.as_expected for checked in files):
+        statuses.append(NOT_AS_EXPECTED)
+    return max(statuses)
+
+
+def _goals(options: Namespace) -> tuple[Goal, ...]:
+    from ..planning.requirements.goals import GoalError, parse_goal
+
+    if options.share is not None and "lengths" not in options.goal:
+        raise UsageError("--share goes with --goal lengths; add it")
+    with_share = {"lengths": options.share}
+    try:
+        return tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
+    except GoalError as error:
+        raise UsageError(str(error)) from None
+
+
+def _print(checked: CheckedFile, options: Namespace) -> None:
+    from .common import print_lines
+    from .excerpts import print_errors
+    from .github import advice_lines, annotation_lines
+
+    warn(checked.doubts)
+    if options.format == "github":
+        workspace = os.environ.get("GITHUB_WORKSPACE")
+        for line in annotation_lines(checked, Path(workspace) if workspace else None):
+            print(line, flush=True)
+    elif options.format == "text" and not options.diff:
+        for design in checked.designs:
+            print_lines([*design.plan.lines(), *advice_lines(design)])
+    if options.format in ("text", "json"):
+        print_errors(checked.messages, options)
 
 
 def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class CheckedDesign:
     """The verdict on one design; `place` is where its file should change, None where nothing is to
-    be complained of.
+    be complained of, and `variant` its name in the file.
 
     `repairs` are changes that would determine what is open, None where nothing is or none were
     asked for. `goals` tell how each goal that was asked for is met, and `missed` what fails of
@@ -40,6 +41,7 @@ class CheckedDesign:
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
     certificate: ScaleCertificate | None = None
+    variant: str | None = None
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -82,15 +84,20 @@ class CheckedFile:
 
 
 def check_files(
-    files: Sequence[Path], variants: Sequence[str] = (), wanted: Wanted = Wanted()
+    files: Sequence[Path],
+    variants: Sequence[str] = (),
+    wanted: Wanted = Wanted(),
+    report: Report = unreported,
 ) -> Iterator[CheckedFile]:
     """Check all files, one after the other; with `variants` only designs of these names.
 
-    A variant that no file has is told last, as the error of all files together.
+    A variant that no file has is told last, as the error of all files together. What is reported
+    are files, the designs of a single file, or the search for repairs of a single design.
     """
     found: set[str | None] = set()
     complete = True
-    for path in files:
+    within = report if len(files) == 1 else unreported
+    for path in counted(files, "files", len(files), report) if len(files) > 1 else files:
         try:
             experiments = load(path, with_modules=wanted.with_modules)
             found |= {experiment.name for experiment in experiments}
@@ -98,7 +105,10 @@ def check_files(
             # What a plan may choose from is loaded where it is asked for only.
             pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
             doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
-            judged = tuple(_checked(one, pools.get(one.name), wanted) for one in chosen)
+            is_single = len(chosen) == 1
+            designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
+            of_search = within if is_single else unreported
+            judged = tuple(_checked(one, pools.get(one.name), wanted, of_search) for one in designs)
             yield CheckedFile(str(path), judged, (), doubts)
         except ExperimentError as error:
             complete = False
@@ -109,20 +119,22 @@ def check_files(
         yield CheckedFile(messages[0].file, (), messages)
 
 
-def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wanted) -> CheckedDesign:
+def _checked(
+    experiment: Experiment, with_pool: Experiment | None, wanted: Wanted, report: Report
+) -> CheckedDesign:
     plan = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
         from ..planning.repair.repair_search import repairs
         from ..planning.repair.scale import scale_certificate
 
-        found = repairs(with_pool)
+        found = repairs(with_pool, report=report)
         certificate = scale_certificate(with_pool, plan.scale)
     goals, missed = _goals(experiment, wanted.goals)
     if wanted.nothing_weak and plan.verdict.weak:
         count = len(plan.verdict.weak)
         missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
-    design = CheckedDesign(plan, None, found, goals, missed, certificate)
+    design = CheckedDesign(plan, None, found, goals, missed, certificate, experiment.name)
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (

@@ -35,7 +35,7 @@ def add_file(parser: ArgumentParser, several: bool = False) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="only this variant; may be repeated",
+        help="use only this variant; may be repeated",
     )
 
 
@@ -110,7 +110,7 @@ def add_workers(parser: Any) -> None:
         "--workers",
         metavar="N",
         type=count,
-        help="processes that share the work; default: one for each processor",
+        help="number of processes; default: one per processor",
     )
 
 

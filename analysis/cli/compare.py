@@ -11,10 +11,10 @@ PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "brace
 
 HELP = "compare an alternative estimator with the full one on synthetic data"
 DESCRIPTION = (
-    "Estimate synthetic data sets of the file's true machine with the full estimator and"
-    " with one that uses distances or lengths alone, and tell how far the distances that"
-    " both correct are apart (NPL Report CISE 15/98, section 6.2.7). The exit status is 0"
-    " if all estimates converged, otherwise 1."
+    "Estimate synthetic data sets of the file's true machine with the full estimator"
+    " and with one that uses distances or lengths alone, and compare the distances that"
+    " the two correct (NPL Report CISE 15/98, section 6.2.7). The exit status is 0 if"
+    " all estimates converged, otherwise 1."
 )
 
 
@@ -46,7 +46,7 @@ def add_options(parser: ArgumentParser) -> None:
             f"--published-{key}",
             metavar="LENGTH",
             type=_length,
-            help=f"a published {words} to place, such as '0.35 um'",
+            help=f"published {words} to compare with, such as '0.35 um'",
         )
     add_json(parser)
 
@@ -64,7 +64,7 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--across-probes",
         action="store_true",
-        help="use distances between balls read with different probes in the same position, too",
+        help="also use distances between balls read with different probes in the same position",
     )
 
 

@@ -82,6 +82,7 @@ def write_data_in_utf8(options: Namespace) -> None:
     is_data = (
         getattr(options, "json", False)
         or getattr(options, "prints_data", False)
+        or getattr(options, "diff", False)
         or getattr(options, "format", "text") in DATA_FORMATS
         or any(str(path) == "-" for _, path in named_paths(options))
     )

@@ -24,8 +24,8 @@ BAD_FILE = 3
 HELP = "write a sweep's results as CSV or Parquet"
 DESCRIPTION = (
     "Write a row for each cell of a store and a column for each figure, in metres and"
-    " radians, with the unit in the column's name. Of a damaged store these are the cells"
-    " that can be read; the exit status then is 3."
+    " radians, with the unit in the column's name. From a damaged store, the cells that"
+    " can be read are written, and the exit status is 3."
 )
 
 
@@ -47,10 +47,13 @@ def add_options(parser: ArgumentParser) -> None:
 def add_store(parser: ArgumentParser) -> None:
     """Add the store and the choice of a sweep in it."""
     parser.add_argument(
-        "store", metavar="STORE", type=Path, help="store that ballplate sweep has made"
+        "store", metavar="STORE", type=Path, help="store written by ballplate sweep"
     )
     parser.add_argument(
-        "--sweep", metavar="N", type=int, help="which sweep of the store; default: the newest"
+        "--sweep",
+        metavar="N",
+        type=int,
+        help="number of the sweep in the store; default: the newest",
     )
 
 

@@ -9,8 +9,7 @@ from .telling import note
 
 HELP = "write a commented experiment or machine file to start from"
 DESCRIPTION = (
-    "Write an experiment file with comments on what may be said, ready for check and run,"
-    " or a machine file, ready for map."
+    "Write a commented experiment file, ready for check and run, or a machine file, ready for map."
 )
 
 

@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -43,7 +43,7 @@ Signature = tuple[int, int, int]
 
 def files_named(options: Namespace) -> dict[Path, Signature | None]:
     """The files that the options of a command name, and whether they are there."""
-    return {path: _signature(path) for _, path in named_paths(options)}
+    return signatures(path for _, path in named_paths(options))
 
 
 def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
@@ -54,6 +54,11 @@ def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
         for one in value if isinstance(value, list) else [value]:
             if isinstance(one, Path):
                 yield name, one
+
+
+def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:
+    """Whether files are there, and what tells that one was written to."""
+    return {path: _signature(path) for path in paths}
 
 
 def _signature(path: Path) -> Signature | None:

@@ -25,13 +25,13 @@ MOST_PAIRS = 500_000
 
 HELP = "map the uncertainty of lengths over the volume against a target"
 DESCRIPTION = (
-    "Compute the standard uncertainty u of the length between every two points of a grid"
-    " over the volume, measured on the corrected machine, and compare it and the expanded"
-    " uncertainty k u with the target by length, direction and place. A target is meant for"
-    " u, or for U = k u where the file states a coverage_factor. The scatter of the"
-    " readings that will measure a length is no part of u unless asked for. The exit status"
-    " is 0 if the rank is as expected and, with --fail, all lengths are within the target,"
-    " otherwise 1."
+    "Compute the standard uncertainty u of the length between every two points of a"
+    " grid over the volume, measured on the corrected machine, and compare it and the"
+    " expanded uncertainty k u with the target by length, direction and place. The"
+    " target applies to u, or to U = k u where the file states a coverage_factor. The"
+    " scatter of the readings that will measure a length is not part of u unless"
+    " requested. The exit status is 0 if the rank is as expected and, with --fail, all"
+    " lengths are within the target, otherwise 1."
 )
 
 
@@ -40,23 +40,25 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--grid",
         metavar="N",
         type=_grid,
         default=(6,),
-        help="points along each axis, or such as 6,5,4; default 6",
+        help="points along each axis, or a number for each such as 6,5,4; default 6",
     )
     parser.add_argument(
-        "--probe", metavar="NAME", help="probe that measures them; default evaluation.probe"
+        "--probe",
+        metavar="NAME",
+        help="probe that measures the lengths; default: evaluation.probe",
     )
     parser.add_argument(
         "--coverage-factor",
         metavar="K",
         type=_factor,
-        help="of the expanded uncertainty; default that of the file, or 2",
+        help="coverage factor of the expanded uncertainty; default: that of the file, or 2",
     )
     parser.add_argument(
         "--fail",
@@ -66,7 +68,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--with-repeatability",
         action="store_true",
-        help="count the scatter of the two readings of a length, too",
+        help="include the scatter of the two readings that measure a length",
     )
     add_output(parser, "--csv", metavar="FILE", help="write a line for each point of the grid")
     add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")

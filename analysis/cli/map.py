@@ -24,12 +24,13 @@ if TYPE_CHECKING:
 POINTS = 21
 
 
-HELP = "volumetric errors of a machine, from its parametric errors"
+HELP = "compute volumetric errors of a machine from its parametric errors"
 DESCRIPTION = (
-    "Combine the parametric errors of a machine file to volumetric errors, systematic and"
-    " random: on a grid with the length errors of the four body diagonals, along a line"
-    " parallel to an axis, or one parametric error along its axis. Errors are where the tip"
-    " is, less where the scales say; the error of indication has the opposite sign."
+    "Combine the parametric errors of a machine file into volumetric errors, systematic"
+    " and random: on a grid with the length errors of the four body diagonals, along a"
+    " line, or one parametric error along its axis. An error is the position of the tip"
+    " minus the position that the scales indicate; the error of indication has the"
+    " opposite sign."
 )
 
 
@@ -59,14 +60,16 @@ def add_options(parser: ArgumentParser) -> None:
         "--points", metavar="N", type=_points, help="points along the line, at least 2; default 21"
     )
     add_picture(
-        parser, "--plot", help="draw it as well, in three dimensions or along the line or axis"
+        parser,
+        "--plot",
+        help="also draw the errors, in three dimensions or along the line or axis",
     )
     add_force(parser)
     parser.add_argument(
         "--magnification",
         metavar="N",
         type=count,
-        help="of errors in the drawing of the grid; default: as fits",
+        help="magnification of the errors in the drawing of the grid; default: one that fits",
     )
     add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import Message
 
 EXISTS = "exists already; name a new file, or overwrite it with --force"
-FORCE = "overwrite files that there are already"
+FORCE = "overwrite existing files"
 
 # Options that name files which name others, as experiment and machine files do.
 NAMING = ("files", "file", "earlier")
@@ -170,6 +170,18 @@ def check_outputs(options: Namespace) -> None:
         messages += _reasons_against(one, options.force)
     if messages:
         raise ExperimentError(messages)
+
+
+def check_overwritten(path: Path) -> None:
+    """Refuse a file that cannot be put in the place of the one that is there.
+
+    :raises ExperimentError: it cannot be written.
+    """
+    from ballplate.simulator.inputs.messages import ExperimentError
+
+    reasons = _reasons_against(Output("files", "--fix", path, None, False), force=True)
+    if reasons:
+        raise ExperimentError(reasons)
 
 
 def _refuse_screen(outputs: list[Output]) -> None:

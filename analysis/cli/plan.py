@@ -21,15 +21,12 @@ if TYPE_CHECKING:
 SHEETS = (".html", ".md", ".csv", ".txt")
 
 
-HELP = (
-    "choose positions and certificates from a pool, and tell how far from the best possible"
-    " they are"
-)
+HELP = "choose positions and certificates from a pool, and bound what any choice could achieve"
 DESCRIPTION = (
-    "Choose from the pool of an experiment file what makes a criterion smallest within a"
-    " budget, and bound what any choice could reach. Without a budget the choice may cost"
-    " what the positions of the file itself do. The exit status is 0 if the choice"
-    " determines everything, otherwise 1."
+    "Choose the positions and certificates from the pool of an experiment file that"
+    " minimise a criterion within a budget, and bound what any choice could achieve."
+    " Without a budget, the choice may cost as much as the positions in the file. The"
+    " exit status is 0 if the choice determines everything, otherwise 1."
 )
 
 
@@ -48,23 +45,26 @@ def add_options(parser: ArgumentParser) -> None:
         "--hours",
         metavar="H",
         type=_hours,
-        help="of laboratory time, with changes between positions",
+        help="laboratory time, including changes between positions",
     )
-    budget.add_argument("--positions", metavar="N", type=count, help="at most so many positions")
-    budget.add_argument("--readings", metavar="N", type=count, help="at most so many readings")
+    budget.add_argument("--positions", metavar="N", type=count, help="largest number of positions")
+    budget.add_argument("--readings", metavar="N", type=count, help="largest number of readings")
     again = parser.add_argument_group("a campaign that has begun")
     again.add_argument(
         "--done",
         metavar="CSV",
         type=Path,
-        help="readings already taken; their positions are kept, and the budget is for the rest",
+        help=(
+            "readings already taken; their positions are kept, and the budget is for the"
+            " remaining ones"
+        ),
     )
     again.add_argument(
         "--moved",
         action="store_true",
         help=(
-            "the artefact does not stand any more where it was read last: a position interrupted"
-            " there can only be set up again"
+            "the artefact no longer stands where it was last read; a position interrupted there"
+            " has to be set up again"
         ),
     )
     again.add_argument(
@@ -73,8 +73,8 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="FILE",
         type=Path,
         help=(
-            "a design chosen from this pool before, to compare with and go on from; default: the"
-            " positions as drawn"
+            "design chosen earlier from this pool, to compare with and to continue from;"
+            " default: the positions in the file"
         ),
     )
     output = parser.add_argument_group("output")
@@ -91,11 +91,11 @@ def add_options(parser: ArgumentParser) -> None:
     output.add_argument(
         "--curve", action="store_true", help="plan for smaller and larger budgets as well"
     )
-    add_picture(output, "--plot", help="draw the choice, its bound, gains, and the curve")
+    add_picture(output, "--plot", help="draw the choice, its bound, its gains and the curve")
     add_force(output)
     add_json(parser)
     parser.add_argument(
-        "--seed", type=whole, default=1, help="of the random starts of the search; default 1"
+        "--seed", type=whole, default=1, help="seed of the random starts of the search; default 1"
     )
     add_workers(parser)
 

@@ -62,6 +62,11 @@ class ProgressDisplay:
         self.bar.set_postfix_str(remark, refresh=False)
         self.bar.update(done - self.bar.n)
 
+    def step_aside(self) -> None:
+        """Take the bar away while something else is printed; the next report brings it back."""
+        if self.bar is not None:
+            self.bar.clear()
+
     def close(self) -> None:
         """Take the bar away, as the step has ended, and tell how long it took where that is asked
         for.

@@ -10,21 +10,25 @@ from .outputs import UsageError
 UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
 
 
-HELP = "tell which repeatability, certificate, repeats, balls or size meets a target"
+HELP = "find the repeatability, certificate, repeats, balls or size that meets a target"
 DESCRIPTION = (
-    "Solve for one unknown of a design at a time, the others as drawn: the largest"
-    " repeatability or certificate uncertainty, and the fewest repeats, fewest balls or"
-    " smallest plate that meet a goal. What is told is a value of three digits, or a whole"
-    " number, with which the file was planned; the next one fails. The exit status is 0 if"
-    " every unknown asked for has such a value (without --by: one of them), otherwise 1;"
-    " with --fail it is 0 if the design as drawn meets the goal, otherwise 1."
+    "Solve for one unknown of a design at a time, with the others as in the file: the"
+    " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"
+    " balls or smallest plate that meets a goal. Each answer is a value of three digits,"
+    " or a whole number, for which the design was computed and meets the goal; the next"
+    " value fails. The exit status is 0 if every unknown asked for has such a value"
+    " (without --by: one of them), otherwise 1; with --fail it is 0 if the design in the"
+    " file meets the goal, otherwise 1."
 )
 
 
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
-        "--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated"
+        "--by",
+        choices=UNKNOWNS,
+        action="append",
+        help="solve for this unknown only; may be repeated",
     )
     parser.add_argument(
         "--goal",
@@ -39,28 +43,28 @@ def add_options(parser: ArgumentParser) -> None:
         "--share",
         metavar="95%",
         type=percentage,
-        help="of the lengths that are to be within; default all",
+        help="share of the lengths that must be within the target; default: all",
     )
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--artefact",
         metavar="NAME",
-        help="the one that varies: its balls, size, calibrations and repeats",
+        help="artefact to vary: its balls, size, calibrations and repeats",
     )
     parser.add_argument(
         "--calibration",
         metavar="N",
         type=whole,
-        help="entry of the list that varies, the first is 0; default: all by the same factor",
+        help="index of the calibration entry to vary, from 0; default: all by the same factor",
     )
     parser.add_argument(
         "--fail",
         action="store_true",
-        help="end with exit status 1 unless the design as drawn meets the goal",
+        help="end with exit status 1 unless the design in the file meets the goal",
     )
     add_json(parser)
 

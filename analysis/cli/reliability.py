@@ -10,12 +10,12 @@ from functools import partial
 from .common import add_file, add_json, number
 from .outputs import UsageError, add_force, add_output, text_writer, write
 
-HELP = "tell which biases of readings and certificates would be noticed, and what the others do"
+HELP = "find which biases of readings and certificates would be noticed, and what the others change"
 DESCRIPTION = (
     "Compute the redundancy of every observation of a design, the smallest biases of"
-    " readings, certificates, probes and positions that a test of the residuals finds, and"
-    " what a bias just too small for it changes in the error function (U4), in distances"
-    " between balls (U5) and between corrected points (U6)."
+    " readings, certificates, probes and positions that a test of the residuals finds,"
+    " and the effect of a bias just too small to be found on the error function (U4) and"
+    " on distances between balls (U5) and between corrected points (U6)."
 )
 
 
@@ -26,7 +26,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="0.1%",
         type=_share,
         default=0.001,
-        help="chance that the test of one bias finds one where there is none; default 0.1%%",
+        help="chance that the test of one bias raises a false alarm; default 0.1%%",
     )
     parser.add_argument(
         "--power",

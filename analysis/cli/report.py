@@ -25,10 +25,10 @@ SUFFIXES = {
 
 HELP = "write a sweep's results as an HTML page, or its tables"
 DESCRIPTION = (
-    "Write what a sweep has found as one HTML page that needs no network: tables, plots,"
-    " rank, the best and the worst design. With --format text, markdown, csv or latex the"
-    " tables alone. Of a damaged store it tells of the cells that can be read; the exit"
-    " status then is 3."
+    "Write the results of a sweep as one HTML page that needs no network: tables,"
+    " plots, rank, the best and the worst design; with --format text, markdown, csv or"
+    " latex, the tables alone. From a damaged store, the cells that can be read are"
+    " reported, and the exit status is 3."
 )
 
 
@@ -51,9 +51,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--run-modules",
         action="store_true",
-        help=(
-            "run error models in Python that the sweep uses, which the drawings of its designs need"
-        ),
+        help="run the sweep's error models in Python, which drawings of its designs need",
     )
 
 

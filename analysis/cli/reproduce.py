@@ -10,18 +10,16 @@ from pathlib import Path
 from .common import trial_count
 from .outputs import UsageError
 
-HELP = (
-    "compute a document's published experiments, or certified problems, and set their"
-    " figures beside ours"
-)
+HELP = "compute published experiments or certified problems, and compare the figures"
 DESCRIPTION = (
     "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
-    " shipped designs. Every legible figure stands beside ours with the ratio and what the"
-    " comparison rests on; statements on rank, errata and open differences likewise. The"
-    " exit status is 0 if all of it agrees within what is stated, otherwise 1. certified:"
-    " solve the problems with certified answers, and tell how many digits agree; with"
-    " --results those of another program. The exit status is 0 if every rank and every"
-    " count is right and every quantity has an answer, otherwise 1."
+    " shipped designs. Every legible figure is printed beside the computed one, with the"
+    " ratio and the basis of the comparison, as are statements on rank, errata and open"
+    " differences. The exit status is 0 if everything agrees within the stated limits,"
+    " otherwise 1. certified: solve the problems with certified answers, and count the"
+    " digits that agree, or with --results those of another program. The exit status is"
+    " 0 if every rank and every count is right and every quantity has an answer,"
+    " otherwise 1."
 )
 
 
@@ -53,7 +51,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--results",
         metavar="FILE",
         type=Path,
-        help="with certified: score the answers in this JSON file instead of our own",
+        help="with certified: score the answers in this JSON file instead of ballplate's own",
     )
     parser.add_argument(
         "--quick", action="store_true", help="leave out what needs synthetic data sets (6.2.7)"

@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from ..montecarlo.experiments import Trials
 
 
-HELP = "tell the uncertainties U1 to U6 that a design will give"
+HELP = "predict the uncertainties U1 to U6 that a design will achieve"
 DESCRIPTION = (
-    "Compute the rank and the standard uncertainties U1 to U6 of a design at zero machine"
-    " error. With --trials, synthetic data sets of the file's true machine are estimated"
-    " too, and bias, spread and coverage stand beside the linearised uncertainties. The"
-    " exit status is 0 if the rank is as expected, otherwise 1."
+    "Compute the rank and the standard uncertainties U1 to U6 of a design at zero"
+    " machine error. With --trials, synthetic data sets of the file's true machine are"
+    " estimated as well, and their bias, spread and coverage are printed beside the"
+    " linearised uncertainties. The exit status is 0 if the rank is as expected,"
+    " otherwise 1."
 )
 
 
@@ -28,13 +29,13 @@ def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     group = parser.add_argument_group("Monte Carlo")
     group.add_argument(
-        "--trials", metavar="N", type=_trial_count, help="number of data sets, at most"
+        "--trials", metavar="N", type=_trial_count, help="largest number of data sets"
     )
     group.add_argument(
         "--until",
         metavar="1%",
         type=percentage,
-        help="stop when the ratios of spread to U are as accurate as this",
+        help="stop when the ratios of spread to U are known this accurately",
     )
     group.add_argument("--seed", type=whole, help="seed of the data sets, instead of the file's")
     add_workers(group)

@@ -14,9 +14,10 @@ from .telling import note
 
 HELP = "write synthetic readings of a design"
 DESCRIPTION = (
-    "Write readings that the file's true machine would give of artefacts that differ from"
-    " their certificates by the stated uncertainties, with noise of the stated"
-    " repeatability. The same seed gives the same readings, with and without --certificate."
+    "Write the readings that the file's true machine would give, of artefacts that"
+    " differ from their certificates within the stated uncertainties, with noise of the"
+    " stated repeatability. The same seed gives the same readings, with and without"
+    " --certificate."
 )
 
 
@@ -43,7 +44,9 @@ def add_options(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole, help="seed of the noise, instead of the file's")
     parser.add_argument(
-        "--exact", action="store_true", help="leave all noise out; artefacts are as drawn"
+        "--exact",
+        action="store_true",
+        help="leave out all noise; artefacts are as stated in the file",
     )
     add_force(parser)
 

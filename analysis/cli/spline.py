@@ -120,7 +120,9 @@ def add_options(parser: ArgumentParser) -> None:
     )
     output = parser.add_argument_group("output")
     output.add_argument(
-        "--evaluate", metavar="PLACES", help='values there too, such as "10 mm, 12.5 mm"'
+        "--evaluate",
+        metavar="PLACES",
+        help=('also print the values at these places, such as "10 mm, 12.5 mm"'),
     )
     output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
     add_output(
@@ -136,7 +138,10 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add_force(output)
     output.add_argument(
-        "--magnification", metavar="N", type=float, help="of the bars; default: one that suits"
+        "--magnification",
+        metavar="N",
+        type=float,
+        help="magnification of the bars; default: one that fits",
     )
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
 

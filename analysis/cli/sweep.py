@@ -24,9 +24,10 @@ BAD_FILE = 3
 
 HELP = "compute a family of experiments into a store"
 DESCRIPTION = (
-    "Compute every cell of a sweep file: rank, U1 to U6, Monte Carlo if it asks for trials."
-    " Each finished cell is stored on disk; started again, the command goes on where it"
-    " ended. The exit status is 0 if all cells are done, 1 if some have failed."
+    "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
+    " trials, Monte Carlo. Each finished cell is stored on disk; when started again, the"
+    " command continues where it stopped. The exit status is 0 if all cells are done, 1"
+    " if some have failed."
 )
 
 
@@ -47,14 +48,12 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="ADDRESS",
         help="compute on the dask.distributed cluster of this scheduler instead",
     )
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="compute cells again that have failed"
-    )
-    parser.add_argument("--fail-fast", action="store_true", help="end when a cell fails")
+    parser.add_argument("--retry-failed", action="store_true", help="compute failed cells again")
+    parser.add_argument("--fail-fast", action="store_true", help="stop when a cell fails")
     parser.add_argument(
         "--beside",
         action="store_true",
-        help="enter a changed sweep beside the one that is in the store",
+        help="add a changed sweep beside the one in the store",
     )
     parser.add_argument(
         "--folder",
@@ -63,8 +62,8 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         help=(
-            "a folder, besides those of the sweep file and of its base, whose files the sweep may"
-            " name; the store keeps a copy of them; may be repeated"
+            "further folder whose files the sweep may name, besides those of the sweep file and"
+            " of its base; the store keeps copies of these files; may be repeated"
         ),
     )
 

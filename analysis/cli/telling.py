@@ -18,13 +18,13 @@ def add_telling(parser: ArgumentParser) -> None:
         "-q",
         "--quiet",
         action="store_true",
-        help="tell no progress and no notes, but errors and warnings",
+        help="print errors and warnings only, no progress and no notes",
     )
     group.add_argument(
         "-v",
         "--verbose",
         action="store_true",
-        help="tell versions, the files that are read, and how long steps take",
+        help="also print versions, the files read, and the time that each step takes",
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, written_count
-from ..inputs.yamltree import Mapping, Mark, Node, mark_of, read_tree
+from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
 from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
 from .changes import node_of
@@ -39,7 +39,10 @@ from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
 
 def load(
-    path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True
+    path: str | os.PathLike[str],
+    planning: bool = False,
+    with_modules: bool = True,
+    text: str | None = None,
 ) -> tuple[Experiment, ...]:
     """Load an experiment file.
 
@@ -47,14 +50,15 @@ def load(
     are read from the folder it is in. For ``planning`` an experiment has its pool, and positions
     may be missing where there is one; otherwise what only the pool places is left out. Error models
     in Python are code that loading runs; without ``with_modules`` files that have any are refused,
-    and nothing is run.
+    and nothing is run. A ``text`` is read as what the file is to have.
 
     :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
         found.
     """
     source = Path(path)
     refused: list[Message] = []
-    root = with_present_keys(read_tree(source, refused))
+    written = read_text(source) if text is None else text
+    root = with_present_keys(parse_tree(written, str(source), refused))
     base_problems = Problems(root)
     trees = variant_trees(root, base_problems)
     if not with_modules:

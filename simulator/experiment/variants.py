@@ -77,7 +77,7 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
         places: dict[str, tuple[str, ...]] = {}
         for path, node in overrides.items.items():
             try:
-                place = _place(base, path)
+                place = place_of(base, path)
                 other = next((p for p, steps in places.items() if _overlap(steps, place)), None)
                 if other is not None:
                     raise ValueError(f'is part of the same place as "{other}"; replace it once')
@@ -96,7 +96,7 @@ def node_at(root: Node, path: str) -> Node | None:
     :raises ValueError: the path is malformed, or an entry of a list does not exist.
     """
     node: Node | None = root
-    for step in _place(root, path):
+    for step in place_of(root, path):
         node = child(node, int(step) if isinstance(node, Sequence) else step)
     return node
 
@@ -106,7 +106,7 @@ def is_same_place(root: Node, path: str, other: str) -> bool:
 
     :raises ValueError: as ``node_at``.
     """
-    return _overlap(_place(root, path), _place(root, other))
+    return _overlap(place_of(root, path), place_of(root, other))
 
 
 def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
@@ -130,7 +130,7 @@ def removed(root: Node, path: str) -> Node:
 
     :raises ValueError: the path is malformed, or nothing stands there.
     """
-    return _less(root, list(_place(root, path)), ())
+    return _less(root, list(place_of(root, path)), ())
 
 
 def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
@@ -160,8 +160,11 @@ def _steps(path: str) -> list[str]:
     return [ALIASES.get(step, step) for step in steps]
 
 
-def _place(root: Node, path: str) -> tuple[str, ...]:
-    """Steps of a path with entries of lists by index, so that one place has one name."""
+def place_of(root: Node, path: str) -> tuple[str, ...]:
+    """Steps of a path with entries of lists by index, so that one place has one name.
+
+    :raises ValueError: the path is malformed, or an entry of a list does not exist.
+    """
     node: Node | None = root
     found: list[str] = []
     for step in _steps(path):

@@ -184,4 +184,5 @@ def test_what_is_undetermined_has_no_value(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         np.isnan(plate.coordinates), np.isnan(plate.standard_uncertainties)
     )
-    assert all(np.isnan(e.value) for e in found.estimates if e.name in ("alpha", "gamma"))
+    without_value = {e.name for e in found.estimates if np.isnan(e.value)}
+    assert without_value >= {"alpha", "gamma"}

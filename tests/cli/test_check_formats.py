@@ -228,9 +228,9 @@ def test_a_junit_report_is_well_formed_for_any_text() -> None:
 def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Repairs of designs of the same name are looked for once."""
 
-    def repairs_of(experiment: Experiment) -> Repairs | None:
+    def repairs_of(experiment: Experiment, **others: Any) -> Repairs | None:
         if experiment.label not in known:
-            known[experiment.label] = repairs(experiment)
+            known[experiment.label] = repairs(experiment, **others)
         return known[experiment.label]
 
     known: dict[str, Repairs | None] = {}

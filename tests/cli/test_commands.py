@@ -302,7 +302,10 @@ def test_bad_files_give_messages_and_nothing_else(
         assert 'machine.repeatability: "0.2" has no unit; ' in err
         assert 'did you mean "down"?' in err and 'did you mean "position"?' in err
         assert "missing.yaml" in err and "Traceback" not in err
-        assert all(line.startswith(str(tmp_path)) for line in err.splitlines())
+        lines = err.splitlines()
+        # One each, and one for each position whose probe is mistyped.
+        assert len(lines) == 3 + text.count("probes: [down]}")
+        assert all(line.startswith(str(tmp_path)) for line in lines)
 
 
 def test_true_machine_that_the_model_cannot_be(

@@ -86,3 +86,21 @@ def test_no_bar_when_quiet(
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
         assert "351 lengths" in "".join(told(capsys, "lengths", QUICKSTART, "--grid", "3")[2])
         assert told(capsys, "lengths", QUICKSTART, "--grid", "3", "-q")[2] == []
+
+
+def test_check_shows_how_far_it_has_come(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Files, designs of a single one, or the search for repairs of a single design."""
+    gauge = "designs/hurt_foss/bryan-gauge.yaml"
+    plain = told(capsys, "check", gauge, "designs/quickstart.yaml")
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: True)
+    shown = told(capsys, "check", gauge, "designs/quickstart.yaml")
+    # A terminal's lines are wrapped.
+    assert (shown[0], shown[1].split()) == (plain[0], plain[1].split())
+    assert "2/2 files" in "".join(shown[2])
+    assert "5/5 designs" in "".join(told(capsys, "check", gauge)[2])
+    search = told(capsys, "check", gauge, "--variant", "radius unknown", "--suggest")
+    assert re.search(r"[0-9]/[0-9] kinds of changes, [0-9:]+ so far, ", "".join(search[2]))
+    assert told(capsys, "check", gauge, "-q")[2] == []
+    assert told(capsys, "check", "designs/quickstart.yaml")[2] == []

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import placed_only
@@ -77,14 +78,16 @@ class Repairs:
 
 
 @single_threaded
-def repairs(experiment: Experiment, most: int = MOST_TOLD) -> Repairs | None:
+def repairs(
+    experiment: Experiment, most: int = MOST_TOLD, report: Report = unreported
+) -> Repairs | None:
     """Repairs of an experiment's design, `most` at most; None where nothing is undetermined or
     weakly determined.
     """
     base = examine(experiment)
     if base.judged.is_cured:
         return None
-    return _Search(base, most).run()
+    return _Search(base, most).run(report)
 
 
 def effort(change: Change) -> float:
@@ -107,13 +110,14 @@ class _Search:
         self.together = int(np.clip(self.before.deficiency, FEWEST_TOGETHER, MOST_TOGETHER))
         self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
 
-    def run(self) -> Repairs:
+    def run(self, report: Report) -> Repairs:
         found = offers(self.base.experiment, self.before.deficiency > 0)
         self.seen = seen_by(self.base, [one for changes in found.values() for one in changes])
         self.ranks = {one: rank_of([said]) for one, said in self.seen.items()}
         best: dict[ChangeKind, tuple[Change, ...]] = {}
         singles: list[Change] = []
-        for kind, changes in found.items():
+        steps = counted(found.items(), "kinds of changes", len(found), report)
+        for kind, changes in steps:
             sound = sum(self.is_sound(self.judge(one)) for one in best.values())
             if sound >= self.most or (kind == ChangeKind.MODEL and sound > 1):
                 # To ask for less is the last resort.

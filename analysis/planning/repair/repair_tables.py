@@ -25,21 +25,22 @@ def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
         return []
     lines = []
     for k, one in enumerate(repairs.complete, start=1):
-        lines.append(f"repair {k}: {_changes(one)}: {_worth(one, judged)}")
+        lines.append(f"repair {k}: {changes_in_words(one)}: {_worth(one, judged)}")
         lines += [f"repair {k}, in the file: {edit}" for edit in one.edits]
     if not repairs.complete:
         tried = _tried(repairs)
         lines.append(f"repair: no changes were found after which nothing is open; {tried}")
     for one in repairs.partial:
         lines.append(
-            f"repair of {_directions(one, judged)} alone: {_changes(one)}: leaves"
+            f"repair of {_directions(one, judged)} alone: {changes_in_words(one)}: leaves"
             f" {_rank(one.deficiency)}"
         )
         lines += [f"repair of {_numbers(one)} alone, in the file: {edit}" for edit in one.edits]
     return lines
 
 
-def _changes(repair: Repair) -> str:
+def changes_in_words(repair: Repair) -> str:
+    """What a repair changes, as imperative sentences."""
     return "; and ".join(change.words for change in repair.changes)
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import yaml
 from ballplate.simulator.experiment.model import (
     Calibration,
     CoordinateCalibration,
@@ -22,7 +21,9 @@ from ballplate.simulator.geometry.positions import (
     QUARTER_TURNS,
     ball_coordinates,
 )
+from ballplate.simulator.inputs.messages import Step, format_path
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
+from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.machines.protocol import Array
 
 from .changes import ball_set, pair_set
@@ -32,13 +33,20 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Edit:
-    """A value that a file is to have at a path; `is_new` says that it goes to the end of the list
-    there.
+    """A value that a file is to have at a path, where positions go by their names; `is_new` says
+    that it goes to the end of the list there.
     """
 
-    path: str
+    steps: tuple[Step, ...]
     value: Any
     is_new: bool = False
+
+    @property
+    def path(self) -> str:
+        """The path as in messages and in overrides of variants."""
+        if self.steps[0] == "positions" and len(self.steps) == 2:
+            return f"positions[{self.steps[1]}]"
+        return format_path(self.steps)
 
     def __str__(self) -> str:
         return f"{'add to ' if self.is_new else ''}{self.path}: {flow(self.value)}"
@@ -51,37 +59,37 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
     """
     found = []
     for name, artefact in after.artefacts.items():
-        found += _fields(f"artefacts.{name}", before.artefacts[name], artefact)
-    found += _fields("error_model", before.error_model, after.error_model)
+        found += _fields(("artefacts", name), before.artefacts[name], artefact)
+    found += _fields(("error_model",), before.error_model, after.error_model)
     for name, offset in after.probes.items():
         if name not in before.probes:
-            found.append(Edit(f"probes.{name}", [written_length(v) for v in offset]))
+            found.append(Edit(("probes", name), [written_length(v) for v in offset]))
     known = {place.name: position_settings(before, place) for place in before.positions}
     for place in after.positions:
         settings = position_settings(after, place)
         if place.name not in known:
-            found.append(Edit("positions", settings, True))
+            found.append(Edit(("positions",), settings, True))
         elif settings != known[place.name]:
-            found.append(Edit(f"positions[{place.name}]", settings))
+            found.append(Edit(("positions", place.name), settings))
     for k, item in enumerate(after.calibration):
         said = calibration_settings(after, item)
         if k >= len(before.calibration):
-            found.append(Edit("calibration", said, True))
+            found.append(Edit(("calibration",), said, True))
             continue
         old = calibration_settings(before, before.calibration[k])
         found += [
-            Edit(f"calibration[{k}].{key}", value)
+            Edit(("calibration", k, key), value)
             for key, value in said.items()
             if value != old.get(key)
         ]
     return tuple(found)
 
 
-def _fields(path: str, before: Any, after: Any) -> list[Edit]:
-    if before is after:
+def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
+    if before == after:
         return []
     old, new = before.model_dump(), after.model_dump()
-    return [Edit(f"{path}.{key}", _plain(value)) for key, value in new.items() if value != old[key]]
+    return [Edit((*steps, key), _plain(value)) for key, value in new.items() if value != old[key]]
 
 
 def _plain(value: Any) -> Any:
@@ -225,15 +233,3 @@ def written_length(value: float) -> str:
     if abs(parse_length(text) - value) <= 1e-15:
         return text
     return f"{value!r} m"
-
-
-def flow(value: Any) -> str:
-    """Plain data as YAML in one line.
-
-    >>> flow({"name": "z low", "corner": {"x": "0 mm"}, "probes": ["a, b", "down"]})
-    "{name: z low, corner: {x: 0 mm}, probes: ['a, b', down]}"
-    """
-    text = yaml.safe_dump(
-        value, default_flow_style=True, width=float("inf"), sort_keys=False, allow_unicode=True
-    )
-    return str(text).removesuffix("\n...\n").strip()

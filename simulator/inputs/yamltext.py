@@ -1,0 +1,346 @@
+"""Changes of a YAML text at some places, with every other byte of it kept."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import yaml
+
+from .messages import ExperimentError, Message, Step, Steps, format_path
+from .yamltree import LOADER, Mark, parse_tree, resolve_scalar, to_python
+
+# What ends a line for YAML's parser.
+LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+# Anchors and tags before a value.
+PROPERTIES = re.compile(r"(?:[&!]\S*\s+)*")
+
+
+@dataclass(frozen=True)
+class TextChange:
+    """A value that is set at a path, where it may be new, appended to the list there, or
+    removed.
+    """
+
+    steps: Steps
+    value: Any = None
+    kind: Literal["set", "append", "remove"] = "set"
+
+
+@dataclass(frozen=True, eq=False)
+class _Span:
+    """Where a value stands: indices of its text, less spaces after it, and `column` of a block's
+    entries, from 0.
+
+    `entries` are keys, or indices, with the span of the key, or of the item, and of what stands
+    there.
+    """
+
+    start: int
+    end: int
+    kind: Literal["scalar", "alias", "list", "mapping"]
+    mark: Mark
+    column: int = 0
+    is_flow: bool = False
+    anchor: str | None = None
+    entries: tuple[tuple[Step, _Span, _Span], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Text:
+    """A text with the spans of its values; `scalars` has the indices of all, keys included, and
+    `aliases` what they refer to.
+    """
+
+    text: str
+    root: _Span
+    scalars: tuple[tuple[int, int], ...]
+    aliases: frozenset[str]
+
+
+def flow(value: Any) -> str:
+    """Plain data as YAML in one line.
+
+    >>> flow({"name": "z low", "corner": {"x": "0 mm"}, "probes": ["a, b", "1e-3"]})
+    "{name: z low, corner: {x: 0 mm}, probes: ['a, b', '1e-3']}"
+    """
+    return _dumped([value], flow_style=True)[1:-1]
+
+
+def with_changes(text: str, file: str, changes: Iterable[TextChange]) -> str:
+    """The text with changes made one after the other; it says nothing else than before besides.
+
+    :raises ExperimentError: a place that others refer to, or that refers to another; a comment
+        there would be lost; or the rest of the text would not mean the same.
+
+    >>> text = "plate: {balls: 5}  # ours\\n"
+    >>> with_changes(text, "example", [TextChange(("plate", "balls"), 6)])
+    'plate: {balls: 6}  # ours\\n'
+    """
+    for change in changes:
+        before = to_python(parse_tree(text, file))
+        spans = _spans(text, file)
+        text = _changed(spans, change)
+        try:
+            after = to_python(parse_tree(text, file))
+        except ExperimentError:
+            after = None
+        if after != changed_data(before, change):
+            raise _refusal(
+                _way(spans, change.steps)[-1],
+                change.steps,
+                "cannot be changed without the text about it; change it by hand",
+            )
+    return text
+
+
+def changed_data(data: Any, change: TextChange) -> Any:
+    """What plain data, with tuples for lists, become by a change.
+
+    >>> changed_data({"a": (1,)}, TextChange(("a",), 2, "append"))
+    {'a': (1, 2)}
+    """
+    step, rest = change.steps[0], change.steps[1:]
+    if isinstance(data, tuple):
+        assert isinstance(step, int)
+        items = list(data)
+        items[step] = _one_changed(items[step], rest, change)
+        return tuple(items)
+    if not rest and change.kind == "remove":
+        return {key: value for key, value in data.items() if key != step}
+    return {**data, step: _one_changed(data.get(step), rest, change)}
+
+
+def _one_changed(data: Any, rest: Steps, change: TextChange) -> Any:
+    if rest:
+        return changed_data(
+            {} if data is None else data, TextChange(rest, change.value, change.kind)
+        )
+    value = _as_read(change.value)
+    return (*(data or ()), value) if change.kind == "append" else value
+
+
+def _as_read(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _as_read(item) for key, item in value.items()}
+    return tuple(map(_as_read, value)) if isinstance(value, list | tuple) else value
+
+
+class _Dumper(yaml.SafeDumper):
+    """Puts a text in quotes that would be read as something else, by rules of YAML 1.1 or 1.2."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _represented(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = None if resolve_scalar(text) == text else "'"
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _represented)
+_Dumper.add_representer(tuple, _Dumper.represent_list)
+
+
+def _dumped(value: Any, flow_style: bool = False) -> str:
+    text = yaml.dump(
+        value,
+        Dumper=_Dumper,
+        default_flow_style=flow_style,
+        width=float("inf"),
+        sort_keys=False,
+        allow_unicode=True,
+    )
+    return str(text).removesuffix("\n...\n").strip()
+
+
+def _spans(text: str, file: str) -> _Text:
+    events: Iterator[Any] = iter(yaml.parse(text, Loader=LOADER))
+    scalars: list[tuple[int, int]] = []
+    aliases: set[str] = set()
+
+    def read(event: Any) -> _Span:
+        start, end = event.start_mark.index, event.end_mark.index
+        mark = Mark(file, event.start_mark.line + 1, event.start_mark.column + 1)
+        if isinstance(event, yaml.AliasEvent):
+            aliases.add(str(event.anchor))
+            return _Span(start, end, "alias", mark)
+        if isinstance(event, yaml.ScalarEvent):
+            # A block's end is where something else begins.
+            end = start + len(text[start:end].rstrip())
+            properties = PROPERTIES.match(text, start, end)
+            scalars.append((properties.end() if properties else start, end))
+            return _Span(start, end, "scalar", mark, anchor=event.anchor)
+        is_flow = text[start:end].endswith(("[", "{"))
+        entries: list[tuple[Step, _Span, _Span]] = []
+        is_list = isinstance(event, yaml.SequenceStartEvent)
+        closing = yaml.SequenceEndEvent if is_list else yaml.MappingEndEvent
+        for below in events:
+            if isinstance(below, closing):
+                break
+            key = read(below)
+            if is_list:
+                entries.append((len(entries), key, key))
+            else:
+                entries.append((below.value, key, read(next(events))))
+        stop = below.end_mark.index if is_flow else entries[-1][2].end
+        column = (mark if is_list or not entries else entries[0][1].mark).column - 1
+        kind: Literal["list", "mapping"] = "list" if is_list else "mapping"
+        return _Span(start, stop, kind, mark, column, is_flow, event.anchor, tuple(entries))
+
+    for event in events:
+        if not isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent):
+            break
+    root = read(event)
+    return _Text(text, root, tuple(scalars), frozenset(aliases))
+
+
+def _way(text: _Text, steps: Steps) -> list[_Span]:
+    """The values that a path leads through, as far as there are any."""
+    found = [text.root]
+    for step in steps:
+        below = next((value for key, _, value in found[-1].entries if key == step), None)
+        if below is None:
+            break
+        found.append(below)
+    return found
+
+
+def _refusal(span: _Span, steps: Steps, text: str) -> ExperimentError:
+    mark = span.mark
+    return ExperimentError([Message(mark.file, mark.line, mark.column, format_path(steps), text)])
+
+
+def _changed(text: _Text, change: TextChange) -> str:
+    way = _way(text, change.steps)
+    for span in way:
+        if span.kind == "alias":
+            raise _refusal(
+                span, change.steps, "stands elsewhere, where this alias leads; change it by hand"
+            )
+        if span.anchor in text.aliases:
+            raise _refusal(
+                span,
+                change.steps,
+                f"others refer to this as *{span.anchor}, and would change with it; change it by"
+                " hand",
+            )
+    is_there = len(way) == len(change.steps) + 1
+    if not is_there and (len(way) < len(change.steps) or way[-1].kind != "mapping"):
+        raise _refusal(way[-1], change.steps, "there is nothing to put it into; write it by hand")
+    if change.kind == "remove":
+        return _without(text, way[-2], way[-1], change)
+    if not is_there:
+        value = [change.value] if change.kind == "append" else change.value
+        return _with_entry(text, way[-1], value, str(change.steps[-1]))
+    if change.kind == "set" or way[-1].kind != "list":
+        value = [change.value] if change.kind == "append" else change.value
+        return _with_value(text, way[-2], way[-1], change, value)
+    return _with_entry(text, way[-1], change.value)
+
+
+def _with_value(text: _Text, above: _Span, span: _Span, change: TextChange, value: Any) -> str:
+    _keep_what_is_told(text, span, span.start, span.end, change)
+    said, old = flow(value), text.text[span.start : span.end]
+    if old[:1] in ("'", '"') and isinstance(value, str) and not set(said) & set("'\"\\"):
+        said = old[0] + said + old[0]
+    if span.start and not text.text[span.start - 1].isspace() and not old:
+        said = f" {said}"
+    if not above.is_flow and span.mark.column - 1 <= above.column:
+        # A list may begin below its key, and nothing else.
+        said = f"  {said}"
+    return text.text[: span.start] + said + text.text[span.end :]
+
+
+def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) -> str:
+    """The text with an entry more at the end of a list or, with a key, of a mapping."""
+    whole = text.text
+    if into.is_flow:
+        said = flow(value) if key is None else flow({key: value})[1:-1]
+        if not into.entries:
+            at = into.end - 1
+            return whole[:at] + said + whole[at:]
+        _, first, last = into.entries[-1]
+        line_start = max((one.end() for one in LINE_END.finditer(whole, 0, first.start)), default=0)
+        indent = whole[line_start : first.start]
+        if indent.strip() or len(into.entries) < 2:
+            return f"{whole[: last.end]}, {said}{whole[last.end :]}"
+        # One entry a line; what is told after the last one stays beside it.
+        rest_end = _line_end(whole, last.end)
+        rest = whole[last.end : min(rest_end, into.end - 1)]
+        comma = "" if rest.lstrip().startswith(",") else ","
+        if rest_end > into.end - 1:
+            return f"{whole[: last.end]}{comma}{_break(whole, 0)}{indent}{said}{whole[last.end :]}"
+        return (
+            f"{whole[: last.end]}{comma}{rest}{_break(whole, rest_end)}{indent}{said}"
+            f"{whole[rest_end:]}"
+        )
+    indent = " " * into.column
+    end = _line_end(whole, into.end)
+    new_line = _break(whole, end) + indent
+    if key is None:
+        is_block = not into.entries[-1][2].is_flow and into.entries[-1][2].kind == "mapping"
+        if is_block and isinstance(value, dict):
+            said = f"{new_line}  ".join(f"{_dumped(k)}: {flow(v)}" for k, v in value.items())
+        else:
+            said = flow(value)
+        return f"{whole[:end]}{new_line}- {said}{whole[end:]}"
+    said = f"{_dumped(key)}: {flow(value)}"
+    if isinstance(value, list | tuple) and len(value) > 1 and isinstance(value[0], dict):
+        said = f"{_dumped(key)}:" + "".join(f"{new_line}  - {flow(item)}" for item in value)
+    return f"{whole[:end]}{new_line}{said}{whole[end:]}"
+
+
+def _without(text: _Text, above: _Span, span: _Span, change: TextChange) -> str:
+    whole = text.text
+    k = next(k for k, (_, _, value) in enumerate(above.entries) if value is span)
+    key = above.entries[k][1]
+    line_start = max((one.end() for one in LINE_END.finditer(whole, 0, key.start)), default=0)
+    if not above.is_flow and not whole[line_start : key.start].strip():
+        start, end = line_start, _line_end(whole, span.end)
+        following = LINE_END.match(whole, end)
+        end = following.end() if following else end
+    elif k + 1 < len(above.entries):
+        start, end = key.start, above.entries[k + 1][1].start
+    else:
+        start, end = (above.entries[k - 1][2].end if k else key.start), span.end
+    _keep_what_is_told(text, span, start, end, change)
+    return whole[:start] + whole[end:]
+
+
+def _keep_what_is_told(text: _Text, span: _Span, start: int, end: int, change: TextChange) -> None:
+    """Refuse to take away comments, anchors and aliases.
+
+    :raises ExperimentError: there are some between the indices.
+    """
+    inside = [one for one in text.scalars if start <= one[0] and one[1] <= end]
+    ends = [start, *(one[1] for one in inside)]
+    for gap_start, gap_end in zip(ends, [*(one[0] for one in inside), end], strict=True):
+        found = re.search("[#&*!]", text.text[gap_start:gap_end])
+        if found is not None:
+            what = {"#": "a comment", "&": "an anchor", "*": "an alias", "!": "a tag"}[found[0]]
+            before = text.text[: gap_start + found.start()]
+            lines = LINE_END.split(before)
+            place = Mark(span.mark.file, len(lines), len(lines[-1]) + 1)
+            raise ExperimentError(
+                [
+                    place.message(
+                        format_path(change.steps),
+                        f"{what} here would be lost with what is to be changed; change it by hand",
+                    )
+                ]
+            )
+
+
+def _line_end(text: str, start: int) -> int:
+    """Index of the end of the line that an index is in."""
+    found = LINE_END.search(text, start)
+    return len(text) if found is None else found.start()
+
+
+def _break(text: str, at: int) -> str:
+    """What ends the line there, or else the first line."""
+    found = LINE_END.match(text, at) or LINE_END.search(text)
+    return "\n" if found is None else found[0]

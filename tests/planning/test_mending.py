@@ -1,0 +1,238 @@
+"""Repairs written into files of any style: what was not to change has not."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from ballplate.planning.repair.mending import mended, to_write
+from ballplate.planning.repair.repair_search import Repair, repairs
+from ballplate.results.study import check
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.reference.yaml_styles import COMMENTS, Writer, lines_ended, plain
+
+SOURCE = Path("example.yaml")
+
+
+def shifted(**changed: Any) -> dict[str, Any]:
+    """A plate that is shifted and never turned, which leaves squareness and one scale open."""
+    corner = {"x": "250 mm", "y": "250 mm"}
+    return {
+        "title": "ebene Platte, 4 × 4",
+        "machine": {"volume": ["900 mm", "900 mm"], "repeatability": "0.2 um"},
+        "error_model": {"kind": "metric", "scale": "x"},
+        "artefacts": {"Prüfplatte": {"kind": "square", "balls": 4, "size": "360 mm"}},
+        "positions": [
+            {"name": "2", "corner": corner},
+            {"name": "ü 1", "corner": {"x": "350 mm", "y": "300 mm"}},
+            {"name": "0", "corner": {"x": "150 mm", "y": "400 mm"}, "repeats": 2},
+        ],
+        "seed": 4,
+        **changed,
+    }
+
+
+def experiment(text: str, variant: str | None = None) -> Experiment:
+    return next(one for one in load(SOURCE, text=text) if one.name == variant)
+
+
+def first_repair(text: str, variant: str | None = None) -> Repair:
+    chosen = experiment(text, variant)
+    found = to_write(repairs(chosen), check(chosen).verdict)
+    assert found is not None
+    return found
+
+
+def text_of(said: dict[str, Any], seed: int = 0, comments: bool = False) -> str:
+    writer = Writer(Random(seed), comments)
+    writer.block(said, 0, ())
+    return "".join(text for text, _ in writer.pieces)
+
+
+@cache
+def repair_of_shifted() -> Repair:
+    return first_repair(text_of(shifted()))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    line_end=st.sampled_from(["\n", "\r\n"]),
+    has_last=st.booleans(),
+    is_expected=st.booleans(),
+)
+def test_files_of_any_style(seed: int, line_end: str, has_last: bool, is_expected: bool) -> None:
+    said = shifted(**({"expected_rank_deficiency": 2} if is_expected else {}))
+    text = lines_ended(text_of(said, seed, comments=True), line_end, has_last)
+    repair = repair_of_shifted()
+    (edit,) = repair.edits
+    new = mended(text, SOURCE, None, repair)
+    expected = copy.deepcopy(said)
+    place = next(one for one in expected["positions"] if one["name"] == edit.steps[1])
+    place["quarter_turns"] = edit.value["quarter_turns"]
+    if is_expected:
+        expected["expected_rank_deficiency"] = 0
+        text = text.replace("deficiency: 2", "deficiency: 0").replace(
+            'deficiency": 2', 'deficiency": 0'
+        )
+    assert plain(new) == expected
+    rest = iter(new)
+    assert all(one in rest for one in text)
+    assert new.count("\r") == (new.count("\n") if line_end == "\r\n" else 0)
+    assert new.endswith(line_end) == has_last
+    assert check(experiment(new)).verdict.deficiency == 0
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32))
+def test_a_pose_gives_way_to_a_plane_or_its_comment_is_named(seed: int) -> None:
+    said = shifted()
+    for one, origin in zip(said["positions"], ([250, 250], [350, 300], [150, 400]), strict=True):
+        del one["corner"]
+        one["pose"] = {"origin": [f"{value} mm" for value in origin], "rotation": "0 deg"}
+    text = text_of(said, seed, comments=True)
+    try:
+        new = mended(text, SOURCE, None, repair_of_shifted())
+    except ExperimentError as error:
+        (message,) = error.messages
+        line = text.split("\n")[message.line - 1]
+        assert line[message.column - 1] == "#" and message.path.startswith("positions[")
+        return
+    for comment in {one.strip() for one in COMMENTS} - {""}:
+        assert new.count(comment) == text.count(comment)
+    assert check(experiment(new)).verdict.deficiency == 0
+    after = plain(new)
+    assert sum("pose" in one for one in after["positions"]) == 2
+
+
+def test_a_number_as_name_means_the_position_of_that_name() -> None:
+    """In a path, a number counts entries."""
+    repair = repair_of_shifted()
+    (edit,) = repair.edits
+    variants = {"as it is": {}, "mended": {"seed": 7}}
+    text = text_of(shifted(variants=variants))
+    after = plain(mended(text, SOURCE, "mended", repair))
+    at = next(k for k, one in enumerate(shifted()["positions"]) if one["name"] == edit.steps[1])
+    assert edit.steps[1] != str(at)
+    turns = edit.value["quarter_turns"]
+    assert after["variants"]["mended"] == {"seed": 7, f"positions[{at}].quarter_turns": turns}
+    assert after["variants"]["as it is"] == {} and after["positions"] == shifted()["positions"]
+
+
+def test_a_variant_of_its_own_positions_is_changed_there() -> None:
+    own = shifted()["positions"]
+    text = text_of(shifted(variants={"a": {"positions": own}, "b": {"positions": own[:1]}}))
+    repair = first_repair(text, "a")
+    after = plain(mended(text, SOURCE, "a", repair))
+    assert after["positions"] == own and after["variants"]["b"] == {"positions": own[:1]}
+    turned = [one.get("quarter_turns", 0) for one in after["variants"]["a"]["positions"]]
+    assert sum(turn > 0 for turn in turned) == 1
+
+
+def test_a_base_list_grows_for_one_variant_alone() -> None:
+    gauge = Path("designs/hurt_foss/bryan-gauge.yaml").read_text(encoding="utf-8")
+    text = gauge.replace("  radius unknown:\n    calibration: []\n", "  radius unknown:\n")
+    text = text.replace("  - {kind: radius, standard_uncertainty: 0.5 um}\n", "  []\n")
+    repair = first_repair(text, "radius unknown")
+    before, after = plain(text), plain(mended(text, SOURCE, "radius unknown", repair))
+    (item,) = after["variants"]["radius unknown"].pop("calibration")
+    assert item["kind"] == "radius"
+    assert after["variants"]["radius unknown"].pop("expected_rank_deficiency") == 0
+    before["variants"]["radius unknown"].pop("expected_rank_deficiency")
+    assert after == before
+
+
+SHARED = """\
+title: shared
+machine: {volume: [900 mm, 900 mm], repeatability: 0.2 um}
+error_model: {kind: metric, scale: x}
+artefacts: {plate: {kind: square, balls: 4, size: 360 mm}}
+positions:
+"""
+
+
+@pytest.mark.parametrize(
+    "positions, variant, place, words",
+    [
+        (
+            """\
+  - &first {name: a, corner: {x: 250 mm, y: 250 mm}}
+  - {name: c, corner: {x: 300 mm, y: 300 mm}}
+variants:
+  base: {}
+  own:
+    positions: [*first, {name: d, corner: {x: 300 mm, y: 350 mm}}]
+""",
+            "own",
+            "11:17: variants.own.positions[0].quarter_turns",
+            "stands elsewhere, where this alias leads",
+        ),
+        (
+            """\
+  - {name: a, pose: {origin: &middle [450 mm, 450 mm]}}
+  - {name: c, pose: {origin: *middle, rotation: 180 deg}}
+""",
+            None,
+            "6:30: positions[0].pose",
+            "an anchor here would be lost",
+        ),
+        (
+            """\
+  - name: a
+    pose: {origin: [250 mm, 250 mm]}  # by hand
+  - {name: c, corner: {x: 300 mm, y: 300 mm}}
+""",
+            None,
+            "7:39: positions[0].pose",
+            "a comment here would be lost",
+        ),
+        (
+            """\
+  - {name: a, corner: {x: 250 mm, y: 250 mm}}
+  - {name: c, corner: {x: 300 mm, y: 300 mm}}
+variants:
+  own: {"positions[a].corner.x": 200 mm, seed: 2}
+""",
+            "own",
+            "9:9: variants.own",
+            "the repair changes positions[0].corner, of which this is a part",
+        ),
+    ],
+)
+def test_what_others_share_is_refused(
+    positions: str, variant: str | None, place: str, words: str
+) -> None:
+    text = SHARED + positions
+    repair = first_repair(text, variant)
+    if "corner, of" in words:
+        # As where the position is moved, too.
+        (edit,) = repair.edits
+        moved = {**edit.value, "corner": {"x": "210 mm", "y": "260 mm"}}
+        repair = replace(repair, edits=(replace(edit, value=moved),))
+    with pytest.raises(ExperimentError) as caught:
+        mended(text, SOURCE, variant, repair)
+    assert str(caught.value).startswith(f"{SOURCE}:{place}: ")
+    assert words in str(caught.value)
+
+
+def test_a_text_that_does_not_say_what_was_found_is_refused() -> None:
+    """The rank is computed from the new text, and not taken from the repair."""
+    text = text_of(shifted())
+    repair = repair_of_shifted()
+    (edit,) = repair.edits
+    for value in (
+        {key: item for key, item in edit.value.items() if key != "quarter_turns"},
+        {**edit.value, "quarter_turns": 2},
+    ):
+        with pytest.raises(ExperimentError, match="cannot be written as it was found"):
+            mended(text, SOURCE, None, replace(repair, edits=(replace(edit, value=value),)))
