@@ -30,6 +30,7 @@ DESCRIPTION = (
 )
 
 
+# In one piece: one option after the other, with its help.
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     parser.epilog = (
