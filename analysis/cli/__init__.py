@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
+from importlib import import_module
 from typing import Any, NoReturn
 
 from .completion import SHELLS, PrintCompletion
@@ -17,32 +18,17 @@ from .outputs import UsageError, check_outputs
 from .streams import StandardOutputError, keep_standard_numbers, lasting_streams
 from .telling import add_telling, told
 
-AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
+USAGE, BAD_FILE, INTERNAL = 2, 3, 70
+
+# Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
+COMMANDS = (
+    *("check", "run", "plan", "reach", "lengths", "reliability", "simulate", "fit", "compare"),
+    *("sweep", "export", "report", "map", "spline", "reproduce", "schema", "init"),
+)
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
-    # Loaded only now, so that hardly anything is when an interruption begins to be answered.
-    from . import (
-        check,
-        compare,
-        export,
-        fit,
-        init,
-        lengths,
-        map,
-        plan,
-        reach,
-        reliability,
-        report,
-        reproduce,
-        run,
-        schema,
-        simulate,
-        spline,
-        sweep,
-    )
-
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
@@ -64,23 +50,12 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    experiments = (
-        check,
-        run,
-        plan,
-        reach,
-        lengths,
-        reliability,
-        simulate,
-        fit,
-        compare,
-        sweep,
-        export,
-        report,
-    )
-    for module in (*experiments, map, spline, reproduce, schema, init):
-        module.add_parser(commands)
-    for command in commands.choices.values():
+    for name in COMMANDS:
+        # Loaded only now, so that hardly anything is when an interruption begins to be answered.
+        module = import_module(f".{name}", __package__)
+        command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
+        module.add_options(command)
+        command.set_defaults(run=module.run)
         add_telling(command)
     return top
 
@@ -138,12 +113,15 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
 def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
     from ballplate.simulator.computing.internal_error import InternalError
+    from ballplate.simulator.computing.unusable import UnusableError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
 
     try:
         check_outputs(options)
+        options.is_written = True
         with told(options):
-            return int(options.run(options))
+            status = int(options.run(options))
+        return status if options.is_written else BAD_FILE
     except UsageError as error:
         print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
         return USAGE
@@ -151,6 +129,9 @@ def _run(options: argparse.Namespace) -> int:
         from .excerpts import print_errors
 
         print_errors(error.messages, options)
+        return BAD_FILE
+    except UnusableError as error:
+        print(error, file=sys.stderr)
         return BAD_FILE
     except InternalError as error:
         print(

@@ -3,58 +3,46 @@
 from __future__ import annotations
 
 import os
-import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, percentage
+from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
 from .outputs import UsageError
+from .telling import warn
 
 if TYPE_CHECKING:
     from ..planning.requirements.goals import Goal
     from .check_files import CheckedFile
 
-FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
+HELP = "check whether designs determine all their parameters"
+DESCRIPTION = (
+    "Determine the rank of each design, the share of lengths within its target, and"
+    " what carries its scale. The exit status is 0 if every rank deficiency is the one"
+    " that the file expects (by default none), every --goal is met and, with --fail-"
+    "weak, nothing is weakly determined; otherwise it is 1. It is 3 if a file cannot be"
+    " used; the other files are still checked."
+)
+
+
 # In one piece: one option after the other, with its help.
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "check",
-        help="check whether designs determine all their parameters",
-        description=(
-            "Determine the rank of each design, the share of lengths within its target, and"
-            " what carries its scale. The exit status is 0 if every rank deficiency is the one"
-            " that the file expects (by default none), every --goal is met and, with --fail-"
-            "weak, nothing is weakly determined; otherwise it is 1. It is 3 if a file cannot be"
-            " used; the other files are still checked."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     parser.epilog = (
         "FILE may be a pattern such as designs/**/*.yaml, where ** matches any number of"
         " folders; files in folders named sweeps or machines are then left out."
     )
-    parser.add_argument(
-        "--format",
-        choices=FORMATS,
-        default="text",
-        help=(
-            "text (default); github: workflow commands of GitHub Actions, which mark lines of a"
-            " pull request; junit: an XML report for build servers; json: an object, or an array of"
-            " them for several experiments, in metres and radians"
-        ),
-    )
-    parser.add_argument(
-        "--json",
-        action="store_const",
-        dest="format",
-        const="json",
-        help="the same as --format json",
+    add_formats(
+        parser,
+        ("text", "github", "junit", "json"),
+        "text (default); github: workflow commands of GitHub Actions, which mark lines of a"
+        " pull request; junit: an XML report for build servers; json: an object, or an array of"
+        " them for several experiments, in metres and radians",
     )
     parser.add_argument(
         "--suggest",
@@ -106,7 +94,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="store_true",
         help="refuse files with an error model in Python, because loading them runs its code",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
@@ -168,8 +155,7 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
     from .excerpts import print_errors
     from .github import annotation_lines
 
-    for doubt in checked.doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
+    warn(checked.doubts)
     if options.format == "github":
         workspace = os.environ.get("GITHUB_WORKSPACE")
         for line in annotation_lines(checked, Path(workspace) if workspace else None):

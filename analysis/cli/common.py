@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import sys
 import textwrap
@@ -12,9 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .outputs import PICTURE, add_output
+from .telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
+
+    from ..presentation.result import Result
 
 
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
@@ -47,44 +51,79 @@ def add_json(parser: ArgumentParser) -> None:
     )
 
 
+def whole(text: str, least: int = 0) -> int:
+    """Read an index or a seed from the command line."""
+    if not text.isascii() or not text.isdigit() or int(text) < least:
+        raise ArgumentTypeError(f'expected a whole number, {least} or above, not "{text}"')
+    return int(text)
+
+
 def count(text: str) -> int:
     """Read a number of things from the command line."""
     return whole(text, 1)
+
+
+def at_most(number: int, most: int, things: str) -> int:
+    """Refuse more things than are possible."""
+    if number > most:
+        raise ArgumentTypeError(f"{number} {things} are too many; at most {most} are possible")
+    return number
 
 
 def trial_count(text: str) -> int:
     """Read a number of synthetic data sets from the command line."""
     from ..montecarlo.trials import MOST_TRIALS
 
-    found = count(text)
-    if found > MOST_TRIALS:
-        raise ArgumentTypeError(
-            f"{found} data sets are too many; at most {MOST_TRIALS} are possible"
-        )
-    return found
+    return at_most(count(text), MOST_TRIALS, "data sets")
 
 
-def whole(text: str, least: int = 0, what: str = "expected") -> int:
-    """Read a whole number from the command line."""
-    if not text.isascii() or not text.isdigit() or int(text) < least:
-        raise ArgumentTypeError(f'{what} a whole number, {least} or above, not "{text}"')
-    return int(text)
+def number(text: str, unit: str = "") -> float:
+    """Read a number with a unit behind it, or without; NaN where it is none."""
+    try:
+        return float(text.removesuffix(unit).strip())
+    except ValueError:
+        return math.nan
 
 
 def percentage(text: str) -> float:
     """Read a percentage above zero from the command line, as a ratio."""
-    try:
-        value = float(text.removesuffix("%").strip())
-    except ValueError:
-        value = float("nan")
+    value = number(text, "%")
     if not text.endswith("%") or not 0.0 < value <= 100.0:
         raise ArgumentTypeError(f'expected a percentage such as 1%, not "{text}"')
     return value / 100.0
 
 
-def seed(text: str) -> int:
-    """Read a seed from the command line."""
-    return whole(text, what="a seed is")
+def grid(text: str) -> tuple[int, ...] | None:
+    """Read the points along some axes of a grid, 2 or above each; None where it is no such
+    text.
+    """
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isascii() and part.isdigit() and 0 < len(part) < 8 for part in parts):
+        return None
+    counts = tuple(map(int, parts))
+    return counts if min(counts) >= 2 else None
+
+
+def add_workers(parser: Any) -> None:
+    """Add the number of processes."""
+    parser.add_argument(
+        "--workers",
+        metavar="N",
+        type=count,
+        help="number of processes; default: one per processor",
+    )
+
+
+def add_formats(parser: ArgumentParser, formats: Sequence[str], help: str) -> None:
+    """Add the choice among forms of what is printed, text at first, and a short way to JSON."""
+    parser.add_argument("--format", choices=formats, default="text", help=help)
+    parser.add_argument(
+        "--json",
+        action="store_const",
+        dest="format",
+        const="json",
+        help="the same as --format json",
+    )
 
 
 def add_picture(parser: Any, name: str, help: str) -> None:
@@ -126,8 +165,7 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
         if unknown:
             raise ExperimentError(unknown)
         found = [experiment for experiment in found if experiment.name in options.variant]
-    for doubt in dict.fromkeys(doubt for experiment in found for doubt in experiment.doubts):
-        print(f"warning: {doubt}", file=sys.stderr)
+    warn(dict.fromkeys(doubt for experiment in found for doubt in experiment.doubts))
     return found
 
 
@@ -136,13 +174,13 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
 
     :raises ExperimentError: the file has several variants and none was chosen.
     """
-    from ballplate.simulator.inputs.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.messages import refused
 
     found = experiments(options, planning)
     if len(found) > 1:
         names = [str(experiment.name) for experiment in found]
         text = f"the file has several variants; choose one with --variant: {', '.join(names)}"
-        raise ExperimentError([Message(str(options.files[0]), 0, 0, "", text)])
+        raise refused(options.files[0], text)
     return found[0]
 
 
@@ -158,6 +196,14 @@ def print_lines(lines: Sequence[str]) -> None:
         )
         print("\n".join(wrapped or [""]))
     sys.stdout.flush()
+
+
+def show(options: Namespace, result: Result) -> None:
+    """Print a result as JSON where that is asked for, otherwise as text."""
+    if options.json:
+        print_json([result.to_dict()])
+    else:
+        print_lines(result.lines())
 
 
 def print_json(results: list[dict[str, Any]]) -> None:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
 from ..estimators.estimator_choice import OF_DISTANCES, OF_LENGTHS, PAIR_SETS
-from .common import add_file, add_json, count, seed, trial_count
+from .common import add_file, add_json, at_most, count, trial_count, whole
+
+HELP = "compare an alternative estimator with the full one on synthetic data"
+DESCRIPTION = (
+    "Estimate synthetic data sets of the file's true machine with the full estimator"
+    " and with one that uses distances or lengths alone, and compare the distances that"
+    " the two correct (NPL Report CISE 15/98, section 6.2.7). The exit status is 0 if"
+    " all estimates converged, otherwise 1."
+)
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "compare",
-        help="compare an alternative estimator with the full one on synthetic data",
-        description=(
-            "Estimate synthetic data sets of the file's true machine with the full estimator"
-            " and with one that uses distances or lengths alone, and compare the distances that"
-            " the two correct (NPL Report CISE 15/98, section 6.2.7). The exit status is 0 if"
-            " all estimates converged, otherwise 1."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     parser.add_argument(
         "--trials",
@@ -37,7 +35,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         ),
     )
     add_pairs(parser)
-    parser.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
+    parser.add_argument("--seed", type=whole, help="seed of the data sets, instead of the file's")
     parser.add_argument(
         "--points", metavar="N", type=_points, default=200, help="pairs of points; default 200"
     )
@@ -49,7 +47,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
             help=f"published {words} to compare with, such as '0.35 um'",
         )
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
@@ -72,12 +69,7 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
 def _points(text: str) -> int:
     from ..estimators.distances import MOST_POINTS
 
-    found = count(text)
-    if found > MOST_POINTS:
-        raise ArgumentTypeError(
-            f"{found} pairs of points are too many; at most {MOST_POINTS} are possible"
-        )
-    return found
+    return at_most(count(text), MOST_POINTS, "pairs of points")
 
 
 def _length(text: str) -> float:

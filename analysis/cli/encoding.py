@@ -7,8 +7,9 @@ from __future__ import annotations
 import codecs
 import sys
 from argparse import Namespace
-from pathlib import Path
 from typing import Any
+
+from .interruption import named_paths
 
 # Errors of encoding are answered under this name.
 HANDLER = "ballplate.readable"
@@ -83,7 +84,7 @@ def write_data_in_utf8(options: Namespace) -> None:
         or getattr(options, "prints_data", False)
         or getattr(options, "diff", False)
         or getattr(options, "format", "text") in DATA_FORMATS
-        or any(isinstance(value, Path) and str(value) == "-" for value in vars(options).values())
+        or any(str(path) == "-" for _, path in named_paths(options))
     )
     if is_data and hasattr(stream, "reconfigure") and not stream.isatty():
         stream.reconfigure(encoding="utf-8", errors=HANDLER, newline="\n")

@@ -9,26 +9,27 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .outputs import PARQUET, add_force, add_output, write_outputs
+from .outputs import PARQUET, UsageError, add_force, add_output, write
+from .telling import complain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ..sweeps.store import StoredResults
-
-WRONG_USAGE, BAD_FILE = 2, 3
+    from ..sweeps.stored import StoredResults
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "export",
-        help="write a sweep's results as CSV or Parquet",
-        description=(
-            "Write a row for each cell of a store and a column for each figure, in metres and"
-            " radians, with the unit in the column's name. From a damaged store, the cells that"
-            " can be read are written, and the exit status is 3."
-        ),
-    )
+BAD_FILE = 3
+
+
+HELP = "write a sweep's results as CSV or Parquet"
+DESCRIPTION = (
+    "Write a row for each cell of a store and a column for each figure, in metres and"
+    " radians, with the unit in the column's name. From a damaged store, the cells that"
+    " can be read are written, and the exit status is 3."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_store(parser)
     add_output(
         parser,
@@ -41,7 +42,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="table, .csv or .parquet; - for CSV on the screen",
     )
     add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def add_store(parser: ArgumentParser) -> None:
@@ -59,15 +59,10 @@ def add_store(parser: ArgumentParser) -> None:
 
 def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
     """Tell of rows that this version would compute by another method."""
-    from ballplate.simulator.inputs.messages import in_one_line
-
     from ..sweeps.store import of_other_methods
 
     for text in of_other_methods(keys):
-        print(
-            in_one_line(f"{path}: {text}; run ballplate sweep again to compute them anew"),
-            file=sys.stderr,
-        )
+        complain(f"{path}: {text}; run ballplate sweep again to compute them anew")
 
 
 def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
@@ -78,7 +73,7 @@ def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
     go_on = GO_ON if results.damage else "ballplate sweep computes anew what is missing"
     text = unread(path, results.unreadable, results.strays, count, results.damage, go_on)
     if text:
-        print(text, file=sys.stderr)
+        complain(text)
     return bool(text)
 
 
@@ -91,36 +86,29 @@ def run(options: Namespace) -> int:
 
     suffix = options.output.suffix.lower()
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
-        print(f"ballplate export: {options.output} should end in .csv or .parquet", file=sys.stderr)
-        return WRONG_USAGE
-    try:
-        with closing(open_store(options.store)) as store:
-            number = chosen_sweep(store, options.sweep)
-            try:
-                defined = definition_of(store, number)
-            except StoreError as error:
-                print(error, file=sys.stderr)
-                defined = None
-            found = results(store, number, None if defined is None else len(defined["cells"]))
-            count = (
-                len(found.cells) + len(found.unreadable)
-                if defined is None
-                else len(defined["cells"])
-            )
-            is_damaged = warn_of_damage(store.path, found, count) or defined is None
-            table = frame_of(found, defined)
-            warn_of_other_methods(store.path, found.keys)
-    except StoreError as error:
-        print(error, file=sys.stderr)
-        return BAD_FILE
+        raise UsageError(f"{options.output} should end in .csv or .parquet")
+    with closing(open_store(options.store)) as store:
+        number = chosen_sweep(store, options.sweep)
+        defined, cells = None, None
+        try:
+            defined = definition_of(store, number)
+            cells = len(defined["cells"])
+        except StoreError as error:
+            complain(error)
+        found = results(store, number, cells)
+        if cells is None:
+            cells = len(found.rows) + len(found.unreadable)
+        is_damaged = warn_of_damage(store.path, found, cells) or defined is None
+        table = frame_of(found, defined)
+        warn_of_other_methods(store.path, found.keys)
     if suffix != ".parquet":
         # A label or a reason may begin like a formula.
         table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)
         table.columns = [cell_of_text(name) for name in table.columns]
     if str(options.output) == "-":
         table.to_csv(sys.stdout, index=False, lineterminator="\n")
-        return BAD_FILE if is_damaged else 0
-    write = table.to_parquet if suffix == ".parquet" else partial(table.to_csv, lineterminator="\n")
-    if not write_outputs({options.output: lambda path: write(path, index=False)}, options.force):
-        return BAD_FILE
+    else:
+        to_csv = partial(table.to_csv, lineterminator="\n")
+        to_file = table.to_parquet if suffix == ".parquet" else to_csv
+        write(options, {options.output: lambda path: to_file(path, index=False)})
     return BAD_FILE if is_damaged else 0

@@ -39,14 +39,17 @@ Signature = tuple[int, int, int]
 
 def files_named(options: Namespace) -> dict[Path, Signature | None]:
     """The files that the options of a command name, and whether they are there."""
+    return signatures(path for _, path in named_paths(options))
+
+
+def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
+    """Paths among the options of a command, with the options' names."""
     from pathlib import Path
 
-    values = [
-        one
-        for value in vars(options).values()
-        for one in (value if isinstance(value, list) else [value])
-    ]
-    return signatures(path for path in values if isinstance(path, Path))
+    for name, value in vars(options).items():
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, Path):
+                yield name, one
 
 
 def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:

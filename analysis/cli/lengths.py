@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import math
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterable
 from pathlib import Path
 
-from .common import add_file, add_json, add_picture, print_json, print_lines, single
-from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from . import common
+from .common import add_file, add_json, add_picture, number, show, single
+from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 
-NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 1, 2, 3
 # Lines of a table of all lengths.
 MOST_PAIRS = 500_000
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "lengths",
-        help="map the uncertainty of lengths over the volume against a target",
-        description=(
-            "Compute the standard uncertainty u of the length between every two points of a"
-            " grid over the volume, measured on the corrected machine, and compare it and the"
-            " expanded uncertainty k u with the target by length, direction and place. The"
-            " target applies to u, or to U = k u where the file states a coverage_factor. The"
-            " scatter of the readings that will measure a length is not part of u unless"
-            " requested. The exit status is 0 if the rank is as expected and, with --fail, all"
-            " lengths are within the target, otherwise 1."
-        ),
-    )
+HELP = "map the uncertainty of lengths over the volume against a target"
+DESCRIPTION = (
+    "Compute the standard uncertainty u of the length between every two points of a"
+    " grid over the volume, measured on the corrected machine, and compare it and the"
+    " expanded uncertainty k u with the target by length, direction and place. The"
+    " target applies to u, or to U = k u where the file states a coverage_factor. The"
+    " scatter of the readings that will measure a length is not part of u unless"
+    " requested. The exit status is 0 if the rank is as expected and, with --fail, all"
+    " lengths are within the target, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--target",
@@ -69,27 +67,19 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
     add_force(parser)
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def _grid(text: str) -> tuple[int, ...]:
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) <= 3 and all(
-        part.isascii() and part.isdigit() and len(part) < 6 for part in parts
-    ):
-        counts = tuple(map(int, parts))
-        if min(counts) >= 2:
-            return counts
-    raise ArgumentTypeError(
-        f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
-    )
+    counts = common.grid(text)
+    if counts is None or len(counts) > 3:
+        raise ArgumentTypeError(
+            f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
+        )
+    return counts
 
 
 def _factor(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
+    value = number(text)
     if not 0.0 < value <= 100.0:
         raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
     return value
@@ -111,15 +101,14 @@ def run(options: Namespace) -> int:
             options.coverage_factor,
             options.with_repeatability,
         )
-        count = math.comb(math.prod(settings.grid), 2)
-        if options.pairs is not None and count > MOST_PAIRS:
-            raise ValueError(
-                f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
-                " --grid coarser"
-            )
     except ValueError as error:
-        print(f"ballplate lengths: {error}", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError(error) from None
+    count = math.comb(math.prod(settings.grid), 2)
+    if options.pairs is not None and count > MOST_PAIRS:
+        raise UsageError(
+            f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
+            " --grid coarser"
+        )
     with progress(options) as shown:
         found = length_map(experiment, settings, shown.show)
     writers: dict[Path, Writer] = {}
@@ -129,15 +118,10 @@ def run(options: Namespace) -> int:
         writers[options.pairs] = _of_lines(pair_csv(experiment, settings))
     if options.plot is not None:
         writers[options.plot] = found.plot
-    is_written = write_outputs(writers, options.force)
-    if options.json:
-        print_json([found.to_dict()])
-    else:
-        print_lines(found.lines())
-    if not is_written:
-        return BAD_FILE
+    write(options, writers)
+    show(options, found)
     is_missed = options.fail and not found.is_met
-    return 0 if found.as_expected and not is_missed else NOT_AS_EXPECTED
+    return 0 if found.as_expected and not is_missed else 1
 
 
 def _of_lines(lines: Iterable[str]) -> Writer:

@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-import sys
+import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_picture, count, print_json, print_lines
-from .outputs import add_force, write_outputs
+from . import common
+from .common import add_formats, add_picture, at_most, count, print_json, print_lines
+from .outputs import UsageError, add_force, write
+from .telling import complain
 
 if TYPE_CHECKING:
     from ..error_maps.volumetric_results import Line
 
-WRONG_USAGE, BAD_FILE = 2, 3
+
+HELP = "compute volumetric errors of a machine from its parametric errors"
+DESCRIPTION = (
+    "Combine the parametric errors of a machine file into volumetric errors, systematic"
+    " and random: on a grid with the length errors of the four body diagonals, along a"
+    " line, or one parametric error along its axis. An error is the position of the tip"
+    " minus the position that the scales indicate; the error of indication has the"
+    " opposite sign."
+)
 
 
-# In one piece: one option after the other, with its help.
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "map",
-        help="compute volumetric errors of a machine from its parametric errors",
-        description=(
-            "Combine the parametric errors of a machine file into volumetric errors, systematic"
-            " and random: on a grid with the length errors of the four body diagonals, along a"
-            " line, or one parametric error along its axis. An error is the position of the tip"
-            " minus the position that the scales indicate; the error of indication has the"
-            " opposite sign."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="machine file (YAML)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
@@ -65,39 +63,19 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=count,
         help="magnification of the errors in the drawing of the grid; default: one that fits",
     )
-    parser.add_argument(
-        "--format",
-        choices=("text", "csv", "json"),
-        default="text",
-        help="csv: the points alone; json: metres, radians",
-    )
-    parser.add_argument(
-        "--json",
-        action="store_const",
-        dest="format",
-        const="json",
-        help="the same as --format json",
-    )
-    parser.set_defaults(run=run)
+    add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")
 
 
-def _grid(text: str) -> tuple[int, int, int]:
+def _grid(text: str) -> tuple[int, ...]:
     from ..error_maps.volumetric_errors import MOST_POINTS
 
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) == 3 and all(
-        part.isascii() and part.isdigit() and len(part) < 8 for part in parts
-    ):
-        x, y, z = (int(part) for part in parts)
-        if min(x, y, z) >= 2:
-            if x * y * z > MOST_POINTS:
-                raise ArgumentTypeError(
-                    f"{x * y * z} points are too many; at most {MOST_POINTS} are possible"
-                )
-            return x, y, z
-    raise ArgumentTypeError(
-        f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"'
-    )
+    counts = common.grid(text)
+    if counts is None or len(counts) != 3:
+        raise ArgumentTypeError(
+            f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"'
+        )
+    at_most(math.prod(counts), MOST_POINTS, "points")
+    return counts
 
 
 def _points(text: str) -> int:
@@ -123,24 +101,24 @@ def run(options: Namespace) -> int:
     from ..error_maps.volumetric_results import VolumetricMap, machine_errors
 
     is_grid = options.line is None and options.error is None
+    if options.magnification is not None and (options.plot is None or not is_grid):
+        raise UsageError("--magnification is for the drawing of the grid; leave it out")
     try:
-        if options.magnification is not None and (options.plot is None or not is_grid):
-            raise ValueError("--magnification is for the drawing of the grid; leave it out")
         found = machine_errors(
             options.file, options.grid, options.line, options.error, options.points
         )
     except ValueError as error:
-        print(f"ballplate map: {error}", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError(error) from None
     for note in found.notes:
-        print(note, file=sys.stderr)
+        complain(note)
     draw = found.plot
     if isinstance(found, VolumetricMap):
         draw = partial(found.plot, magnification=options.magnification)
     # Before anything is printed that nobody may read to its end.
-    is_drawn = options.plot is None or write_outputs({options.plot: draw}, options.force)
+    if options.plot is not None:
+        write(options, {options.plot: draw})
     if options.format == "json":
         print_json([found.to_dict()])
     else:
         print_lines(found.lines() if options.format == "text" else list(found.point_lines()))
-    return 0 if is_drawn else BAD_FILE
+    return 0

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
 
 from ballplate.simulator.computing.memory import want_of_memory
+
+from .interruption import named_paths
 
 # What makes a command's work smaller.
 SMALLER = {
@@ -31,9 +32,7 @@ def no_memory(error: BaseException, options: Namespace) -> str | None:
     any other error.
     """
     name = options.run.__module__.rpartition(".")[2]
-    named = [
-        value for key in ("files", "file", "store") for value in _paths(getattr(options, key, None))
-    ]
+    named = [path for key, path in named_paths(options) if key in ("files", "file", "store")]
     place = ", ".join(map(str, named)) or f"ballplate {name}"
     smaller = SMALLER.get(name, "close other programs")
     # Worker processes that the system has ended; loading the class for it would take memory.
@@ -44,8 +43,3 @@ def no_memory(error: BaseException, options: Namespace) -> str | None:
         )
     want = want_of_memory(error)
     return None if want is None else f"{place}: {name} {want}; {smaller}"
-
-
-def _paths(value: object) -> list[Path]:
-    values = value if isinstance(value, list) else [value]
-    return [one for one in values if isinstance(one, Path)]

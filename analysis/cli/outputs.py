@@ -24,6 +24,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
+from .interruption import named_paths
+
 if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import Message
 
@@ -93,7 +95,7 @@ class Output:
 
 
 class UsageError(ValueError):
-    """Options that do not go together."""
+    """Options that do not go together, or one whose value cannot be used here."""
 
 
 class OutputAction(Action):
@@ -230,15 +232,14 @@ def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
     """Files that the options name and that are not written, and those that these files name."""
     from ..sweeps.named_files import named_by
 
-    for name, value in vars(options).items():
-        paths = value if isinstance(value, list) else [value]
-        for path in paths:
-            if name not in outputs and isinstance(path, Path):
-                yield path
-                if name == "store" and path.name:
-                    yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
-                if name in NAMING and path.suffix.lower() != ".csv":
-                    yield from named_by(path)
+    for name, path in named_paths(options):
+        if name in outputs:
+            continue
+        yield path
+        if name == "store" and path.name:
+            yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
+        if name in NAMING and path.suffix.lower() != ".csv":
+            yield from named_by(path)
 
 
 def _reasons_against(output: Output, force: bool) -> list[Message]:
@@ -310,12 +311,20 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     return True
 
 
-def text_writer(write: Callable[[TextIO], object]) -> Writer:
+def write(options: Namespace, writers: Mapping[Path, Writer]) -> bool:
+    """Write the files of a command, which ends with the status of a file that cannot be used if
+    one of them cannot be written; whether they are.
+    """
+    options.is_written = write_outputs(writers, options.force) and options.is_written
+    return bool(options.is_written)
+
+
+def text_writer(print_to: Callable[[TextIO], object]) -> Writer:
     """A writer of text, in UTF-8 and with line ends as they are."""
 
     def write_file(path: Path) -> None:
         with path.open("w", encoding="utf-8", newline="") as stream:
-            write(stream)
+            print_to(stream)
 
     return write_file
 

@@ -7,31 +7,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, add_picture, count, print_json, print_lines, seed, single
-from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from .common import add_file, add_json, add_picture, add_workers, count, number, show, single, whole
+from .outputs import Writer, add_force, add_output, text_writer, write
 from .telling import note
 
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
 
-AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 SHEETS = (".html", ".md", ".csv", ".txt")
 
 
+HELP = "choose positions and certificates from a pool, and bound what any choice could achieve"
+DESCRIPTION = (
+    "Choose the positions and certificates from the pool of an experiment file that"
+    " minimise a criterion within a budget, and bound what any choice could achieve."
+    " Without a budget, the choice may cost as much as the positions in the file. The"
+    " exit status is 0 if the choice determines everything, otherwise 1."
+)
+
+
 # In one piece: one option after the other, with its help.
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "plan",
-        help=(
-            "choose positions and certificates from a pool, and bound what any choice could achieve"
-        ),
-        description=(
-            "Choose the positions and certificates from the pool of an experiment file that"
-            " minimise a criterion within a budget, and bound what any choice could achieve."
-            " Without a budget, the choice may cost as much as the positions in the file. The"
-            " exit status is 0 if the choice determines everything, otherwise 1."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--criterion",
@@ -95,15 +91,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_force(output)
     add_json(parser)
     parser.add_argument(
-        "--seed", type=seed, default=1, help="seed of the random starts of the search; default 1"
+        "--seed", type=whole, default=1, help="seed of the random starts of the search; default 1"
     )
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=count,
-        help="number of processes; default: one per processor",
-    )
-    parser.set_defaults(run=run)
+    add_workers(parser)
 
 
 class _Criterion(Action):
@@ -134,10 +124,7 @@ def _criterion(text: str) -> str:
 
 
 def _hours(text: str) -> float:
-    try:
-        value = float(text.removesuffix("h").strip())
-    except ValueError:
-        value = float("nan")
+    value = number(text, "h")
     if not 0.0 < value < 1e5:
         raise ArgumentTypeError(f'expected hours above zero, such as 7.5, not "{text}"')
     return value
@@ -173,23 +160,18 @@ def run(options: Namespace) -> int:
             experiment, request, offered, earlier, options.workers or processors(), shown.show
         )
     try:
-        is_written = _written(found, options)
+        _write(found, options)
     except ExperimentError as error:
         # What took so long to find is told nevertheless.
         print_errors(error.messages, options)
-        is_written = False
-    if options.json:
-        print_json([found.to_dict()])
-    else:
-        print_lines(found.lines())
-    if not is_written:
-        return BAD_FILE
+        options.is_written = False
+    show(options, found)
     is_full = found.prediction.verdict.deficiency == found.left_open
-    return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
+    return 0 if found.is_determined and is_full else 1
 
 
-def _written(campaign: Campaign, options: Namespace) -> bool:
-    """Write what was asked for; False if something cannot be written."""
+def _write(campaign: Campaign, options: Namespace) -> None:
+    """Write what was asked for."""
     writers: dict[Path, Writer] = {}
     if options.output is not None:
         text = campaign.to_yaml(options.output.parent)
@@ -200,8 +182,6 @@ def _written(campaign: Campaign, options: Namespace) -> bool:
     if options.plot is not None:
         # Numbered as on the run sheet.
         writers[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot
-    is_written = write_outputs(writers, options.force)
-    for path in (options.output, options.sheet):
-        if is_written and path is not None:
+    if write(options, writers):
+        for path in filter(None, (options.output, options.sheet)):
             note(options, f"{path} written")
-    return is_written

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 
-from .common import add_file, add_json, percentage, print_json, print_lines, single, whole
+from .common import add_file, add_json, percentage, show, single, whole
+from .outputs import UsageError
 
-WRONG_USAGE = 2
 UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "reach",
-        help="find the repeatability, certificate, repeats, balls or size that meets a target",
-        description=(
-            "Solve for one unknown of a design at a time, with the others as in the file: the"
-            " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"
-            " balls or smallest plate that meets a goal. Each answer is a value of three digits,"
-            " or a whole number, for which the design was computed and meets the goal; the next"
-            " value fails. The exit status is 0 if every unknown asked for has such a value"
-            " (without --by: one of them), otherwise 1; with --fail it is 0 if the design in the"
-            " file meets the goal, otherwise 1."
-        ),
-    )
+HELP = "find the repeatability, certificate, repeats, balls or size that meets a target"
+DESCRIPTION = (
+    "Solve for one unknown of a design at a time, with the others as in the file: the"
+    " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"
+    " balls or smallest plate that meets a goal. Each answer is a value of three digits,"
+    " or a whole number, for which the design was computed and meets the goal; the next"
+    " value fails. The exit status is 0 if every unknown asked for has such a value"
+    " (without --by: one of them), otherwise 1; with --fail it is 0 if the design in the"
+    " file meets the goal, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--by",
@@ -69,7 +67,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="end with exit status 1 unless the design in the file meets the goal",
     )
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
@@ -98,12 +95,8 @@ def run(options: Namespace) -> int:
                 shown.show,
             )
     except (GoalError, NotVariableError, QuantityError) as error:
-        print(f"ballplate reach: {error}", file=sys.stderr)
-        return WRONG_USAGE
-    if options.json:
-        print_json([found.to_dict()])
-    else:
-        print_lines(found.lines())
+        raise UsageError(error) from None
+    show(options, found)
     if options.fail:
         return 0 if found.present.is_met else 1
     met = [one.is_met for one in found.answers]

@@ -4,30 +4,22 @@ not.
 
 from __future__ import annotations
 
-import sys
-from argparse import ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from functools import partial
 
-from .common import add_file, add_json, percentage
-from .outputs import add_force, add_output, text_writer, write_outputs
+from .common import add_file, add_json, number
+from .outputs import UsageError, add_force, add_output, text_writer, write
 
-WRONG_USAGE, BAD_FILE = 2, 3
+HELP = "find which biases of readings and certificates would be noticed, and what the others change"
+DESCRIPTION = (
+    "Compute the redundancy of every observation of a design, the smallest biases of"
+    " readings, certificates, probes and positions that a test of the residuals finds,"
+    " and the effect of a bias just too small to be found on the error function (U4) and"
+    " on distances between balls (U5) and between corrected points (U6)."
+)
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "reliability",
-        help=(
-            "find which biases of readings and certificates would be noticed, and what the"
-            " others change"
-        ),
-        description=(
-            "Compute the redundancy of every observation of a design, the smallest biases of"
-            " readings, certificates, probes and positions that a test of the residuals finds,"
-            " and the effect of a bias just too small to be found on the error function (U4) and"
-            " on distances between balls (U5) and between corrected points (U6)."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     parser.add_argument(
         "--false-alarm",
@@ -57,17 +49,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_output(parser, "--csv", metavar="FILE", help="write a row for every observation")
     add_force(parser)
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def _share(text: str) -> float:
     from ..gross_errors.power import LEAST_CHANCE, MOST_CHANCE
 
-    try:
-        value = percentage(text)
-    except ArgumentTypeError:
-        value = float("nan")
-    if not LEAST_CHANCE <= value <= MOST_CHANCE:
+    value = number(text, "%") / 100.0
+    if not text.endswith("%") or not LEAST_CHANCE <= value <= MOST_CHANCE:
         raise ArgumentTypeError(
             f'expected a percentage between 0% and 100%, such as 0.1%, not "{text}"'
         )
@@ -82,30 +70,25 @@ def run(options: Namespace) -> int:
     from .progress import progress
 
     if options.power <= options.false_alarm:
-        print(
-            "ballplate reliability: --power must be above --false-alarm; any test has that much",
-            file=sys.stderr,
-        )
-        return WRONG_USAGE
+        raise UsageError("--power must be above --false-alarm; any test has that much")
     chosen = experiments(options)
     if options.csv is not None and len(chosen) > 1:
         names = ", ".join(str(one.name or one.label) for one in chosen)
-        text = f"--csv writes the table of one experiment; choose one with --variant: {names}"
-        print(f"ballplate reliability: {text}", file=sys.stderr)
-        return WRONG_USAGE
-    found, is_written = [], True
-    for number, experiment in enumerate(chosen):
+        raise UsageError(
+            f"--csv writes the table of one experiment; choose one with --variant: {names}"
+        )
+    found = []
+    for k, experiment in enumerate(chosen):
         with progress(options) as shown:
             result = reliability(
                 experiment, options.false_alarm, options.power, options.sigma, shown.show
             )
         if options.csv is not None:
-            writer = text_writer(partial(write_observations, result=result))
-            is_written = write_outputs({options.csv: writer}, options.force)
+            write(options, {options.csv: text_writer(partial(write_observations, result=result))})
         if options.json:
             found.append(result.to_dict())
         else:
-            print_lines([*([""] if number else []), *result.lines(options.all)])
+            print_lines([*([""] if k else []), *result.lines(options.all)])
     if options.json:
         print_json(found)
-    return 0 if is_written else BAD_FILE
+    return 0

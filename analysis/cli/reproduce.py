@@ -4,31 +4,26 @@ printed of them.
 
 from __future__ import annotations
 
-import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from .common import trial_count
+from .outputs import UsageError
 
-WRONG_USAGE = 2
+HELP = "compute published experiments or certified problems, and compare the figures"
+DESCRIPTION = (
+    "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
+    " shipped designs. Every legible figure is printed beside the computed one, with the"
+    " ratio and the basis of the comparison, as are statements on rank, errata and open"
+    " differences. The exit status is 0 if everything agrees within the stated limits,"
+    " otherwise 1. certified: solve the problems with certified answers, and count the"
+    " digits that agree, or with --results those of another program. The exit status is"
+    " 0 if every rank and every count is right and every quantity has an answer,"
+    " otherwise 1."
+)
 
 
-# In one piece: one option after the other, with its help.
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "reproduce",
-        help="compute published experiments or certified problems, and compare the figures",
-        description=(
-            "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
-            " shipped designs. Every legible figure is printed beside the computed one, with the"
-            " ratio and the basis of the comparison, as are statements on rank, errata and open"
-            " differences. The exit status is 0 if everything agrees within the stated limits,"
-            " otherwise 1. certified: solve the problems with certified answers, and count the"
-            " digits that agree, or with --results those of another program. The exit status is"
-            " 0 if every rank and every count is right and every quantity has an answer,"
-            " otherwise 1."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "document",
         metavar="DOCUMENT",
@@ -73,7 +68,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--json", action="store_true", help="print a JSON object in metres and radians"
     )
     form.add_argument("--markdown", action="store_true", help="print Markdown")
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
@@ -86,13 +80,13 @@ def run(options: Namespace) -> int:
     from .progress import progress
 
     is_certified = options.document == "certified"
+    if is_certified and (options.quick or options.markdown):
+        raise UsageError("--quick and --markdown go with npl only; leave them out")
+    if options.results and not is_certified:
+        raise UsageError("--results goes with certified only; leave it out")
     chosen, folder = options.experiment, options.designs
     found: CertifiedScores | ReproducedDocument
     try:
-        if is_certified and (options.quick or options.markdown):
-            raise ValueError("--quick and --markdown go with npl only; leave them out")
-        if options.results and not is_certified:
-            raise ValueError("--results goes with certified only; leave it out")
         with progress(options) as shown:
             if is_certified:
                 found = score_certified(chosen, options.results, folder, shown.show)
@@ -100,8 +94,7 @@ def run(options: Namespace) -> int:
                 trials = None if options.quick else options.trials
                 found = reproduce_npl(chosen, trials, folder, shown.show)
     except ValueError as error:
-        print(f"ballplate reproduce: {error}", file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError(error) from None
     if options.json:
         print_json([found.to_dict()])
     elif options.markdown:

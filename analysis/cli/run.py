@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from argparse import ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, count, percentage, seed, trial_count
+from .common import add_file, add_json, add_workers, percentage, trial_count, whole
+from .outputs import UsageError
+from .telling import complain
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
@@ -14,21 +15,18 @@ if TYPE_CHECKING:
 
     from ..montecarlo.experiments import Trials
 
-WRONG_USAGE = 2
+
+HELP = "predict the uncertainties U1 to U6 that a design will achieve"
+DESCRIPTION = (
+    "Compute the rank and the standard uncertainties U1 to U6 of a design at zero"
+    " machine error. With --trials, synthetic data sets of the file's true machine are"
+    " estimated as well, and their bias, spread and coverage are printed beside the"
+    " linearised uncertainties. The exit status is 0 if the rank is as expected,"
+    " otherwise 1."
+)
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "run",
-        help="predict the uncertainties U1 to U6 that a design will achieve",
-        description=(
-            "Compute the rank and the standard uncertainties U1 to U6 of a design at zero"
-            " machine error. With --trials, synthetic data sets of the file's true machine are"
-            " estimated as well, and their bias, spread and coverage are printed beside the"
-            " linearised uncertainties. The exit status is 0 if the rank is as expected,"
-            " otherwise 1."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser, several=True)
     group = parser.add_argument_group("Monte Carlo")
     group.add_argument(
@@ -40,15 +38,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=percentage,
         help="stop when the ratios of spread to U are known this accurately",
     )
-    group.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
-    group.add_argument(
-        "--workers",
-        metavar="N",
-        type=count,
-        help="number of processes; default: one per processor",
-    )
+    group.add_argument("--seed", type=whole, help="seed of the data sets, instead of the file's")
+    add_workers(group)
     add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def _trial_count(text: str) -> int:
@@ -66,11 +58,7 @@ def run(options: Namespace) -> int:
     plans, found, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
-        print(
-            "ballplate run: --seed and --workers have a meaning with --trials or --until only",
-            file=sys.stderr,
-        )
-        return WRONG_USAGE
+        raise UsageError("--seed and --workers have a meaning with --trials or --until only")
     kept = options.interruption.kept
     for experiment in experiments(options):
         plans.append(predict(experiment, with_scale=True))
@@ -88,9 +76,8 @@ def run(options: Namespace) -> int:
             interrupted = done.outcome is not None and done.outcome.interrupted
         found.append(data)
         if interrupted:
-            print(
-                f"{options.interruption.word}: the figures are those of the data sets done so far",
-                file=sys.stderr,
+            complain(
+                f"{options.interruption.word}: the figures are those of the data sets done so far"
             )
             break
     if options.json:

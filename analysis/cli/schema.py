@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from typing import Any
 
+HELP = "print the JSON Schema of experiment, sweep or machine files"
+DESCRIPTION = (
+    "Print the JSON Schema of experiment files, or of sweep or machine files, for editors"
+    " that complete and check as you type."
+)
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "schema",
-        help="print the JSON Schema of experiment, sweep or machine files",
-        description=(
-            "Print the JSON Schema of experiment files, or of sweep or machine files, for editors"
-            " that complete and check as you type."
-        ),
-    )
+
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files"
     )
-    parser.set_defaults(run=run, prints_data=True)
+    parser.set_defaults(prints_data=True)
 
 
 def run(options: Namespace) -> int:

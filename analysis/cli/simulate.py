@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from .common import add_file, seed
-from .outputs import add_force, add_output, text_writer, write_outputs
+from .common import add_file, whole
+from .outputs import add_force, add_output, text_writer, write
 from .telling import note
 
-BAD_FILE = 3
+HELP = "write synthetic readings of a design"
+DESCRIPTION = (
+    "Write the readings that the file's true machine would give, of artefacts that"
+    " differ from their certificates within the stated uncertainties, with noise of the"
+    " stated repeatability. The same seed gives the same readings, with and without"
+    " --certificate."
+)
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser = commands.add_parser(
-        "simulate",
-        help="write synthetic readings of a design",
-        description=(
-            "Write the readings that the file's true machine would give, of artefacts that"
-            " differ from their certificates within the stated uncertainties, with noise of the"
-            " stated repeatability. The same seed gives the same readings, with and without"
-            " --certificate."
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
     add_output(
         parser,
@@ -46,14 +42,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
             " for fit --certificate"
         ),
     )
-    parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
+    parser.add_argument("--seed", type=whole, help="seed of the noise, instead of the file's")
     parser.add_argument(
         "--exact",
         action="store_true",
         help="leave out all noise; artefacts are as stated in the file",
     )
     add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
@@ -85,10 +80,9 @@ def run(options: Namespace) -> int:
         told.append(
             f"{len(certified_values(drawn))} certificate values written to {options.certificate}"
         )
-    writers = {path: text_writer(write) for path, write in texts.items() if str(path) != "-"}
-    if not write_outputs(writers, options.force):
-        return BAD_FILE
-    for line, path in zip(told, texts, strict=True):
+    writers = {path: text_writer(print_to) for path, print_to in texts.items() if str(path) != "-"}
+    is_written = write(options, writers)
+    for line, path in zip(told, texts, strict=True) if is_written else ():
         if path in writers:
             note(options, line)
         else:

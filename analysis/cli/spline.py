@@ -10,29 +10,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common import add_picture, count, print_json, print_lines
-from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 
 if TYPE_CHECKING:
     from ballplate.simulator.splines.read import CurvePoints
 
-WRONG_USAGE, BAD_FILE = 2, 3
+
+HELP = "fit a spline with prescribed values and slopes to measured errors"
+DESCRIPTION = (
+    "Fit a spline to errors along an axis or along the profile of a turned part, by least"
+    " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
+    " polynomials for a controller. The file has columns such as position_mm and error_um,"
+    " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
+    " abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa"
+    ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
+    ' mm, -37.084 mm".'
+)
 
 
 # In one piece: one option after the other, with its help.
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "spline",
-        help="fit a spline with prescribed values and slopes to measured errors",
-        description=(
-            "Fit a spline to errors along an axis or along the profile of a turned part, by least"
-            " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
-            " polynomials for a controller. The file has columns such as position_mm and error_um,"
-            " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
-            " abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa"
-            ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
-            ' mm, -37.084 mm".'
-        ),
-    )
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="measured points (CSV)")
     data = parser.add_argument_group("points")
     data.add_argument(
@@ -141,7 +138,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="magnification of the bars; default: one that fits",
     )
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
-    parser.set_defaults(run=run)
 
 
 POWERS = (
@@ -151,7 +147,6 @@ POWERS = (
 
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
-    from ballplate.simulator.inputs.messages import in_one_line
 
     from ..error_maps.curve_options import Asked, OptionError
     from ..error_maps.curve_result import error_curve
@@ -169,8 +164,7 @@ def run(options: Namespace) -> int:
             partial(_check, options),
         )
     except OptionError as error:
-        print(in_one_line(f"ballplate spline: {error}"), file=sys.stderr)
-        return WRONG_USAGE
+        raise UsageError(error) from None
     lines = [] if options.json else found.lines()
     writers: dict[Path, Writer] = {}
     if options.plot is not None:
@@ -182,34 +176,32 @@ def run(options: Namespace) -> int:
     polynomials = None if options.coefficients is None else found.coefficients()
     if polynomials is not None and str(options.coefficients) != "-":
         writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
-    is_written = write_outputs(writers, options.force)
+    write(options, writers)
     if options.json:
         print_json([found.to_dict()])
     elif polynomials is not None and str(options.coefficients) == "-":
         sys.stdout.write(polynomials)
     else:
         print_lines(lines)
-    return 0 if is_written else BAD_FILE
+    return 0
 
 
 def _check(options: Namespace, points: CurvePoints) -> None:
     """Refuse options that do not go together.
 
-    :raises OptionError: there are such.
+    :raises UsageError: there are such.
     """
-    from ..error_maps.curve_options import OptionError
-
     if options.whiskers is not None and points.places is None:
-        raise OptionError(
+        raise UsageError(
             "--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file"
         )
     if options.whiskers is not None and points.y_column.kind != "length":
-        raise OptionError(
+        raise UsageError(
             f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle"
         )
     if options.magnification is not None and not 0 < options.magnification < float("inf"):
-        raise OptionError("--magnification should be above 0, such as 200")
+        raise UsageError("--magnification should be above 0, such as 200")
     if options.magnification is not None and options.whiskers is None:
-        raise OptionError("--magnification is that of --whiskers; add that, or leave it out")
+        raise UsageError("--magnification is that of --whiskers; add that, or leave it out")
     if options.json and str(options.coefficients) == "-":
-        raise OptionError("--json and --coefficients - both go to the screen; name a file for one")
+        raise UsageError("--json and --coefficients - both go to the screen; name a file for one")

@@ -9,7 +9,9 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import count
+from .common import add_workers
+from .outputs import UsageError
+from .telling import complain
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
@@ -19,20 +21,19 @@ if TYPE_CHECKING:
     from ..sweeps.model import Sweep
     from ..sweeps.store import Store
 
-WRONG_USAGE, BAD_FILE = 2, 3
+BAD_FILE = 3
 
 
-def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
-    parser: ArgumentParser = commands.add_parser(
-        "sweep",
-        help="compute a family of experiments into a store",
-        description=(
-            "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
-            " trials, Monte Carlo. Each finished cell is stored on disk; when started again, the"
-            " command continues where it stopped. The exit status is 0 if all cells are done, 1"
-            " if some have failed."
-        ),
-    )
+HELP = "compute a family of experiments into a store"
+DESCRIPTION = (
+    "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
+    " trials, Monte Carlo. Each finished cell is stored on disk; when started again, the"
+    " command continues where it stopped. The exit status is 0 if all cells are done, 1"
+    " if some have failed."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="sweep file (YAML)")
     parser.add_argument(
         "--store",
@@ -43,12 +44,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--dry-run", action="store_true", help="list the cells and estimate the time; store nothing"
     )
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=count,
-        help="number of processes; default: one per processor",
-    )
+    add_workers(parser)
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -72,18 +68,14 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
             " of its base; the store keeps copies of these files; may be repeated"
         ),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
     """Run a sweep; 1 if cells have failed."""
-    from ballplate.simulator.inputs.messages import in_one_line
-
     from ..sweeps.bundle import bundle_of
-    from ..sweeps.cluster import ClusterError
     from ..sweeps.load import load_sweep
-    from ..sweeps.running import OtherSweepError, writable_store
-    from ..sweeps.store_file import StoreError, is_same_file
+    from ..sweeps.running import writable_store
+    from ..sweeps.store_file import is_same_file
 
     sweep = load_sweep(
         options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder)
@@ -93,35 +85,26 @@ def run(options: Namespace) -> int:
     bundle = bundle_of(sweep)
     path = options.store or options.file.with_suffix(".sqlite")
     if any(is_same_file(path, file) for file in (options.file, sweep.base)):
-        print(
-            f"ballplate sweep: --store {path} is the sweep's own file; name another",
-            file=sys.stderr,
-        )
-        return WRONG_USAGE
+        raise UsageError(f"--store {path} is the sweep's own file; name another")
     try:
         with writable_store(path) as store:
             return _run(sweep, bundle, store, options)
     except OSError as error:
         where = error.filename or path
-        text = (
+        complain(
             f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
         )
-        print(in_one_line(text), file=sys.stderr)
-    except (StoreError, ClusterError, OtherSweepError) as error:
-        print(error, file=sys.stderr)
-    return BAD_FILE
+        return BAD_FILE
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ballplate.simulator.inputs.messages import in_one_line
-
     from ..sweeps.local import ChangedError
     from ..sweeps.running import compute_sweep, enter
     from .progress import progress
 
     entered = enter(store, sweep, bundle, options.beside)
     for remark in entered.remarks:
-        print(remark, file=sys.stderr)
+        complain(remark)
     options.interruption.kept = lambda: (
         f"what is done is in {store.path}, and the same command goes on from there"
     )
@@ -143,7 +126,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
             "the files of the sweep have been changed while it ran; what is done is stored, start"
             " it again"
         )
-        print(in_one_line(f"{options.file}: {text}"), file=sys.stderr)
+        complain(f"{options.file}: {text}")
         return BAD_FILE
     _tell(
         store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary
@@ -176,7 +159,7 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
     )
     print(in_one_line(told))
     for text in shortcomings(store, number, summary.cells):
-        print(text, file=sys.stderr)
+        complain(text)
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -30,10 +30,21 @@ def add_telling(parser: ArgumentParser) -> None:
 
 def note(options: Namespace, text: str) -> None:
     """Tell what is neither a result nor an error nor a warning."""
+    if not options.quiet:
+        complain(text)
+
+
+def complain(text: object) -> None:
+    """Tell in one line what is wrong, or what of it is to be known."""
     from ballplate.simulator.inputs.messages import in_one_line
 
-    if not options.quiet:
-        print(in_one_line(text), file=sys.stderr)
+    print(in_one_line(str(text)), file=sys.stderr)
+
+
+def warn(doubts: Iterable[object]) -> None:
+    """Tell what is doubtful, each in one line."""
+    for doubt in doubts:
+        complain(f"warning: {doubt}")
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from ballplate.simulator.splines.constraints import Constraint
 from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
 from ballplate.simulator.splines.read import Column
 
-from ..presentation.formatting import aligned, number
+from ..presentation.formatting import aligned, as_data, number, picked, records
 from .error_curve import ErrorCurve
 
 ORDERS = {
@@ -200,74 +200,49 @@ def _value_lines(curve: ErrorCurve, at: np.ndarray) -> list[str]:
 # In one piece: one mapping, in the form in which the JSON has it.
 def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> dict[str, Any]:
     """The curve as plain data in metres and radians; what is not known is None."""
-    fitted, points = curve.fit, curve.points
+    fitted, points, space = curve.fit, curve.points, curve.fit.space
     found = pieces(fitted, powers)
-    spread = curve.standard_uncertainty(fitted.x)
     units = {"length": "m", "angle": "rad"}
-    return {
-        "file": file,
-        "x": {"name": points.x_column.name, "unit": units[points.x_column.kind]},
-        "y": {"name": points.y_column.name, "unit": units[points.y_column.kind]},
-        "order": fitted.space.order,
-        "start": fitted.space.lower,
-        "end": fitted.space.upper,
-        "knots": list(fitted.space.knots),
-        "boundaries": list(curve.boundaries),
-        "prescribed": [
-            {
-                "at": hold.places[0],
-                "derivative": hold.derivative,
-                "value": hold.value,
-                "missed_by": missed,
-            }
-            for hold, missed in ((hold, fitted.violation(hold)) for hold in curve.holds)
-        ],
-        "free_coefficients": fitted.free,
-        "degrees_of_freedom": fitted.degrees_of_freedom,
-        "sum_of_squares": fitted.sum_of_squares,
-        "sigma": _known(curve.sigma),
-        "sigma_is_estimated": curve.sigma_is_estimated,
-        "coverage_factor": _known(curve.coverage_factor),
-        "powers": powers,
-        "pieces": [
-            {"start": start, "end": end, "coefficients": row.tolist()}
-            for start, end, row in zip(
-                found.breaks.tolist(), found.breaks[1:].tolist(), found.coefficients, strict=False
-            )
-        ],
-        "points": [
-            {
-                "point": name,
-                "x": x,
-                "y": y,
-                "curve": y - residual,
-                "residual": residual,
-                "standard_uncertainty": _known(u),
-            }
-            for name, x, y, residual, u in zip(
-                points.names,
-                fitted.x.tolist(),
-                fitted.y.tolist(),
-                fitted.residuals.tolist(),
-                spread,
-                strict=True,
-            )
-        ],
-        "values": [
-            {"x": x, "curve": value, "slope": slope, "standard_uncertainty": _known(u)}
-            for x, value, slope, u in zip(
-                at.tolist(),
-                fitted.values(at).tolist(),
-                fitted.values(at, 1).tolist(),
-                curve.standard_uncertainty(at),
-                strict=True,
-            )
-        ],
-    }
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    data: dict[str, Any] = as_data(
+        {
+            "file": file,
+            "x": {"name": points.x_column.name, "unit": units[points.x_column.kind]},
+            "y": {"name": points.y_column.name, "unit": units[points.y_column.kind]},
+            **picked(space, "order", "knots"),
+            "start": space.lower,
+            "end": space.upper,
+            **picked(curve, "boundaries", "sigma", "sigma_is_estimated", "coverage_factor"),
+            **picked(fitted, "degrees_of_freedom", "sum_of_squares"),
+            "prescribed": [
+                {
+                    "at": hold.places[0],
+                    **picked(hold, "derivative", "value"),
+                    "missed_by": fitted.violation(hold),
+                }
+                for hold in curve.holds
+            ],
+            "free_coefficients": fitted.free,
+            "powers": powers,
+            "pieces": records(
+                start=found.breaks[:-1], end=found.breaks[1:], coefficients=found.coefficients
+            ),
+            "points": records(
+                point=points.names,
+                x=fitted.x,
+                y=fitted.y,
+                curve=fitted.y - fitted.residuals,
+                residual=fitted.residuals,
+                standard_uncertainty=curve.standard_uncertainty(fitted.x),
+            ),
+            "values": records(
+                x=at,
+                curve=fitted.values(at),
+                slope=fitted.values(at, 1),
+                standard_uncertainty=curve.standard_uncertainty(at),
+            ),
+        }
+    )
+    return data
 
 
 def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:

@@ -14,17 +14,19 @@ from ..presentation.svg import (
     MUTED,
     PAPER,
     SERIES,
+    common_legend,
     drawing,
     micro,
     placed_axes,
     round_number,
     save,
+    scale_bar,
+    sticks,
 )
 from .curve_tables import derivative_unit, shown
 from .error_curve import ErrorCurve, whole_profile
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Points: of the drawings.
@@ -93,8 +95,7 @@ def draw_curve(curve: ErrorCurve, path: str | Path | None = None) -> Figure:
             )
         axes.set_xlabel(f"{x.words}, {micro(x.unit)}")
         axes.set_ylabel(f"{y.words}, {micro(y.unit)}")
-        handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3)
+        common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3)
         return save(figure, path, words(curve))
 
 
@@ -159,19 +160,22 @@ def draw_whiskers(
         fitted = set(curve.points.names)
         inside = np.array([name in fitted for name in points.names])
         for chosen, colour, label in ((inside, SERIES[0], "fitted"), (~inside, INK, "not fitted")):
-            _bars(
-                axes,
-                start[chosen] / factor,
-                tips[chosen] / factor,
-                colour,
-                label if not inside.all() else "error",
-            )
-        _scale(axes, scale * magnification / factor, f"{scale * 1e6:g} µm")
+            if chosen.any():
+                sticks(
+                    axes,
+                    start[chosen] / factor,
+                    tips[chosen] / factor,
+                    color=colour,
+                    linewidth=1.2,
+                    marker="o",
+                    markersize=2.5,
+                    label=label if not inside.all() else "error",
+                )
+        scale_bar(axes, scale * magnification / factor, 0.08, f"{scale * 1e6:g} µm")
         axes.set_xlabel(f"axial co-ordinate, {unit}")
         axes.set_ylabel(f"radius, {unit}")
-        handles, labels = axes.get_legend_handles_labels()
         title = f"{points.y_column.words}, magnified {magnification:g} times"
-        figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
+        common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
         worst = int(np.argmax(comparable(np.abs(points.y))))
         told = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
         largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"
@@ -186,20 +190,3 @@ def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.nd
     for first, last in features:
         parts += [places[first : last + 1, ::-1], np.full((1, 2), np.nan)]
     return np.concatenate(parts)
-
-
-def _bars(axes: Axes, start: np.ndarray, tips: np.ndarray, colour: str, label: str) -> None:
-    if not len(start):
-        return
-    gaps = np.full_like(start, np.nan)
-    x, y = np.stack([start, tips, gaps], axis=1).reshape(-1, 2).T
-    axes.plot(x, y, color=colour, linewidth=1.2, label=label)
-    axes.plot(*start.T, color=colour, marker="o", markersize=2.5, linestyle="none")
-
-
-def _scale(axes: Axes, length: float, text: str) -> None:
-    """A bar of a length in the lower left corner."""
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    x, y = left + 0.05 * (right - left), bottom + 0.08 * (top - bottom)
-    axes.plot([x, x + length], [y, y], color=INK, linewidth=2.0)
-    axes.text(x, y + 0.02 * (top - bottom), text, va="bottom", ha="left")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from math import comb, prod
 
 import numpy as np
@@ -20,10 +21,11 @@ from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 
+from ..presentation.formatting import csv_lines
 from ..uncertainty.pairs import PairTile, pair_tiles
 from ..uncertainty.tasks import expansion
 from .length_groups import LengthGroups, LengthMapSettings
-from .length_tables import LengthMap, csv_line
+from .length_tables import LengthMap
 
 # Points of a grid: twelve million lengths.
 MOST_POINTS = 5000
@@ -154,14 +156,23 @@ def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[st
     """A line for each length; what is undetermined is left empty."""
     points, tiles = length_pairs(experiment, settings)
     axes = AXIS_NAMES[: points.shape[1]]
-    heads = [f"{axis}{end}_mm" for end in (1, 2) for axis in axes]
-    yield ",".join([*heads, "length_mm,u_um,expanded_um,target_um"])
-    for tile in tiles:
+    heads = [
+        *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
+        "length_mm,u_um,expanded_um,target_um",
+    ]
+    for k, tile in enumerate(tiles):
         u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
-        target = 1e6 * settings.target.at(tile.lengths)
-        columns = [1e3 * points[tile.first], 1e3 * points[tile.second], 1e3 * tile.lengths, u]
-        for row in np.column_stack([*columns, settings.coverage_factor * u, target]).tolist():
-            yield csv_line(row)
+        lines = csv_lines(
+            heads,
+            1e3 * points[tile.first],
+            1e3 * points[tile.second],
+            1e3 * tile.lengths,
+            u,
+            settings.coverage_factor * u,
+            1e6 * settings.target.at(tile.lengths),
+        )
+        # The heads stand above the first lengths alone.
+        yield from islice(lines, int(k > 0), None)
 
 
 def _tiles(

@@ -20,6 +20,7 @@ from ..presentation.svg import (
     PAPER,
     SERIES,
     drawing,
+    legend_above,
     micro,
     placed_axes,
     save,
@@ -203,13 +204,4 @@ def _curves(axes: Axes, found: GroupedLengths) -> None:
     axes.grid(True)
     axes.set_xlabel("length, mm")
     axes.set_ylabel("µm")
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=4,
-        borderaxespad=0.3,
-        borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.4,
-        handletextpad=0.5,
-    )
+    legend_above(axes, 4)

@@ -11,7 +11,16 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array
 
-from ..presentation.formatting import aligned, finite, number, percent, uncertainty_words
+from ..presentation.formatting import (
+    aligned,
+    as_data,
+    csv_lines,
+    number,
+    percent,
+    picked,
+    records,
+    uncertainty_words,
+)
 from ..presentation.result import Result
 from .length_groups import GroupedLengths, LengthGroups, target_words
 from .length_plots import draw_lengths
@@ -225,68 +234,52 @@ def _table(
 def point_csv(lengths: LengthMap) -> Iterator[str]:
     """A line for each point of the grid: of the lengths that start or end there."""
     axes = AXES[: lengths.design.dimension]
-    yield ",".join([*(f"{axis}_mm" for axis in axes), POINT_COLUMNS])
     groups = lengths.by_point
-    columns = [
+    return csv_lines(
+        [*(f"{axis}_mm" for axis in axes), POINT_COLUMNS],
         1e3 * lengths.points,
         groups.count,
         groups.undetermined,
         1e6 * groups.average,
         1e6 * groups.maximum,
-    ]
-    columns += [groups.average_ratio, groups.maximum_ratio, groups.share(), groups.share(True)]
-    for row in np.column_stack(columns).tolist():
-        yield csv_line(row)
-
-
-def csv_line(row: list[float]) -> str:
-    return ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
+        groups.average_ratio,
+        groups.maximum_ratio,
+        groups.share(),
+        groups.share(True),
+    )
 
 
 def _data(lengths: LengthMap) -> dict[str, Any]:
     """The same as plain data in metres; what is undetermined is None."""
-    settings = lengths.settings
-    edges = lengths.edges.tolist()
+    settings, edges = lengths.settings, lengths.edges.tolist()
     classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
-    return {
-        "experiment": lengths.label,
-        "title": lengths.title,
-        "rank_deficiency": lengths.deficiency,
-        "grid": list(settings.grid),
-        "probe": settings.probe,
-        "target": {"constant": settings.target.constant, "slope": settings.target.slope},
-        "coverage_factor": settings.coverage_factor,
-        "target_coverage_factor": settings.target_factor,
-        "with_repeatability": settings.with_repeatability,
-        "all": _group_data(lengths.whole)[0],
-        "worst": None
-        if lengths.worst is None
-        else [lengths.points[k].tolist() for k in lengths.worst],
-        "by_length": _with(classes, lengths.by_length),
-        "by_direction": _with(
-            [{"direction": name} for name in lengths.directions], lengths.by_direction
-        ),
-        "by_point": _with(
-            [{"point": point} for point in lengths.points.tolist()], lengths.by_point
-        ),
-    }
-
-
-def _with(heads: list[dict[str, Any]], groups: LengthGroups) -> list[dict[str, Any]]:
-    return [{**head, **own} for head, own in zip(heads, _group_data(groups), strict=True)]
-
-
-def _group_data(groups: LengthGroups) -> list[dict[str, Any]]:
-    return [
+    data: dict[str, Any] = as_data(
         {
-            "lengths": int(groups.count[i]),
-            "undetermined": int(groups.undetermined[i]),
-            "average": finite(float(groups.average[i])),
-            "maximum": finite(float(groups.maximum[i])),
-            "average_ratio": finite(float(groups.average_ratio[i])),
-            "maximum_ratio": finite(float(groups.maximum_ratio[i])),
-            "share_within": finite(float(groups.share()[i])),
-            "share_expanded_within": finite(float(groups.share(True)[i])),
+            "experiment": lengths.label,
+            "title": lengths.title,
+            "rank_deficiency": lengths.deficiency,
+            **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+            "target": picked(settings.target, "constant", "slope"),
+            "target_coverage_factor": settings.target_factor,
+            "all": _group_data([{}], lengths.whole)[0],
+            "worst": None if lengths.worst is None else [lengths.points[k] for k in lengths.worst],
+            "by_length": _group_data(classes, lengths.by_length),
+            "by_direction": _group_data(
+                [{"direction": name} for name in lengths.directions], lengths.by_direction
+            ),
+            "by_point": _group_data(
+                [{"point": point} for point in lengths.points], lengths.by_point
+            ),
         }
-        for i in range(len(groups.count))
-    ]
+    )
+    return data
+
+
+def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[dict[str, Any]]:
+    rows = records(
+        lengths=groups.count,
+        **picked(groups, "undetermined", "average", "maximum", "average_ratio", "maximum_ratio"),
+        share_within=groups.share(),
+        share_expanded_within=groups.share(True),
+    )
+    return [head | row for head, row in zip(heads, rows, strict=True)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from ballplate.simulator.machines.arrangement import AXES
@@ -144,12 +145,7 @@ class Volumetric:
         for k, (function, deviation) in enumerate(
             zip(model.chain.functions, deviations, strict=True)
         ):
-            if isinstance(deviation, Points):
-                columns[:, :, k] *= np.interp(
-                    points[:, function.axis], deviation.positions, deviation.values
-                )[:, None]
-            else:
-                columns[:, :, k] *= deviation
+            columns[:, :, k] *= _at(deviation, points[:, function.axis])[:, None]
         probing = np.broadcast_to(self.machine.probing * np.eye(3), (len(points), 3, 3))
         lasting, sizes = self.lasting
         return (
@@ -215,6 +211,13 @@ def between(start: Array, end: Array, count: int) -> Array:
     return np.asarray(np.linspace(start, end, count))
 
 
+def _at(deviation: float | Points, positions: Array) -> Array:
+    """A standard deviation at positions (m,) along its axis."""
+    if isinstance(deviation, Points):
+        return np.asarray(np.interp(positions, deviation.positions, deviation.values))
+    return np.full(len(positions), deviation)
+
+
 @dataclass(frozen=True, eq=False)
 class AlongAxis:
     """A parametric error along its axis: at `positions` (m,), as stated, at the reference point,
@@ -230,6 +233,10 @@ class AlongAxis:
     values: Array | None
     deviation: Array | None
     measured: Points | None
+
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        return "rad" if self.error.is_rotation else "m"
 
     @property
     def range(self) -> float:
@@ -257,15 +264,7 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
                 positions,
                 None if shape is None else shape.values(t)[:, 0],
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
-                (
-                    None
-                    if deviation is None
-                    else (
-                        np.interp(positions, deviation.positions, deviation.values)
-                        if isinstance(deviation, Points)
-                        else np.full(len(positions), deviation)
-                    )
-                ),
+                None if deviation is None else _at(deviation, positions),
                 table,
             )
         )

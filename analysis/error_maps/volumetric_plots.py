@@ -13,7 +13,8 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.volumetric import meaning, symbol
 
 from ..presentation.formatting import SHOWN, number
-from ..presentation.scene import box_edges, projection
+from ..presentation.pictures import draw_box
+from ..presentation.scene import box, projection
 from ..presentation.svg import (
     DASHES,
     INK,
@@ -23,6 +24,7 @@ from ..presentation.svg import (
     SERIES,
     blank_axes,
     drawing,
+    legend_above,
     micro,
     placed_axes,
     round_number,
@@ -45,9 +47,6 @@ MOST_LINES, MOST_ON_LINE = 41, 201
 
 # Between the plot and its title, in points: the legend stands there and covers nothing.
 TITLE_PAD = 26.0
-
-# Part of the drawing's size below which an edge is too short for its name between its numbers.
-SHORT = 0.25
 
 # Points beyond which they are not marked one by one.
 MOST_MARKS = 60
@@ -78,11 +77,8 @@ def draw_grid(
     moved = nominal + factor * errors.systematic.reshape(*counts, 3)
     with drawing(430.0, WIDTH) as figure:
         axes = blank_axes(figure)
-        edges, hidden = box_edges(nominal[0, 0, 0], nominal[-1, -1, -1], away)
-        for edge, is_hidden in zip(edges, hidden, strict=True):
-            axes.plot(
-                *(edge @ view.T).T, color=MUTED, linewidth=0.9, linestyle=":" if is_hidden else "-"
-            )
+        volume = box(nominal[0, 0, 0], nominal[-1, -1, -1])
+        draw_box(axes, volume)
         for axis in range(3):
             near = -1 if away[axis] < 0 else 0
             for side, is_near in ((near, True), (-1 - near, False)):
@@ -90,10 +86,9 @@ def draw_grid(
                 # front stays readable.
                 _face(axes, nominal.take(side, axis) @ view.T, MUTED, 0.5, is_near)
                 _face(axes, moved.take(side, axis) @ view.T, SERIES[0], 1.1, is_near)
-        size = float(np.ptp(edges @ view.T, axis=(0, 1)).max())
-        drawn = np.concatenate([edges.reshape(-1, 3), moved.reshape(-1, 3)]) @ view.T
+        size = volume.size
+        drawn = np.concatenate([volume.edges.reshape(-1, 2), moved.reshape(-1, 3) @ view.T])
         low, high = drawn.min(axis=0), drawn.max(axis=0)
-        _axis_names(axes, nominal, view, size)
         middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
         for k, corner in enumerate(diagonals.starts @ view.T):
             x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
@@ -114,7 +109,7 @@ def draw_grid(
         ]
         lengths = f"length errors of the diagonals from the corners {', '.join(told)}"
         figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
-        axes.set_xlim(low[0] - 0.16 * size, high[0] + 0.12 * size)
+        axes.set_xlim(low[0] - 0.2 * size, high[0] + 0.16 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
         return save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
 
@@ -132,52 +127,21 @@ def _spread(count: int, most: int) -> Integers:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
-def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
-    """Names and ends of the axes along the lower front edges and the left one."""
-    middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
-    ends = [nominal[0, 0, 0], nominal[-1, -1, -1]]
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        choices = []
-        for one in (0, 1):
-            for two in (0, 1):
-                line = np.array([ends[0], ends[1]])
-                line[:, others[0]], line[:, others[1]] = ends[one][others[0]], ends[two][others[1]]
-                choices.append(line @ view.T)
-        # Horizontal axes stand lowest, the vertical one furthest to the left.
-        edge = min(choices, key=lambda line, axis=axis: float(line.mean(axis=0)[int(axis != 2)]))  # type: ignore[misc]
-        along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
-        out = np.array([along[1], -along[0]])
-        out = out if out @ (edge.mean(axis=0) - middle) > 0 else -out
-        # Beside a short edge the name stands outside its numbers.
-        off = 0.02 if np.linalg.norm(edge[1] - edge[0]) > SHORT * size else 0.12
-        texts = [(edge.mean(axis=0) + off * size * out, f"{'xyz'[axis]}, mm")]
-        texts += [(edge[k] + 0.02 * size * out, f"{1e3 * ends[k][axis] + 0.0:.6g}") for k in (0, 1)]
-        for (x, y), text in texts:
-            axes.text(
-                x,
-                y,
-                text,
-                ha="left" if out[0] > 0 else "right",
-                va="center" if axis == 2 else "top",
-            )
-
-
-def draw_line(errors: VolumetricErrors, path: str | Path | None = None) -> Figure:
+def draw_line(found: VolumetricErrors, path: str | Path | None = None) -> Figure:
     """A picture of the errors along a line: components, resultant, and twice the random part about
     them; it is written to the path, if there is one.
 
     :raises OSError: the file cannot be written.
     """
-    start, end = 1e3 * errors.points[0], 1e3 * errors.points[-1]
+    start, end = 1e3 * found.points[0], 1e3 * found.points[-1]
     moving = np.flatnonzero(start != end)
     if len(moving) == 1:
         axis = int(moving[0])
-        name, positions = "xyz"[axis], 1e3 * errors.points[:, axis]
+        name, positions = "xyz"[axis], 1e3 * found.points[:, axis]
         where = ", ".join(f"{'xyz'[k]} = {start[k]:.6g} mm" for k in range(3) if k != axis)
         along = f"along {name} at {where}"
     else:
-        name, positions = "distance", 1e3 * np.linalg.norm(errors.points - errors.points[0], axis=1)
+        name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
         ends = [f"({', '.join(f'{value:.6g}' for value in point)})" for point in (start, end)]
         where = along = f"from {ends[0]} to {ends[1]} mm"
     with drawing(320.0, WIDTH) as figure:
@@ -187,24 +151,24 @@ def draw_line(errors: VolumetricErrors, path: str | Path | None = None) -> Figur
             _band(
                 axes,
                 positions,
-                1e6 * errors.systematic[:, k],
-                1e6 * errors.deviation[:, k],
+                1e6 * found.systematic[:, k],
+                1e6 * found.deviation[:, k],
                 k,
                 letter,
             )
         axes.plot(
             positions,
-            1e6 * errors.resultant,
+            1e6 * found.resultant,
             color=INK,
             linewidth=1.2,
             linestyle=DASHES[3],
             label="resultant",
         )
-        _band_in_legend(axes, bool(errors.deviation.any()))
+        _band_in_legend(axes, bool(found.deviation.any()))
         _finish(axes, f"{name}, mm", "error, µm")
-        worst = int(comparable(errors.resultant).argmax())
+        worst = int(comparable(found.resultant).argmax())
         told = (
-            f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
+            f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
             f" {positions[worst]:.6g} mm"
         )
         return save(figure, path, f"Volumetric errors {along}: {told}")
@@ -217,7 +181,7 @@ def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
     :raises OSError: the file cannot be written.
     """
     positions = 1e3 * along.positions
-    name, unit = along.error.name, micro(SHOWN["rad" if along.error.is_rotation else "m"])
+    name, unit = along.error.name, micro(SHOWN[along.unit])
     with drawing(280.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
         band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
@@ -296,13 +260,4 @@ def _finish(axes: Axes, x: str, y: str) -> None:
     axes.margins(x=0.0)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=5,
-        borderaxespad=0.3,
-        borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.0,
-        handletextpad=0.5,
-    )
+    legend_above(axes, 5)

@@ -14,7 +14,7 @@ from ballplate.simulator.machines.curves import NAMES
 from ballplate.simulator.machines.protocol import Array, Parameter
 from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
 
-from ..presentation.formatting import SHOWN, aligned, number
+from ..presentation.formatting import SHOWN, aligned, as_data, csv_lines, number, records
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = (
@@ -30,19 +30,10 @@ def machine_lines(built: Volumetric) -> list[str]:
     lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
     rows = [["", "symbol", "error", "range", "random", "unit", "stated as"]]
     for one in along_axes(machine):
-        unit = "rad" if one.error.is_rotation else "m"
-        factor = 1e6
-        random = "" if one.deviation is None else number(factor * float(one.deviation.max()))
-        found = "" if one.values is None else number(factor * one.range)
-        cells = [
-            one.error.name,
-            symbol(one.error.name),
-            meaning(one.error.name),
-            found,
-            random,
-            SHOWN[unit],
-        ]
-        rows.append([*cells, _stated_as(one)])
+        name = one.error.name
+        random = "" if one.deviation is None else number(1e6 * float(one.deviation.max()))
+        found = "" if one.values is None else number(1e6 * one.range)
+        rows.append([name, symbol(name), meaning(name), found, random, _unit(one), _stated_as(one)])
     lines += (
         aligned(rows, [False, False, False, True, True, False, False])
         if len(rows) > 1
@@ -211,13 +202,7 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
 
 def along_lines(along: AlongAxis) -> list[str]:
     """A parametric error along its axis."""
-    unit = SHOWN["rad" if along.error.is_rotation else "m"]
-    columns = [
-        ("stated", along.stated),
-        ("at the reference point", along.values),
-        ("random", along.deviation),
-    ]
-    given = [(name, values) for name, values in columns if values is not None]
+    given, unit = _given(along, "at the reference point"), _unit(along)
     positions = along.positions
     keep = (
         np.arange(0, len(positions), 5)
@@ -225,12 +210,12 @@ def along_lines(along: AlongAxis) -> list[str]:
         else np.flatnonzero(np.isin(positions, along.measured.positions))
     )
     axis = along.error.name[2].lower()
-    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name, _ in given)]]
+    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name in given)]]
     for k in keep:
         rows.append(
             [
                 _millimetres(float(positions[k])),
-                *(_fixed(float(1e6 * values[k]), 3) for _, values in given),
+                *(_fixed(1e6 * values[k], 3) for values in given.values()),
             ]
         )
     head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
@@ -251,34 +236,38 @@ def _line_stated(along: AlongAxis) -> str:
 
 def error_csv(errors: VolumetricErrors) -> Iterator[str]:
     """Errors as lines of a CSV file."""
-    yield (
-        "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um,"
-        "random_x_um,random_y_um,random_z_um"
-    )
-    columns = (
+    return csv_lines(
+        [
+            "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um",
+            "random_x_um,random_y_um,random_z_um",
+        ],
         1e3 * errors.points,
         1e6 * errors.systematic,
-        1e6 * errors.resultant[:, None],
+        1e6 * errors.resultant,
         1e6 * errors.deviation,
     )
-    for row in np.concatenate(columns, axis=1).tolist():
-        yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
 
 def along_csv(along: AlongAxis) -> Iterator[str]:
     """A parametric error along its axis as lines of a CSV file."""
-    unit = SHOWN["rad" if along.error.is_rotation else "m"]
-    columns = [
-        ("stated", along.stated),
-        (along.error.name, along.values),
-        ("random", along.deviation),
-    ]
-    given = [(name, values) for name, values in columns if values is not None]
-    yield ",".join(["position_mm", *(f"{name}_{unit}" for name, _ in given)])
-    for row in np.column_stack(
-        [1e3 * along.positions, *(1e6 * values for _, values in given)]
-    ).tolist():
-        yield ",".join(f"{value + 0.0:.12g}" for value in row)
+    given = _given(along, along.error.name)
+    return csv_lines(
+        ["position_mm", *(f"{name}_{_unit(along)}" for name in given)],
+        1e3 * along.positions,
+        *(1e6 * values for values in given.values()),
+    )
+
+
+def _given(one: AlongAxis, name: str) -> dict[str, Array]:
+    """What there is of an error along its axis, where `name` is what it is at the reference
+    point.
+    """
+    columns = {"stated": one.stated, name: one.values, "random": one.deviation}
+    return {key: values for key, values in columns.items() if values is not None}
+
+
+def _unit(one: AlongAxis) -> str:
+    return SHOWN[one.unit]
 
 
 def machine_data(built: Volumetric) -> dict[str, Any]:
@@ -288,7 +277,7 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
     for one in along_axes(machine):
         functions[one.error.name] = {
             "symbol": symbol(one.error.name),
-            "unit": "rad" if one.error.is_rotation else "m",
+            "unit": one.unit,
             "range": None if one.values is None else one.range,
             "random": None if one.deviation is None else float(one.deviation.max()),
         }
@@ -313,52 +302,39 @@ def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
 
 def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
     """Length errors, in metres."""
-    return [
-        {
-            "from": errors.starts[k].tolist(),
-            "to": errors.ends[k].tolist(),
-            "length": float(errors.nominal[k]),
-            "error": float(errors.error[k]),
-            "random": float(errors.deviation[k]),
-        }
-        for k in range(len(errors.error))
-    ]
+    ends = {"from": errors.starts, "to": errors.ends}
+    rows = records(**ends, length=errors.nominal, error=errors.error, random=errors.deviation)
+    return list(as_data(rows))
 
 
 def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
     """Errors point by point, in metres."""
-    return [
-        {"position": point, "error": error, "resultant": resultant, "random": random}
-        for point, error, resultant, random in zip(
-            errors.points.tolist(),
-            errors.systematic.tolist(),
-            errors.resultant.tolist(),
-            errors.deviation.tolist(),
-            strict=True,
-        )
-    ]
+    rows = records(
+        position=errors.points,
+        error=errors.systematic,
+        resultant=errors.resultant,
+        random=errors.deviation,
+    )
+    return list(as_data(rows))
 
 
 def along_data(along: AlongAxis) -> dict[str, Any]:
     """A parametric error along its axis, in metres and radians."""
-
-    def listed(values: Array | None) -> list[float] | None:
-        return None if values is None else [float(value) for value in values]
-
-    return {
+    data = {
         "error": along.error.name,
         "symbol": symbol(along.error.name),
-        "unit": "rad" if along.error.is_rotation else "m",
-        "position": listed(along.positions),
-        "stated": listed(along.stated),
-        "value": listed(along.values),
-        "random": listed(along.deviation),
+        "unit": along.unit,
+        "position": along.positions,
+        "stated": along.stated,
+        "value": along.values,
+        "random": along.deviation,
     }
+    return dict(as_data(data))
 
 
 def _fixed(value: float, decimals: int) -> str:
     """A number with so many decimals; what rounds to zero has no sign."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
 def _millimetres(value: float) -> str:

@@ -26,7 +26,7 @@ from ballplate.simulator.estimation.length_equations import (
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import (
@@ -37,7 +37,7 @@ from ballplate.simulator.readings.generate import (
 )
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
-from ..presentation.formatting import SHOWN, aligned, number
+from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
 from ..presentation.result import FitResult, Result
 from ..results.estimates import ParameterEstimate, estimate_rows
 from .length_fits import has_all_errors
@@ -160,9 +160,7 @@ def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
             try:
                 found.append(pairs(layout, chosen) + first)
             except ValueError as error:
-                raise ExperimentError(
-                    [Message(str(experiment.source), 0, 0, f"artefacts.{artefact}", str(error))]
-                ) from None
+                raise refused(experiment.source, str(error), f"artefacts.{artefact}") from None
         first += len(layout.names)
     return np.concatenate(found)
 
@@ -217,7 +215,7 @@ def _refuse_many_terms(
             f"{len(design.model.parameters)} parameters: take fewer --pairs, such as corners, or"
             " fewer balls"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+        raise refused(experiment.source, text, "artefacts")
 
 
 def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
@@ -231,7 +229,7 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
         text = (
             f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+        raise refused(experiment.source, text, "artefacts")
 
 
 def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
@@ -254,7 +252,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
             " ballplate check"
         )
     if text:
-        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+        raise refused(experiment.source, text, what)
 
 
 def fit_alternative(
@@ -455,24 +453,18 @@ def _fit_data(fit: AlternativeFit) -> dict[str, Any]:
     """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
     None.
     """
-    return {
-        "experiment": fit.label,
-        "title": fit.title,
-        "estimator": fit.solution.estimator,
-        "pairs": fit.pairs,
-        "lengths": fit.lengths,
-        "observations": fit.solution.observations,
-        "rank_deficiency": fit.solution.deficiency,
-        "status": fit.solution.status,
-        "iterations": [
-            {"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations
-        ],
-        "estimates": {
-            e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit}
-            for e in fit.estimates
-        },
-        **fit.said(),
-    }
+    data: dict[str, Any] = as_data(
+        {
+            "experiment": fit.label,
+            **picked(fit, "title", "pairs", "lengths"),
+            **picked(fit.solution, "estimator", "observations", "status"),
+            "rank_deficiency": fit.solution.deficiency,
+            "iterations": [picked(it, "step", "sum_of_squares") for it in fit.solution.iterations],
+            "estimates": {e.name: picked(e, "value", "unit") for e in fit.estimates},
+            **fit.said(),
+        }
+    )
+    return data
 
 
 def _comparison_lines(comparison: EstimatorComparison) -> list[str]:
@@ -525,24 +517,17 @@ def _comparison_data(comparison: EstimatorComparison) -> dict[str, Any]:
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
         "experiment": comparison.label,
-        "title": comparison.title,
-        "estimator": comparison.estimator,
-        "trials": comparison.trials,
-        "pairs": comparison.pairs,
-        "lengths": comparison.lengths,
-        "across_probes": comparison.across_probes,
-        "points": comparison.points,
-        "not_converged": list(comparison.failed),
+        **picked(comparison, "title", "estimator", "trials", "pairs", "lengths"),
+        **picked(comparison, "across_probes", "points"),
+        "not_converged": comparison.failed,
     }
     for key, values in (("rms", comparison.rms), ("maximum", comparison.maximum)):
-        quantiles = list(np.quantile(values, QUANTILES)) if len(values) else []
+        quantiles = np.quantile(values, QUANTILES) if len(values) else ()
         data[key] = {
-            "quantiles": {
-                str(q): float(value) for q, value in zip(QUANTILES, quantiles, strict=False)
-            },
-            "values": [float(value) for value in values],
+            "quantiles": {str(q): value for q, value in zip(QUANTILES, quantiles, strict=False)},
+            "values": values,
         }
         value = comparison.published.get(key)
         if value is not None:
             data[key] |= {"published": value, "share_below_published": share_below(values, value)}
-    return data
+    return dict(as_data(data))

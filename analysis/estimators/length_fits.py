@@ -21,12 +21,12 @@ from ballplate.simulator.estimation.length_equations import (
 from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
-from ..presentation.formatting import aligned, finite, number
+from ..presentation.formatting import aligned, as_data, number, picked
 from ..presentation.result import FitResult
 from ..rank.verdict import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
@@ -130,7 +130,7 @@ def fit_lengths(
             f"{error}; look for wrong units, balls or positions among the readings, or read more"
             " directions"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
+        raise refused(experiment.source, text) from None
     remarks = _remarks(design, estimator, solution)
     if sigma is not None:
         remarks.append(
@@ -164,12 +164,9 @@ def _refuse_other_artefacts(
     """Refuse an experiment that has no lengths in three dimensions."""
     if design.dimension == 3 and len(design.of(Lengths)):
         return
-    what = "machine.volume" if design.dimension != 3 else "artefacts"
-    has = (
-        "has two dimensions"
-        if design.dimension != 3
-        else "has no ball bar or Bryan gauge whose lengths are read"
-    )
+    what, has = "artefacts", "has no ball bar or Bryan gauge whose lengths are read"
+    if design.dimension != 3:
+        what, has = "machine.volume", "has two dimensions"
     text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
     bars = [
         name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)
@@ -178,7 +175,7 @@ def _refuse_other_artefacts(
         text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
         mark = experiment.place(("artefacts", bars[0]))
         raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
-    raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+    raise refused(experiment.source, text, what)
 
 
 def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolution) -> list[str]:
@@ -232,14 +229,13 @@ def _lines(fit: LengthFit) -> list[str]:
     """Solved length equations as lines of text."""
     found = fit.solution
     rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
-    status = "converged" if found.converged else "not converged"
     lines = [
         f"{fit.label}: {fit.title}",
         (
             f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
             f" {rank}; {freedom_words(found.degrees_of_freedom)}"
         ),
-        f"{status} after {found.iterations} iterations",
+        f"{_status(fit)} after {found.iterations} iterations",
         "",
     ]
     rows = [
@@ -261,6 +257,10 @@ def _lines(fit: LengthFit) -> list[str]:
     return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
 
 
+def _status(fit: LengthFit) -> str:
+    return "converged" if fit.solution.converged else "not converged"
+
+
 def _millimetres(value: float, decimals: int) -> str:
     return "-" if np.isnan(value) else f"{1e3 * value:.{decimals}f}"
 
@@ -268,18 +268,19 @@ def _millimetres(value: float, decimals: int) -> str:
 def _data(fit: LengthFit) -> dict[str, Any]:
     """Solved length equations as plain data in metres and radians; what is open is None."""
     found = fit.solution
-    return {
-        "experiment": fit.label,
-        "title": fit.title,
-        "estimator": found.estimator,
-        "status": "converged" if found.converged else "not converged",
-        "equations": found.equations,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "rank_deficiency": found.deficiency,
-        "factors": {name: finite(value) for name, value in zip(FACTORS, fit.factors, strict=True)},
-        "adjustments": adjustment_data(fit.adjustments),
-        "pivots": {name: [finite(value) for value in centre] for name, centre in fit.pivots},
-        "spheres": dict(fit.spheres),
-        "lengths": {name: finite(value) for name, value in fit.lengths},
-        **fit.said(),
-    }
+    data: dict[str, Any] = as_data(
+        {
+            "experiment": fit.label,
+            "title": fit.title,
+            **picked(found, "estimator", "equations", "degrees_of_freedom"),
+            "status": "converged" if found.converged else "not converged",
+            "rank_deficiency": found.deficiency,
+            "factors": dict(zip(FACTORS, fit.factors, strict=True)),
+            "adjustments": adjustment_data(fit.adjustments),
+            "pivots": dict(fit.pivots),
+            "spheres": dict(fit.spheres),
+            "lengths": dict(fit.lengths),
+            **fit.said(),
+        }
+    )
+    return data

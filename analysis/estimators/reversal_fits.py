@@ -72,7 +72,7 @@ def fit_reversal(
     except UndeterminedError as error:
         text = f"{error}; read balls that are not"
         raise ExperimentError(
-            [_message(experiment, ("artefacts", design.artefacts.names[0]), text)]
+            [experiment.message(("artefacts", design.artefacts.names[0]), text)]
         ) from None
     axes = axes_of_plates(experiment)[design.artefacts.names[0]]
     full = fit(experiment, observed, sigma)
@@ -108,16 +108,12 @@ PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
 )
 
 
-def _message(experiment: Experiment, steps: Steps, text: str) -> Message:
-    return experiment.message(steps, text)
-
-
 def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Scale | None) -> None:
     """Refuse what is no reversal."""
     found: list[Message] = []
 
     def say(steps: Steps, text: str) -> None:
-        found.append(_message(experiment, steps, f"{text}, {INSTEAD}"))
+        found.append(experiment.message(steps, f"{text}, {INSTEAD}"))
 
     if not isinstance(experiment.error_model, MetricSettings):
         kind = experiment.error_model.kind

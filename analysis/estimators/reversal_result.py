@@ -13,7 +13,7 @@ from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
-from ..presentation.formatting import SHOWN, aligned, number, to_uncertainty
+from ..presentation.formatting import SHOWN, aligned, as_data, number, picked, to_uncertainty
 from ..presentation.result import FitResult
 from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
@@ -252,15 +252,14 @@ def _data(fit: ReversalFit) -> dict[str, Any]:
         "experiment": fit.label,
         "title": fit.title,
         "estimator": "reversal",
-        "scale": fit.scale,
-        "offsets": fit.offsets,
-        "positions": {"first": fit.first, "second": fit.second},
+        **picked(fit, "scale", "offsets"),
+        "positions": picked(fit, "first", "second"),
         "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
         "degrees_of_freedom": found.degrees_of_freedom,
         "neglected_standard_uncertainties": found.bias,
         "neglected_coordinates": fit.distortion,
         "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
-        "estimates": {e.name: {"value": e.value, "unit": e.unit} for e in fit.estimates},
+        "estimates": {e.name: picked(e, "value", "unit") for e in fit.estimates},
         "axes": {
             "origin": fit.names[fit.axes.origin],
             "xy"[fit.axes.axis]: fit.names[fit.axes.ball],
@@ -269,11 +268,7 @@ def _data(fit: ReversalFit) -> dict[str, Any]:
         "residuals": _by_ball(fit.names, found.residuals),
         "multiple_redundancy": {
             "relation": {
-                e.name: {
-                    "value": None if np.isnan(e.value) else e.value,
-                    "standard_uncertainty": None if np.isnan(e.value) else e.standard_uncertainty,
-                    "unit": e.unit,
-                }
+                e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
                 for e in fit.redundant
             },
             **fit.full.to_dict(),

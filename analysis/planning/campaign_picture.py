@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..planning.choice import Gain, Selection
+from ..planning.constraints import HOUR, Budget, Spent
+from ..planning.criteria import DESCRIPTIONS
 from ..presentation.formatting import number
 from ..presentation.pictures import draw_scene
 from ..presentation.scene import scene
@@ -23,12 +26,10 @@ from ..presentation.svg import (
     PAPER,
     SERIES,
     drawing,
+    legend_above,
     placed_axes,
     save,
 )
-from .choice import Gain, Selection
-from .constraints import HOUR, Budget, Spent
-from .criteria import DESCRIPTIONS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -203,16 +204,7 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
             markeredgewidth=2.0 if is_inside and marker == "|" else 1.0,
             clip_on=False,
         )
-        axes.annotate(
-            mark.told,
-            (1.0, k),
-            (VALUES - RIGHT + 2.0, 0.0),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=9.0,
-        )
+        _told_beside(axes, mark.told, k, high)
     _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
@@ -286,16 +278,7 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
     )
     _plain_numbers(axes.yaxis, axes.get_yscale() == "log")
     axes.grid(True)
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(-0.09, 1.04),
-        ncols=3,
-        borderaxespad=0.2,
-        borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.0,
-        handletextpad=0.5,
-    )
+    legend_above(axes, 3, -0.09, 1.04)
 
 
 def _limits(values: Sequence[float], target: float | None) -> tuple[float, float]:
@@ -399,23 +382,21 @@ def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
         is_candidate = bool(row.told)
         name = row.name if len(row.name) <= MOST_LETTERS else row.name[: MOST_LETTERS - 1] + "…"
         axes.text(0.008, k, name, va="center", fontsize=9.0, color=INK if is_candidate else MUTED)
-        axes.annotate(
-            row.told,
-            (1.0, k),
-            (VALUES - RIGHT + 2.0, 0.0),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=9.0,
-            annotation_clip=False,
-        )
-        axes.annotate(
-            row.mark,
-            (0.0, k),
-            (-6.0, 0.0),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=9.0,
-            annotation_clip=False,
-        )
+        _told_beside(axes, row.told, k, 1.0)
+        _told_beside(axes, row.mark, k, 0.0, -6.0)
+
+
+def _told_beside(
+    axes: Axes, text: str, row: int, x: float, points: float = VALUES - RIGHT + 2.0
+) -> None:
+    """A text that ends so many points to the right of a place."""
+    axes.annotate(
+        text,
+        (x, row),
+        (points, 0.0),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        fontsize=9.0,
+        annotation_clip=False,
+    )

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
 
+import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
@@ -93,3 +96,46 @@ def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
 def finite(value: float) -> float | None:
     """A value as JSON can have it; None for what is undetermined."""
     return value if math.isfinite(value) else None
+
+
+def as_data(value: Any) -> Any:
+    """A result as JSON can have it: objects by their fields, arrays and tuples as lists, and None
+    for what is undetermined.
+
+    >>> as_data({"u": (0.5, math.nan)})
+    {'u': [0.5, None]}
+    """
+    if is_dataclass(value):
+        value = {one.name: getattr(value, one.name) for one in fields(value)}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {key: as_data(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_data(item) for item in value]
+    return finite(value) if isinstance(value, float) else value
+
+
+def records(**columns: Any) -> list[dict[str, Any]]:
+    """Columns of the same length as a mapping for each row.
+
+    >>> records(x=(1, 2), y="ab")
+    [{'x': 1, 'y': 'a'}, {'x': 2, 'y': 'b'}]
+    """
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def csv_lines(heads: Iterable[str], *columns: np.ndarray) -> Iterator[str]:
+    """Numbers (m,) or (m, k) as lines of CSV with twelve digits; what is undetermined is empty."""
+    yield ",".join(heads)
+    for row in np.column_stack(columns).tolist():
+        yield ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
+
+
+def picked(source: object, *names: str) -> dict[str, Any]:
+    """Some attributes of an object by their names.
+
+    >>> picked(1 + 2j, "real", "imag")
+    {'real': 1.0, 'imag': 2.0}
+    """
+    return {name: getattr(source, name) for name in names}

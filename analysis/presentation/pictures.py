@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +13,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from ..uncertainty.error_map import ErrorMap, Slice
 from .formatting import number
-from .scene import Place, Scene, scene
+from .scene import Box, Place, Scene, scene
 from .svg import (
     DASHES,
     INK,
@@ -36,6 +38,9 @@ LEFT, RIGHT, BELOW, ABOVE = 50.0, 18.0, 40.0, 10.0
 # Positions whose names fit into the drawing; more are numbered.
 MOST_NAMES = 8
 
+# Part of the drawing's size below which an edge is too short for its name between its numbers.
+SHORT = 0.25
+
 # Bands between lines of the error map at most, from the first of these colours to the second: light
 # enough for dark letters everywhere.
 MOST_BANDS = 10
@@ -45,8 +50,7 @@ DARK = "#101010"
 
 def scene_svg(drawn: Scene, name: str, words: str) -> str:
     """The volume with the positions in it."""
-    with drawing(330.0) as figure:
-        draw_scene(blank_axes(figure), drawn, len(drawn.places) > MOST_NAMES)
+    with _drawn(drawn) as figure:
         return as_svg(figure, name, words)
 
 
@@ -58,59 +62,70 @@ def draw_design(design: Design, words: str, path: str | Path | None = None) -> F
     :raises ValueError: the name ends in none of the kinds of pictures.
     :raises OSError: the file cannot be written.
     """
-    drawn = scene(design)
+    with _drawn(scene(design)) as figure:
+        return save(figure, path, words)
+
+
+@contextmanager
+def _drawn(drawn: Scene) -> Iterator[Figure]:
     with drawing(330.0) as figure:
         draw_scene(blank_axes(figure), drawn, len(drawn.places) > MOST_NAMES)
-        return save(figure, path, words)
+        yield figure
 
 
 def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:
     """The volume with the positions in it, which are told by their names or numbers, on axes
     without a frame.
     """
-    for edge, is_hidden in zip(drawn.edges, drawn.hidden, strict=True):
-        axes.plot(*edge.T, color=MUTED, linewidth=0.8, linestyle=":" if is_hidden else "-")
-    taken = [at for axis in drawn.axes for at in _write_axis(axes, drawn, *axis)]
-    size = float(np.ptp(drawn.edges.reshape(-1, 2), axis=0).max())
+    taken, size = draw_box(axes, drawn.box), drawn.box.size
     for place in drawn.places:
         _place(axes, place)
     for place in drawn.places:
         _name(axes, place, taken, size, by_number)
     # Room for what is written around the volume and for plates that stand out of it.
     drawn_points = np.concatenate(
-        [drawn.edges.reshape(-1, 2), *(place.outline for place in drawn.places)]
+        [drawn.box.edges.reshape(-1, 2), *(place.outline for place in drawn.places)]
     )
-    low, high = drawn_points.min(axis=0) - 0.11 * size, drawn_points.max(axis=0) + 0.11 * size
+    low = np.minimum(drawn_points.min(axis=0) - 0.11 * size, np.min(taken, axis=0) - 0.05 * size)
+    high = drawn_points.max(axis=0) + 0.11 * size
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
 
 
+def draw_box(axes: Axes, box: Box) -> list[Array]:
+    """A volume with the names and ends of its axes; where these stand."""
+    for edge, is_hidden in zip(box.edges, box.hidden, strict=True):
+        axes.plot(*edge.T, color=MUTED, linewidth=0.8, linestyle=":" if is_hidden else "-")
+    return [at for axis in box.axes for at in _write_axis(axes, box, *axis)]
+
+
 def _write_axis(
-    axes: Axes, drawn: Scene, name: str, ends: Array, low: float, high: float
+    axes: Axes, box: Box, name: str, ends: Array, low: float, high: float
 ) -> list[Array]:
     """Write the axis's name and ends beside its edge, away from the middle; where they stand."""
-    middle = drawn.edges.reshape(-1, 2).mean(axis=0)
+    middle, size = box.edges.mean(axis=(0, 1)), box.size
     centre = ends.mean(axis=0)
-    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    length = np.linalg.norm(ends[1] - ends[0])
+    along = (ends[1] - ends[0]) / length
     out = np.array([along[1], -along[0]])
     out = out if out @ (centre - middle) > 0 else -out
-    size = float(np.ptp(drawn.edges.reshape(-1, 2), axis=0).max())
+    # Ends are drawn in, so that those of two axes keep apart; beside a short edge they stand there,
+    # and the name outside of them.
+    off, inward = (0.06, 0.05) if length > SHORT * size else (0.14, 0.0)
     written: list[Array] = []
-    for place, text in (
-        (centre, f"{name}, mm"),
-        (ends[0], _millimetres(low)),
-        (ends[1], _millimetres(high)),
+    for place, text, away, shift in (
+        (centre, f"{name}, mm", off, 0.0),
+        (ends[0], _millimetres(low), 0.06, inward),
+        (ends[1], _millimetres(high), 0.06, -inward),
     ):
-        # Ends are drawn in, so that those of two axes keep apart.
-        inward = 0.05 * size * np.sign((centre - place) @ along) * along
-        at = place + inward + (0.06 * size) * out
+        at = place + shift * size * along + away * size * out
         axes.text(at[0], at[1], text, ha="center", va="center")
         written.append(at)
     return written
 
 
 def _millimetres(value: float) -> str:
-    return f"{1000 * value:.6g}"
+    return f"{1000 * value + 0.0:.6g}"
 
 
 def _place(axes: Axes, place: Place) -> None:

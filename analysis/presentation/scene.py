@@ -36,18 +36,31 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """A design on the paper, in metres: edges (k, 2, 2) of the volume, hidden ones marked, and
-    positions, rear first.
+class Box:
+    """A volume on the paper, in metres: its edges (k, 2, 2), hidden ones marked.
 
-    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, `tips`
-    the probes' tips about the reference point.
+    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, and
+    the co-ordinates there.
     """
 
     edges: Array
     hidden: NDArray[np.bool_]
-    places: tuple[Place, ...]
     axes: tuple[tuple[str, Array, float, float], ...]
+
+    @property
+    def size(self) -> float:
+        """The larger side of what is drawn."""
+        return float(np.ptp(self.edges, axis=(0, 1)).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A design on the paper, in metres: the volume, positions, rear first, and the probes' tips
+    about the reference point.
+    """
+
+    box: Box
+    places: tuple[Place, ...]
     tips: tuple[tuple[str, Array], ...]
 
 
@@ -55,7 +68,6 @@ def scene(design: Design) -> Scene:
     """The scene of a design; one in two dimensions is seen from above."""
     view, towards = projection(design.dimension)
     volume = design.machine.volume
-    edges, hidden = box_edges(volume.lower, volume.upper, towards)
     where = locations(design, nominal_state(design), design.readings)
     places = []
     for k, name in enumerate(design.positions.names):
@@ -89,7 +101,14 @@ def scene(design: Design) -> Scene:
         (name, view @ offset)
         for name, offset in zip(design.probes.names, design.probes.offsets, strict=True)
     )
-    return Scene(edges @ view.T, hidden, tuple(places), _axes(design, view), tips)
+    return Scene(box(volume.lower, volume.upper), tuple(places), tips)
+
+
+def box(lower: Array, upper: Array) -> Box:
+    """The volume between two corners (d,) on the paper."""
+    view, away = projection(len(lower))
+    edges, hidden = box_edges(lower, upper, away)
+    return Box(edges @ view.T, hidden, _axes(lower, upper, view))
 
 
 def projection(dimension: int) -> tuple[Array, Array]:
@@ -120,12 +139,10 @@ def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[n
     return np.array(edges), np.array(hidden)
 
 
-def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
+def _axes(lower: Array, upper: Array, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
     """Axes along the edges that stand outermost on the paper: x and y below, z on the left."""
-    volume = design.machine.volume
-    lower, upper = volume.lower, volume.upper
-    starts = [lower.copy() for _ in range(design.dimension)]
-    if design.dimension == 3:
+    starts = [lower.copy() for _ in lower]
+    if len(lower) == 3:
         # The vertical edge at the left, the lower one at the right.
         left = min(
             ([x, y] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])),
@@ -147,25 +164,18 @@ def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float],
 
 
 def hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2) counter-clockwise, by Andrew's chain.
+    """Corners of the convex hull of points (n, 2) counter-clockwise; the ends, where all of them
+    stand on a line.
 
-    >>> hull(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.1], [1.0, 1.0], [0.0, 1.0]])).tolist()
-    [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    >>> hull(np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])).tolist()
+    [[0.0, 0.0], [1.0, 1.0]]
     """
-    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    # Takes long to load, which checking a file must not.
+    from scipy.spatial import ConvexHull, QhullError
+
     ordered = np.unique(points, axis=0)
-    if len(ordered) < 3:
-        return ordered
-
-    def chain(one_way: Array) -> list[Array]:
-        kept: list[Array] = []
-        for point in one_way:
-            while len(kept) > 1:
-                (a, b), (c, d) = kept[-1] - kept[-2], point - kept[-2]
-                if a * d - b * c > 1e-12 * size * size:
-                    break
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    return np.array(chain(ordered) + chain(ordered[::-1]))
+    try:
+        corners = ordered[ConvexHull(ordered).vertices] if len(ordered) > 2 else ordered
+    except QhullError:
+        return ordered[[0, -1]]
+    return np.asarray(corners)

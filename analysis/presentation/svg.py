@@ -14,9 +14,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .files import write_file
 
 if TYPE_CHECKING:
+    from ballplate.simulator.machines.protocol import Array
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -118,6 +121,43 @@ def blank_axes(figure: Figure) -> Axes:
     axes.set_axis_off()
     axes.set_aspect("equal")
     return axes
+
+
+def sticks(axes: Axes, starts: Array, tips: Array, **style: Any) -> None:
+    """Lines from starts to tips (m, 2), each with a marker where it starts."""
+    ends = np.stack([starts, tips, np.full_like(starts, np.nan)], axis=1)
+    axes.plot(*ends.reshape(-1, 2).T, markevery=3, **style)
+
+
+def scale_bar(axes: Axes, length: float, height: float, text: str) -> None:
+    """A bar of a length along x at the left of axes, in a height as a share of theirs, and what it
+    means.
+    """
+    left, right = axes.get_xlim()
+    x = left + 0.05 * (right - left)
+    style: Any = {"transform": axes.get_xaxis_transform(), "clip_on": False}
+    axes.plot([x, x + length], [height, height], color=INK, linewidth=2.5, **style)
+    axes.text(x + length + 0.02 * (right - left), height, text, va="center", **style)
+
+
+def legend_above(axes: Axes, columns: int, left: float = 0.0, bottom: float = 1.0) -> None:
+    """A legend in a few columns above axes, where it covers nothing."""
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(left, bottom),
+        ncols=columns,
+        borderaxespad=0.3,
+        borderpad=0.2,
+        columnspacing=1.2,
+        handlelength=2.0,
+        handletextpad=0.5,
+    )
+
+
+def common_legend(figure: Figure, axes: Axes, **more: Any) -> None:
+    """A legend of the figure for what its axes hold."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, **more)
 
 
 def micro(text: str) -> str:

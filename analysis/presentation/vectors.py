@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from ballplate.simulator.machines.protocol import Array
 
-from .svg import INK, MARKERS, MUTED, SERIES, WIDTH, drawing, placed_axes, round_number, save
+from .svg import (
+    MARKERS,
+    MUTED,
+    SERIES,
+    WIDTH,
+    drawing,
+    placed_axes,
+    round_number,
+    save,
+    scale_bar,
+    sticks,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,9 +57,7 @@ def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
     >>> magnification((one,), 0.5)
     200000.0
     """
-    longest = max(
-        (float(np.sqrt((g.residuals**2).sum(axis=1)).max(initial=0.0)) for g in groups), default=0.0
-    )
+    longest = _longest(groups)
     if longest == 0.0 or extent == 0.0:
         return 1.0
     return round_number(LONGEST * extent / longest)
@@ -82,7 +91,7 @@ def draw_vectors(
     across, up = upper - lower + 2.0 * pad
     width = WIDTH - MARGIN - 10.0
     height = width * up / across
-    below = 34.0 + LINE * (len(groups) + 1)
+    below = 50.0 + LINE * len(groups)
     with drawing(height + below + 10.0 + LINE * len(heading)) as figure:
         axes = placed_axes(figure, MARGIN, below, width, height)
         axes.set_xlim(1e3 * (lower[0] - pad), 1e3 * (upper[0] + pad))
@@ -98,18 +107,15 @@ def draw_vectors(
                 axes.plot(*edge.T, color=MUTED, linewidth=0.8)
         axes.set_title("\n".join(heading), loc="left")
         for k, group in enumerate(groups):
-            colour, marker = _style(k)
-            ends = group.places + times * group.residuals
-            segments = np.stack([group.places, ends, np.full_like(ends, np.nan)], axis=1).reshape(
-                -1, 2
-            )
-            axes.plot(*1e3 * segments.T, color=colour)
-            axes.plot(
-                *1e3 * group.places.T,
-                color=colour,
-                marker=marker,
+            sticks(
+                axes,
+                1e3 * group.places,
+                1e3 * (group.places + times * group.residuals),
+                color=SERIES[k % len(SERIES)],
+                # Where colours begin again, other markers go with them.
+                marker=MARKERS[(k + k // len(SERIES)) % len(MARKERS)],
                 markersize=MARKER,
-                linestyle="none",
+                label=group.label,
             )
         for text, place, away in named:
             axes.annotate(
@@ -122,7 +128,12 @@ def draw_vectors(
                 color=MUTED,
                 fontsize=7.0,
             )
-        _legend(figure, groups, times, width / (1e3 * across))
+        # One, two or five of some unit, as long in the drawing as such a residual is.
+        length = round_number(_longest(groups) or 1e-6)
+        told = f"{1e6 * length:g} µm, magnified {times:,.0f} times"
+        scale_bar(axes, 1e3 * length * times, -42.0 / height, told)
+        if any(group.label for group in groups):
+            axes.legend(loc="upper left", bbox_to_anchor=(0.0, -48.0 / height), borderaxespad=0.0)
         return save(figure, path, f"{title}: residuals as vectors, magnified {times:g} times")
 
 
@@ -139,36 +150,6 @@ def _named(groups: tuple[Vectors, ...]) -> list[tuple[str, Array, Array]]:
     return list(found.values()) if len(found) <= MOST_NAMES else []
 
 
-def _style(k: int) -> tuple[str, str]:
-    """Colour and marker of a group; where colours begin again, other markers go with them."""
-    return SERIES[k % len(SERIES)], MARKERS[(k + k // len(SERIES)) % len(MARKERS)]
-
-
-def _legend(
-    figure: Figure, groups: tuple[Vectors, ...], times: float, per_millimetre: float
-) -> None:
-    """Names of the groups, and a bar of one, two or five of some unit, that long in the drawing as
-    a residual is.
-    """
-    longest = max(float(np.sqrt((g.residuals**2).sum(axis=1)).max()) for g in groups)
-    length = round_number(longest) if longest > 0.0 else 1e-6
-    w, h = 72.0 * figure.get_size_inches()
-    scale = placed_axes(figure, 0.0, 0.0, w, LINE * (len(groups) + 1) + 4.0)
-    scale.set_axis_off()
-    scale.set_xlim(0.0, w)
-    scale.set_ylim(0.0, LINE * (len(groups) + 1) + 4.0)
-    for k, group in enumerate(groups):
-        y = LINE * (len(groups) - k) + 6.0
-        colour, marker = _style(k)
-        scale.plot([MARGIN, MARGIN + 22.0], [y, y], color=colour)
-        scale.plot([MARGIN], [y], color=colour, marker=marker, markersize=MARKER)
-        scale.text(MARGIN + 30.0, y, group.label, va="center", color=INK)
-    bar = 1e3 * length * times * per_millimetre
-    scale.plot([MARGIN, MARGIN + bar], [6.0, 6.0], color=MUTED, linewidth=3.0)
-    scale.text(
-        MARGIN + bar + 8.0,
-        6.0,
-        f"{1e6 * length:g} µm, magnified {times:,.0f} times",
-        va="center",
-        color=INK,
-    )
+def _longest(groups: tuple[Vectors, ...]) -> float:
+    """The longest residual."""
+    return max(float(np.hypot(*g.residuals.T).max(initial=0.0)) for g in groups)

@@ -59,8 +59,8 @@ def heat_maps(results: ReportedSweep) -> list[Heat]:
 
 def _heat(results: ReportedSweep, i: int, j: int, measure: Measure) -> Heat:
     rows, columns = results.axes[i], results.axes[j]
-    row_of, row_labels = _grouped(rows)
-    column_of, column_labels = _grouped(columns)
+    row_of, column_of = rows.groups(MOST_VALUES), columns.groups(MOST_VALUES)
+    row_labels, column_labels = _labels(rows, row_of), _labels(columns, column_of)
     shape = len(row_labels), len(column_labels)
     open_ = partly_open(results, measure.symbol)
     figures = np.where(results.done, results.figure(measure.figure), np.nan)
@@ -72,29 +72,26 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure) -> Heat:
         row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members)
     )
     entries, medians = [], np.full(len(members), np.nan)
-    for k, rows_here in enumerate(members):
-        known = rows_here[np.isfinite(values[rows_here])]
-        if len(known):
-            medians[k] = np.median(values[known])
-        text = (
-            number(measure.factor * medians[k], DIGITS)
-            if len(known)
-            else "-"
-            if len(rows_here)
-            else NOT_DONE
-        )
-        is_open = bool((open_ & results.done)[rows_here].any())
+    for k, here in enumerate(members):
+        known = values[here][np.isfinite(values[here])]
+        medians[k] = np.median(known) if len(known) else np.nan
+        is_open = bool((open_ & results.done)[here].any())
         any_open |= is_open
-        if is_open and len(rows_here) == 1 and np.isfinite(figures[rows_here[0]]):
-            text = number(measure.factor * figures[rows_here[0]], DIGITS)
+        # A single figure that leaves something out is told, without a shade.
+        told = figures[here[0]] if is_open and len(here) == 1 else medians[k]
+        text = number(measure.factor * told, DIGITS) if len(here) else NOT_DONE
         text += STAR if is_open else ""
-        if planned[k] == 1 and len(rows_here):
-            row = int(rows_here[0])
-            status = results.statuses[row]
-            is_done = status == "done"
-            value = float(figures[row]) if is_done else None
-            cell = int(results.frame["cell"].to_numpy()[row])
-            entries.append(Entry(text if is_done else status, value, cell, measure.figure))
+        if planned[k] == 1 and len(here):
+            row, cells = here[0], results.frame["cell"].to_numpy()
+            is_done = results.done[row]
+            entries.append(
+                Entry(
+                    text if is_done else results.statuses[row],
+                    float(figures[row]) if is_done else None,
+                    int(cells[row]),
+                    measure.figure,
+                )
+            )
         else:
             entries.append(Entry(text if planned[k] else ""))
     notes = [] if planned.max() <= 1 else ["Medians over all cells that share the two values."]
@@ -121,20 +118,13 @@ def _members(place: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
     return np.split(order, np.searchsorted(place[order], np.arange(1, count)))
 
 
-def _grouped(axis: ReportAxis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
-    """Place of each value in the map, and the labels there: neighbouring values together where
-    there are many.
-    """
-    count = len(axis.labels)
-    if count <= MOST_VALUES:
-        return np.arange(count), axis.short_labels
+def _labels(axis: ReportAxis, group: NDArray[np.int64]) -> tuple[str, ...]:
+    """Labels of values, or of groups of neighbouring ones where there are many."""
+    if len(axis.labels) <= MOST_VALUES:
+        return axis.short_labels
     numbers = np.array(axis.numbers)
-    order = np.argsort(np.argsort(numbers, kind="stable"), kind="stable")
-    group = order * MOST_VALUES // count
     ends = [(numbers[group == k].min(), numbers[group == k].max()) for k in range(MOST_VALUES)]
-    return group, tuple(
-        f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends
-    )
+    return tuple(f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends)
 
 
 def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:

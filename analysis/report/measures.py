@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..presentation.formatting import shown_unit
-from ..sweeps.columns import symbol_column
+from ..sweeps.columns import MORE, symbol_column
 from ..uncertainty.quantities import DESCRIPTIONS
 from .results import ReportedSweep
 
@@ -117,23 +117,21 @@ def trial_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measur
 def trial_symbols(results: ReportedSweep) -> list[str]:
     """Quantities with Monte Carlo figures, those of further artefacts marked by dashes."""
     found = []
-    for column in results.frame.columns:
-        name, mark, _ = column.partition("_spread_ratio")
-        symbol = name.replace("_more", "'").replace("_", " ")
-        if mark and column.endswith("_spread_ratio") and symbol.rstrip("'") in DESCRIPTIONS:
+    for symbol in DESCRIPTIONS:
+        while f"{symbol_column(symbol)}_spread_ratio" in results.frame:
             found.append(symbol)
-    order = list(DESCRIPTIONS)
-    return sorted(found, key=lambda symbol: (order.index(symbol.rstrip("'")), symbol))
+            symbol += MORE
+    return found
 
 
 def descriptions(measures: Sequence[Measure]) -> list[str]:
     """What the quantities are the uncertainties of, each in a line."""
     found = []
     for symbol in dict.fromkeys(measure.symbol for measure in measures):
-        known = DESCRIPTIONS.get(symbol.rstrip("'"))
+        known = DESCRIPTIONS.get(symbol.rstrip(MORE))
         if known is not None:
             found.append(
-                f"{symbol}: {known}" + (" of a further artefact" if symbol.endswith("'") else "")
+                f"{symbol}: {known}" + (" of a further artefact" if symbol.endswith(MORE) else "")
             )
     return found
 

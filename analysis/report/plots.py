@@ -16,6 +16,7 @@ from ..presentation.svg import (
     SERIES,
     WIDTH,
     as_svg,
+    common_legend,
     drawing,
     micro,
     placed_axes,
@@ -54,8 +55,7 @@ def plot_svg(plot: Plot, name: str) -> str:
             found[k].tick_params(labelbottom=k == count - 1)
         found[-1].set_xlabel(micro(plot.axis.title))
         if has_legend:
-            handles, labels = found[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="lower center", ncols=columns, borderaxespad=0.0)
+            common_legend(figure, found[0], loc="lower center", ncols=columns, borderaxespad=0.0)
         return as_svg(figure, name, words(plot))
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..sweeps.columns import MORE, symbol_column
 from ..sweeps.frame import frame_of
 from ..sweeps.store import Store, chosen_sweep, definition_of, results
-from ..sweeps.store import StoredResults as Found
+from ..sweeps.stored import StoredResults as Found
 from ..uncertainty.quantities import RECORDED
 
 if TYPE_CHECKING:
@@ -46,6 +46,16 @@ class ReportAxis:
     def title(self) -> str:
         """The name, with the unit where there is one."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
+
+    def groups(self, most: int) -> Integers:
+        """Place of each value among at most so many: neighbouring ones together where there are
+        more.
+        """
+        count = len(self.labels)
+        if count <= most:
+            return np.arange(count)
+        order = np.argsort(np.argsort(np.array(self.numbers), kind="stable"), kind="stable")
+        return np.asarray(order * most // count)
 
     @property
     def short_labels(self) -> tuple[str, ...]:
@@ -127,7 +137,7 @@ def read_results(store: Store, sweep: int | None) -> ReportedSweep:
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = results(store, number, len(cells))
-    texts = dict(zip(found.cells.tolist(), found.details, strict=True))
+    texts = {row.number: row.details for row in found.rows}
     return ReportedSweep(
         number,
         definition,

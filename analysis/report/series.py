@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 # Lines that can be told apart, and places along an axis that can.
 MOST_LINES, MOST_PLACES = 6, 24
 
+# Of a line without a range, or without Monte Carlo.
+NONE = np.zeros(0)
+
 
 @dataclass(frozen=True, eq=False)
 class SeriesLine:
@@ -61,9 +64,8 @@ def plots(results: ReportedSweep) -> list[Plot]:
     measures = [
         m
         for m in uncertainty_measures(results)
-        if not m.is_count and m.statistic in ("average", "maximum")
+        if m.statistic in ("average", "maximum") and " or " not in m.unit
     ]
-    measures = [m for m in measures if " or " not in m.unit]
     found = []
     for k, axis in enumerate(results.axes):
         if len(axis.numbers) < 2:
@@ -83,10 +85,11 @@ def _plot(results: ReportedSweep, k: int, symbol: str, measures: Sequence[Measur
     done = results.done
     others = [i for i in range(len(results.axes)) if i != k]
     settings, which = np.unique(results.chosen[done][:, others], axis=0, return_inverse=True)
-    which = which.ravel()
     places = results.chosen[done, k]
-    groups, note = _places(axis, places)
-    is_apart = len(settings) <= MOST_LINES and groups is None
+    x, count = np.array(axis.numbers)[places], len(axis.numbers)
+    is_grouped = count > MOST_PLACES and len(places) > 0
+    note = f", and over groups of neighbouring ones of the {count} values" if is_grouped else ""
+    is_apart = len(settings) <= MOST_LINES and not is_grouped
     panels = []
     left_out = partly_open(results, symbol)[done]
     for measure in measures:
@@ -95,19 +98,17 @@ def _plot(results: ReportedSweep, k: int, symbol: str, measures: Sequence[Measur
         lines = []
         if is_apart:
             for number, setting in enumerate(settings.tolist()):
-                chosen = np.flatnonzero(which == number)
+                chosen = np.flatnonzero(which.ravel() == number)
                 # By what is plotted, which the file may have in any order.
-                chosen = chosen[np.argsort(np.array(axis.numbers)[places[chosen]], kind="stable")]
-                x, y = np.array(axis.numbers)[places[chosen]], values[chosen]
+                chosen = chosen[np.argsort(x[chosen], kind="stable")]
                 words = ", ".join(
                     f"{results.axes[i].name} {results.axes[i].labels[j]}"
                     for i, j in zip(others, setting, strict=True)
                 )
-                empty = np.zeros(0)
-                here = (actual[chosen], error[chosen]) if len(actual) else (empty, empty)
-                lines.append(SeriesLine(words, x, y, empty, empty, *here))
+                here = (actual[chosen], error[chosen]) if len(actual) else (NONE, NONE)
+                lines.append(SeriesLine(words, x[chosen], values[chosen], NONE, NONE, *here))
         else:
-            lines.append(_median(axis, places, groups, values))
+            lines.append(_median(axis.groups(MOST_PLACES)[places], x, values))
         panels.append(Panel(measure, tuple(lines)))
     if not is_apart:
         over = (
@@ -121,31 +122,11 @@ def _plot(results: ReportedSweep, k: int, symbol: str, measures: Sequence[Measur
     return Plot(axis, symbol, measures[0].unit, tuple(panels), note)
 
 
-def _places(axis: ReportAxis, places: NDArray[np.int64]) -> tuple[NDArray[np.int64] | None, str]:
-    """Groups of neighbouring values by index, where there are too many to show each; None where
-    there are not.
-    """
-    count = len(axis.numbers)
-    if count <= MOST_PLACES or not len(places):
-        return None, ""
-    order = np.argsort(np.argsort(np.array(axis.numbers), kind="stable"), kind="stable")
-    return (
-        order * MOST_PLACES // count,
-        f", and over groups of neighbouring ones of the {count} values",
-    )
-
-
-def _median(
-    axis: ReportAxis, places: NDArray[np.int64], groups: NDArray[np.int64] | None, values: Floats
-) -> SeriesLine:
-    """Median and range at each place."""
+def _median(key: NDArray[np.int64], x: Floats, values: Floats) -> SeriesLine:
+    """Median and range at each place, told by its `key`."""
     import pandas
 
-    numbers = np.array(axis.numbers)
-    key = places if groups is None else groups[places]
-    table = (
-        pandas.DataFrame({"key": key, "x": numbers[places], "y": values}).dropna().groupby("key")
-    )
+    table = pandas.DataFrame({"key": key, "x": x, "y": values}).dropna().groupby("key")
     found = pandas.DataFrame(
         {
             "x": table["x"].median(),
@@ -154,8 +135,8 @@ def _median(
             "high": table["y"].max(),
         }
     ).sort_values("x")
-    x, y, low, high = (found[name].to_numpy(float) for name in ("x", "y", "low", "high"))
-    return SeriesLine("median", x, y, low, high, np.zeros(0), np.zeros(0))
+    places, y, low, high = (found[name].to_numpy(float) for name in ("x", "y", "low", "high"))
+    return SeriesLine("median", places, y, low, high, NONE, NONE)
 
 
 def _actual(

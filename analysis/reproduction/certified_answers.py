@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.reading_files import read_readings
 
+from ..presentation.formatting import as_data, picked
 from ..results.study import fit, predict
 from ..uncertainty.summaries import Quantity
 from .certified_problems import CertifiedProblem
@@ -67,16 +67,7 @@ def _geometry(design: Design, state: State) -> dict[str, Any]:
 def _uncertainties(quantities: dict[str, Quantity]) -> dict[str, Any]:
     """U1 to U6 as certified problems have them."""
     return {
-        symbol: {
-            "maximum": _known(quantity.maximum),
-            "average": _known(quantity.average),
-            "count": quantity.count,
-            "undetermined": quantity.undetermined,
-        }
+        symbol: as_data(picked(quantity, "maximum", "average", "count", "undetermined"))
         for symbol, quantity in quantities.items()
         if symbol in SYMBOLS
     }
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.settings import hint, shorten
 
 # Above any number that means something here, and below where a float ends.
@@ -52,7 +52,7 @@ def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]
             "no certified problems here; name their folder, designs/certified in a checkout, with"
             " --designs"
         )
-        raise ExperimentError([Message(str(folder), 0, 0, "", text)])
+        raise refused(folder, text)
     unknown = [name for name in names if name not in found]
     if unknown:
         messages = [
@@ -66,14 +66,12 @@ def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]
 def _problem(path: Path) -> CertifiedProblem:
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("certified"), dict):
-        raise ExperimentError(
-            [Message(str(path), 0, 0, "", 'no certified problem: it has no key "certified"')]
-        )
+        raise refused(path, 'no certified problem: it has no key "certified"')
     for part in data["certified"].keys() & {"as_drawn", "estimate"}:
         complaint = _complaint(data["certified"][part])
         if complaint:
             text = f"{complaint}; make the file anew, or take the shipped one"
-            raise ExperimentError([Message(str(path), 0, 0, f"certified.{part}", text)])
+            raise refused(path, text, f"certified.{part}")
     return CertifiedProblem(
         str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"]
     )
@@ -124,7 +122,7 @@ def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, 
             'expected {"problems": {NAME: {"as_drawn": …, "estimate": …}}} as in'
             " docs/documents/certified.md"
         )
-        raise ExperimentError([Message(str(path), 0, 0, "", text)])
+        raise refused(path, text)
     known = {path.stem for one in problems for path in one.path.parent.glob("*.json")}
     messages = [
         Message(
@@ -150,9 +148,7 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ExperimentError(
-            [Message(str(path), 0, 0, "", f"cannot be read ({error.strerror}); name a JSON file")]
-        ) from None
+        raise refused(path, f"cannot be read ({error.strerror}); name a JSON file") from None
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
         raise ExperimentError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.steps import Report, unreported
@@ -116,13 +116,13 @@ class ErratumLine:
     The deviations are the largest of a figure from the common factor.
     """
 
+    statistic: Statistic
     headed: str
     meant: str
-    statistic: Statistic
-    as_headed: dict[str, float]
-    as_meant: dict[str, float]
-    deviation_headed: float
-    deviation_meant: float
+    ratios_as_headed: dict[str, float]
+    ratios_as_meant: dict[str, float]
+    deviation_as_headed: float
+    deviation_as_meant: float
 
 
 @dataclass(frozen=True)
@@ -136,8 +136,11 @@ class ComparedErratum:
     @property
     def agrees(self) -> bool:
         """Whether the figures are those of the designs meant, and not those of the heading."""
-        meant = all(line.deviation_meant <= self.limit for line in self.lines)
-        return meant and any(line.deviation_headed > self.limit for line in self.lines)
+        meant = all(line.deviation_as_meant <= self.limit for line in self.lines)
+        return meant and any(line.deviation_as_headed > self.limit for line in self.lines)
+
+
+Rule = Literal["within", "most", "shown"]
 
 
 @dataclass(frozen=True)
@@ -152,7 +155,7 @@ class ProgressLine:
     quantity: str
     published: float
     ours: float
-    rule: Literal["within", "most", "shown"]
+    rule: Rule
     limit: float
 
     @property
@@ -255,14 +258,11 @@ class Section:
 
     @property
     def agrees(self) -> bool:
-        return (
-            all(one.agrees for one in self.ranks)
-            and all(one.agrees for one in self.columns)
-            and all(one.agrees for one in self.remarks)
-            and all(one.agrees for one in self.errata)
-            and all(one.agrees for one in self.progress)
-            and all(one.agrees for one in self.differences)
+        compared: tuple[Any, ...] = (
+            *(*self.ranks, *self.columns, *self.remarks),
+            *(*self.errata, *self.progress, *self.differences),
         )
+        return all(one.agrees for one in compared)
 
 
 @dataclass(frozen=True)
@@ -463,9 +463,7 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
                 factor = common_factor(ratios[symbol] for symbol in regular)
                 deviations.append(max(abs(ratios[symbol] / factor - 1.0) for symbol in regular))
             lines.append(
-                ErratumLine(
-                    headed, meant, column.statistic, both[0], both[1], deviations[0], deviations[1]
-                )
+                ErratumLine(column.statistic, headed, meant, both[0], both[1], *deviations)
             )
     return ComparedErratum(erratum, tuple(lines), stated.limits.figure)
 
@@ -478,42 +476,34 @@ def compare_progress(
     found = fitted_exactly(shipped_experiment(shipped, progress.design))
     record = found.solution.iterations
     steps, sums = [iteration.step for iteration in record], sums_of_squares(found)
+    # What ours has ended with is what it would have later.
+    later = sums + sums[-1:] * len(progress.sums_of_squares)
     lines = []
-
-    def add(
-        quantity: str, published: float, ours: list[float], k: int, rule: str, limit: float
-    ) -> None:
-        value = ours[k] if k < len(ours) else math.nan
-        chosen: Literal["within", "most", "shown"] = "within"
-        if rule == "shown":
-            chosen = "shown"
-        elif rule == "most" or math.isnan(value):
-            chosen = "most"
-        lines.append(ProgressLine(f"{quantity} {k}", published, value, chosen, limit))
-
     for k, published in enumerate(progress.steps, start=1):
         last = progress.settles and k == len(progress.steps)
-        rule = "shown" if k in progress.steps_shown_only else "most" if last else "within"
-        add("step", published, steps, k, rule, limits.step)
+        rule: Rule = "shown" if k in progress.steps_shown_only else "most" if last else "within"
+        lines.append(_line("step", k, published, steps, rule, limits.step))
     for k, published in enumerate(progress.sums_of_squares):
-        rule = (
-            "shown"
-            if k in progress.sums_shown_only
-            else "within"
-            if k < 2 or progress.misfit
-            else "most"
-        )
-        # What ours has ended with is what it would have later.
-        add("S^2", published, sums + sums[-1:] * k, k, rule, limits.sum_of_squares)
+        is_close = k < 2 or progress.misfit
+        rule = "shown" if k in progress.sums_shown_only else "within" if is_close else "most"
+        lines.append(_line("S^2", k, published, later, rule, limits.sum_of_squares))
     settled = found.solution.status == "converged"
     if progress.steps:
         settled = settled and len(record) - 1 <= len(progress.steps)
     else:
-        for k in range(1, len(record)):
-            add("step", math.nan, steps, k, "shown", limits.step)
+        for k in range(1, len(steps)):
+            lines.append(_line("step", k, math.nan, steps, "shown", limits.step))
         for k in range(len(sums)):
-            add("S^2", math.nan, sums, k, "shown", limits.sum_of_squares)
+            lines.append(_line("S^2", k, math.nan, sums, "shown", limits.sum_of_squares))
     return ComparedProgress(progress, settled, len(record) - 1, tuple(lines))
+
+
+def _line(
+    quantity: str, k: int, published: float, ours: list[float], rule: Rule, limit: float
+) -> ProgressLine:
+    value = ours[k] if k < len(ours) else math.nan
+    rule = "most" if rule == "within" and math.isnan(value) else rule
+    return ProgressLine(f"{quantity} {k}", published, value, rule, limit)
 
 
 def compare_difference(

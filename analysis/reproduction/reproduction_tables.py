@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..presentation.formatting import aligned, number
+from ..presentation.formatting import aligned, as_data, number, picked
 from .compare import (
     ComparedColumn,
     ComparedErratum,
@@ -277,8 +277,8 @@ def _erratum(compared: ComparedErratum) -> list[Block]:
             if line.statistic != statistic:
                 continue
             for words, design, ratios, deviation in (
-                ("headed", line.headed, line.as_headed, line.deviation_headed),
-                ("meant", line.meant, line.as_meant, line.deviation_meant),
+                ("headed", line.headed, line.ratios_as_headed, line.deviation_as_headed),
+                ("meant", line.meant, line.ratios_as_meant, line.deviation_as_meant),
             ):
                 shown = (f"{ratios[symbol]:.3f}" if symbol in ratios else "-" for symbol in SYMBOLS)
                 rows.append((words, design, *shown, f"{100 * deviation:.0f}"))
@@ -350,7 +350,7 @@ def _differences(section: Section) -> list[Block]:
                 case_of(one.difference.design),
                 {"rms": "rms", "maximum": "largest"}[part.quantity],
                 number(1e6 * part.published),
-                *(number(1e6 * value, 3) for value in np.quantile(part.values, QUANTILES)),
+                *(number(1e6 * value, 3) for _, value in _quantiles(part)),
                 f"{100 * part.below:.0f} %",
                 yes(part.agrees),
             )
@@ -428,37 +428,23 @@ def _sentence(text: str) -> str:
 
 
 def _summary(reproduction: Reproduction) -> list[Block]:
-    figures = [
-        f for section in reproduction.sections for column in section.columns for f in column.figures
-    ]
+    def every(part: str) -> list[Any]:
+        return [one for section in reproduction.sections for one in getattr(section, part)]
+
+    columns = every("columns")
+    figures = [figure for column in columns for figure in column.figures]
     regular = [f for f in figures if f.exception is None]
-    excepted = [f for f in figures if f.exception is not None]
-    columns = [column for section in reproduction.sections for column in section.columns]
-    parts = []
-    for words, ones in (
-        ("figures of tables within the common limit", [f.agrees for f in regular]),
-        ("exceptions within their own", [f.agrees for f in excepted]),
-        ("common factors", [column.factor_agrees for column in columns]),
-        (
-            "statements on rank",
-            [one.agrees for section in reproduction.sections for one in section.ranks],
-        ),
-        ("remarks", [one.agrees for section in reproduction.sections for one in section.remarks]),
-        (
-            "errata confirmed",
-            [one.agrees for section in reproduction.sections for one in section.errata],
-        ),
-        (
-            "fits of exact readings",
-            [one.agrees for section in reproduction.sections for one in section.progress],
-        ),
-        (
-            "differences of estimators",
-            [p.agrees for s in reproduction.sections for one in s.differences for p in one.parts],
-        ),
-    ):
-        if ones:
-            parts.append((words, f"{sum(ones)} of {len(ones)}"))
+    counted: dict[str, list[bool]] = {
+        "figures of tables within the common limit": [f.agrees for f in regular],
+        "exceptions within their own": [f.agrees for f in figures if f.exception is not None],
+        "common factors": [column.factor_agrees for column in columns],
+        "statements on rank": [one.agrees for one in every("ranks")],
+        "remarks": [one.agrees for one in every("remarks")],
+        "errata confirmed": [one.agrees for one in every("errata")],
+        "fits of exact readings": [one.agrees for one in every("progress")],
+        "differences of estimators": [p.agrees for one in every("differences") for p in one.parts],
+    }
+    parts = [(words, f"{sum(are)} of {len(are)}") for words, are in counted.items() if are]
     unexplained = sum(len(under) for one, under in _excepted(reproduction) if one.open)
     if unexplained:
         parts.append(("open differences, unexplained", f"{unexplained} figures"))
@@ -484,48 +470,34 @@ def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
     """A reproduction as plain data in metres and radians; what is undetermined is None."""
     stated = reproduction.document.statements
     shown = {key for section in reproduction.sections for key in section.rests_on}
-    return {
+    data = {
         "document": stated.title,
         "agrees": reproduction.agrees,
         "limits": stated.limits.model_dump(),
         "assumptions": {one.key: one.text for one in stated.assumptions if one.key in shown},
         "exceptions": {
-            one.key: {
-                "reason": one.reason,
-                "open": one.open,
-                "within": list(one.within),
-                "figures": len(under),
-            }
+            one.key: {**picked(one, "reason", "open", "within"), "figures": len(under)}
             for one, under in _excepted(reproduction)
         },
         "sections": [_section_data(section) for section in reproduction.sections],
     }
+    plain_data: dict[str, Any] = as_data(data)
+    return plain_data
 
 
 # In one piece: one mapping, in the form in which the JSON has it.
 def _section_data(section: Section) -> dict[str, Any]:
     return {
         "section": section.name,
-        "title": section.title,
-        "agrees": section.agrees,
+        **picked(section, "title", "agrees"),
         "rests_on": list(section.rests_on),
         "ranks": [
-            {
-                "design": one.design,
-                "published": one.published,
-                "ours": one.ours,
-                "gap": _finite(one.gap),
-                "agrees": one.agrees,
-            }
-            for one in section.ranks
+            picked(one, "design", "published", "ours", "gap", "agrees") for one in section.ranks
         ],
         "factors": [
             {
-                "table": one.column.table,
-                "design": one.column.design,
-                "statistic": one.column.statistic,
-                "factor": _finite(one.factor),
-                "within": list(one.within),
+                **picked(one.column, "table", "design", "statistic"),
+                **picked(one, "factor", "within"),
                 "agrees": one.factor_agrees,
             }
             for one in section.columns
@@ -533,55 +505,31 @@ def _section_data(section: Section) -> dict[str, Any]:
         "figures": [_figure_data(one, figure) for one in section.columns for figure in one.figures],
         "remarks": [
             {
-                "text": one.remark.text,
-                "quantities": list(one.remark.quantities),
-                "least_ratio": _finite(one.least),
-                "largest_ratio": _finite(one.largest),
-                "at_least": one.remark.at_least,
-                "at_most": one.remark.at_most,
+                **picked(one.remark, "text", "quantities", "at_least", "at_most"),
+                "least_ratio": one.least,
+                "largest_ratio": one.largest,
                 "agrees": one.agrees,
             }
             for one in section.remarks
         ],
         "errata": [
             {
-                "table": one.erratum.table,
-                "text": one.erratum.text,
+                **picked(one.erratum, "table", "text"),
                 "confirmed": one.agrees,
-                "columns": [
-                    {
-                        "statistic": line.statistic,
-                        "headed": line.headed,
-                        "meant": line.meant,
-                        "ratios_as_headed": {k: _finite(v) for k, v in line.as_headed.items()},
-                        "ratios_as_meant": {k: _finite(v) for k, v in line.as_meant.items()},
-                        "deviation_as_headed": _finite(line.deviation_headed),
-                        "deviation_as_meant": _finite(line.deviation_meant),
-                    }
-                    for line in one.lines
-                ],
+                "columns": one.lines,
             }
             for one in section.errata
         ],
         "convergence": [
             {
-                "table": one.progress.table,
-                "design": one.progress.design,
+                **picked(one.progress, "table", "design"),
                 "published_settles": one.progress.settles,
                 "ours_settles": one.settled,
-                "iterations": one.iterations,
+                **picked(one, "iterations", "agrees"),
                 "figures": [
-                    {
-                        "quantity": line.quantity,
-                        "published": _finite(line.published),
-                        "ours": _finite(line.ours),
-                        "rule": line.rule,
-                        "limit": line.limit,
-                        "agrees": line.agrees,
-                    }
+                    picked(line, "quantity", "published", "ours", "rule", "limit", "agrees")
                     for line in one.lines
                 ],
-                "agrees": one.agrees,
             }
             for one in section.progress
         ],
@@ -589,7 +537,7 @@ def _section_data(section: Section) -> dict[str, Any]:
             {
                 "design": one.difference.design,
                 "trials": one.comparison.trials,
-                "not_converged": list(one.comparison.failed),
+                "not_converged": one.comparison.failed,
                 **{part.quantity: _placed_data(part) for part in one.parts},
                 "agrees": one.agrees,
             }
@@ -599,52 +547,35 @@ def _section_data(section: Section) -> dict[str, Any]:
             {
                 "design": one.design,
                 "quantities": {
-                    symbol: {
-                        "maximum": _finite(one.quantities[symbol].maximum),
-                        "average": _finite(one.quantities[symbol].average),
-                        "unit": one.quantities[symbol].unit,
-                    }
+                    symbol: picked(one.quantities[symbol], "maximum", "average", "unit")
                     for symbol in SYMBOLS
                 },
             }
             for one in section.told
         ],
-        "illegible": [{"table": block.table, "what": block.what} for block in section.illegible],
+        "illegible": [picked(block, "table", "what") for block in section.illegible],
         "left_out": section.skipped or None,
     }
 
 
 def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> dict[str, Any]:
     return {
-        "table": column.column.table,
-        "quantity": figure.quantity,
-        "statistic": column.column.statistic,
-        "case": column.column.case,
-        "design": column.column.design,
-        "unit": figure.unit,
-        "published": figure.published,
-        "ours": _finite(figure.ours),
-        "ratio": _finite(figure.ratio),
-        "ratio_after_factor": _finite(figure.adjusted),
-        "within": list(figure.within),
+        **picked(column.column, "table", "statistic", "case", "design"),
+        **picked(figure, "quantity", "unit", "published", "ours", "ratio", "within", "agrees"),
+        "ratio_after_factor": figure.adjusted,
         "exception": figure.exception.key if figure.exception else None,
         "rests_on": list(figure.rests_on),
-        "agrees": figure.agrees,
     }
 
 
 def _placed_data(part: PlacedFigure) -> dict[str, Any]:
     return {
-        "published": part.published,
-        "median": part.median,
-        "quantiles": {
-            str(q): float(v)
-            for q, v in zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)
-        },
+        **picked(part, "published", "median", "agrees"),
+        "quantiles": {str(q): v for q, v in _quantiles(part)},
         "share_below_published": part.below,
-        "agrees": part.agrees,
     }
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _quantiles(part: PlacedFigure) -> Iterator[tuple[float, float]]:
+    """Some shares with the quantiles of the values."""
+    return zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)

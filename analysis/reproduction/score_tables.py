@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ..presentation.formatting import aligned
+from ..presentation.formatting import aligned, as_data
 from .certified_problems import CertifiedProblem
 from .score import Score
 
@@ -66,16 +66,4 @@ def _cell(score: Score | None) -> str:
 
 def score_data(scores: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
     """Scores, and the answers that they are of."""
-    return {
-        "scores": [
-            {
-                "problem": score.problem,
-                "part": score.part,
-                "quantity": score.quantity,
-                "digits": None if math.isnan(score.digits) else score.digits,
-                "note": score.note,
-            }
-            for score in scores
-        ],
-        "problems": results,
-    }
+    return {"scores": as_data(scores), "problems": results}

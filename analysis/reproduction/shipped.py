@@ -8,7 +8,7 @@ from pathlib import Path
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
@@ -44,7 +44,7 @@ def variants(shipped: Shipped, name: str) -> dict[str, Experiment]:
                 "no such folder; name that of the shipped designs, which is designs/npl in a"
                 " checkout, with --designs"
             )
-            raise ExperimentError([Message(str(shipped.folder), 0, 0, "", text)])
+            raise refused(shipped.folder, text)
         shipped.loaded[name] = {one.label: one for one in load(shipped.folder / f"{name}.yaml")}
     return shipped.loaded[name]
 
@@ -58,7 +58,7 @@ def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
     found = variants(shipped, name)
     if label not in found:
         text = f'no experiment "{label}"; {hint(label, found)}'
-        raise ExperimentError([Message(str(shipped.folder / f"{name}.yaml"), 0, 0, "", text)])
+        raise refused(shipped.folder / f"{name}.yaml", text)
     return found[label]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from ballplate.simulator.experiment.modules import python_models
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.yamltree import Node, read_tree, to_python
 
 from .model import Sweep
@@ -54,7 +54,7 @@ def bundle_of(sweep: Sweep) -> Bundle:
         names = names_of(paths)
     except ValueError:
         text = f"{sweep.base} lies on another drive than the sweep file; put both on the same one"
-        raise ExperimentError([Message(str(sweep.source), 0, 0, "base", text)]) from None
+        raise refused(sweep.source, text, "base") from None
     try:
         size = sum(path.stat().st_size for path in paths)
         if size > MOST_BYTES:
@@ -63,11 +63,11 @@ def bundle_of(sweep: Sweep) -> Bundle:
                 f" {MOST_BYTES / 1e6:.0f} MB are the limit of what a store takes; name large files"
                 " from the root of the file system"
             )
-            raise ExperimentError([Message(str(sweep.source), 0, 0, "", text)])
+            raise refused(sweep.source, text)
         files = tuple((name, Path(path).read_bytes()) for path, name in names.items())
     except OSError as error:
         text = f"cannot be read ({error.strerror}); check its name and permissions"
-        raise ExperimentError([Message(str(error.filename), 0, 0, "", text)]) from None
+        raise refused(error.filename, text) from None
     return Bundle(names[source], names[base], files)
 
 
@@ -104,7 +104,7 @@ def files_of(sweep: Sweep) -> list[Path]:
             f"{sweep.base} leads through a link to another folder and back; name the file from its"
             " real folder"
         )
-        raise ExperimentError([Message(str(sweep.source), 0, 0, "base", text)])
+        raise refused(sweep.source, text, "base")
     return sorted({source, base, *named_files(sweep)})
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import ballplate.simulator
+from ballplate.simulator.computing.unusable import UnusableError
 
 from .bundle import Bundle, unpack
 from .execute import Runner
@@ -41,8 +42,8 @@ RESTART = (
 )
 
 
-class ClusterError(Exception):
-    """No cluster can be used; the text says why, and what would help."""
+class ClusterError(UnusableError):
+    """No cluster can be used."""
 
 
 class OtherVersionError(Exception):

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Store, StoredResults, chosen_sweep, definition_of, results
+from .store import Store, chosen_sweep, definition_of, results
+from .stored import StoredResults
 
 if TYPE_CHECKING:
     import pandas
@@ -44,17 +45,16 @@ def frame_of(results: StoredResults, defined: dict[str, Any] | None) -> pandas.D
     )
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
-        is_whole = all(
-            abs(value) < MOST_WHOLE and float(value).is_integer() for value in axis["values"]
-        )
-        if axis["unit"] == "1" and is_whole:
+        if axis["unit"] == "1" and ((abs(values) < MOST_WHOLE) & (values % 1.0 == 0.0)).all():
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
-    columns |= {"status": results.statuses, "reason": results.reasons, **results.figures}
+    columns |= {name: [getattr(row, name) for row in results.rows] for name in ("status", "reason")}
+    columns |= results.figures
     columns |= {
-        "data_set_seed": results.seeds,
+        "data_set_seed": np.array([row.seed for row in results.rows], np.int64),
         "fingerprint": results.keys,
-        "duration_s": results.seconds,
+        "duration_s": np.array([row.seconds for row in results.rows], float),
     }
-    columns |= {f"{name}_version": texts for name, texts in results.versions.items()}
+    for name in dict.fromkeys(name for row in results.rows for name in row.versions):
+        columns[f"{name}_version"] = [row.versions.get(name, "") for row in results.rows]
     return pandas.DataFrame(columns)

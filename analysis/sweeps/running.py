@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.inputs.messages import in_one_line
 from filelock import FileLock, Timeout
 
@@ -42,7 +43,7 @@ MOST_CHANGES = 20
 MOST_REASONS = 10
 
 
-class OtherSweepError(Exception):
+class OtherSweepError(UnusableError):
     """The store holds another sweep; the text says what is different, a line for each."""
 
 
@@ -197,15 +198,14 @@ def shortcomings(store: Store, number: int, cells: int) -> tuple[str, ...]:
     failed.
     """
     found, told = results(store, number, cells), []
-    versions = set(zip(*found.versions.values(), strict=True))
+    versions = {tuple(row.versions.items()) for row in found.rows}
     if len(versions) > 1:
         text = f"the rows were computed with {len(versions)} different sets of versions"
         told.append(in_one_line(f"{store.path}: {text}"))
     reasons: dict[str, list[int]] = {}
-    rows = zip(found.cells.tolist(), found.statuses, found.reasons, strict=True)
-    for cell, status, reason in rows:
-        if status == "failed":
-            reasons.setdefault(reason, []).append(cell)
+    for row in found.rows:
+        if row.status == "failed":
+            reasons.setdefault(row.reason, []).append(row.number)
     for reason, failed in list(reasons.items())[:MOST_REASONS]:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         told.append(f"cell {failed[0]}{more} failed: {reason}")

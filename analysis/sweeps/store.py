@@ -14,14 +14,13 @@ import sqlite3
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count as numbers_from
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..montecarlo.accumulator import Accumulator, QuantityAccumulator
 from .fingerprint import METHOD, METHODS, method_of
@@ -39,12 +38,12 @@ from .store_file import (
 )
 from .stored import (
     OF_RESULT,
+    StoredResults,
     UnreadableError,
     check_key,
     checked_definition,
     checked_row,
     digest_of,
-    figures_of,
     read_rows,
     salvaged_rows,
     texts_of,
@@ -72,7 +71,14 @@ CREATE TABLE result (
 """
 
 COLUMNS = (
-    "key, block, status, reason, seed, names, figures, details, versions, seconds, tally, digest"
+    *("key", "block", "status", "reason", "seed", "names", "figures", "details", "versions"),
+    *("seconds", "tally", "digest"),
+)
+INSERT = (
+    f"INSERT INTO result ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
+    " ON CONFLICT (key, block) DO UPDATE"
+    f" SET {', '.join(f'{column} = excluded.{column}' for column in COLUMNS[2:])}"
+    " WHERE result.status = 'failed'"
 )
 
 
@@ -263,11 +269,6 @@ def definitions(store: Store) -> tuple[dict[int, dict[str, Any]], dict[int, str]
     return found, unreadable
 
 
-def sweeps(store: Store) -> dict[int, dict[str, Any]]:
-    """Definitions of the sweeps of a store by number, as far as they can be read."""
-    return definitions(store)[0]
-
-
 def definition_of(store: Store, sweep: int) -> dict[str, Any]:
     """Definition of one sweep of the store.
 
@@ -422,40 +423,11 @@ def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
             figures = np.array(list(row.figures.values()), "<f8").tobytes()
             details = json.dumps(row.details, ensure_ascii=True, sort_keys=True)
             tally = None if row.tally is None else _packed(row.tally)
-            kept = (
-                row.key,
-                row.block,
-                row.status,
-                reason,
-                row.seed,
-                of_names,
-                figures,
-                details,
-                of_versions,
-                tally,
-            )
+            first = row.key, row.block, row.status, reason, row.seed
+            digest = digest_of(*first, of_names, figures, details, of_versions, tally)
             connection.execute(
-                f"INSERT INTO result ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
-                "ON CONFLICT (key, block) DO UPDATE SET "
-                "status = excluded.status, reason = excluded.reason, seed = excluded.seed, "
-                "names = excluded.names, figures = excluded.figures, details = excluded.details, "
-                "versions = excluded.versions, seconds = excluded.seconds, tally = excluded.tally, "
-                "digest = excluded.digest "
-                "WHERE result.status = 'failed'",
-                [
-                    row.key,
-                    row.block,
-                    row.status,
-                    reason,
-                    row.seed,
-                    names,
-                    figures,
-                    details,
-                    versions,
-                    row.seconds,
-                    tally,
-                    digest_of(*kept),
-                ],
+                INSERT,
+                [*first, names, figures, details, versions, row.seconds, tally, digest],
             )
             connection.execute(
                 "INSERT OR REPLACE INTO cell (sweep, number, key, digest) VALUES (?, ?, ?, ?)",
@@ -532,31 +504,6 @@ def _unpacked(content: bytes) -> Accumulator:
         raise UnreadableError("its sums over data sets are none") from None
 
 
-@dataclass(frozen=True)
-class StoredResults:
-    """Results of a sweep's cells (n,) in their order; `cells` count from 0, `seconds` is what each
-    took.
-
-    `figures` by name, (n,) each, NaN where a cell has no such figure; `versions` by name, a text
-    for each cell; `details` what was told of each. `unreadable` says of other cells why they are
-    not among these, and `strays` counts rows that belong to no cell. `damage` is what SQLite finds
-    wrong with the store, empty where nothing.
-    """
-
-    cells: Integers
-    keys: list[str]
-    statuses: list[str]
-    reasons: list[str]
-    seeds: Integers
-    seconds: Array
-    figures: dict[str, Array]
-    versions: dict[str, list[str]]
-    details: list[dict[str, Any]]
-    unreadable: dict[int, str]
-    strays: int
-    damage: str
-
-
 def results(store: Store, sweep: int, count: int | None = None) -> StoredResults:
     """Results of the first `count` cells of a sweep, or of all; cells that are not done yet are
     left out.
@@ -589,23 +536,7 @@ def results(store: Store, sweep: int, count: int | None = None) -> StoredResults
             " sweep --store"
         )
         raise StoreError(f"{store.path}: is damaged: {text} and a new name")
-    rows = reading.rows
-    kept_versions = [reading.texts.versions_of(row.versions) for row in rows]
-    kinds = dict.fromkeys(name for one in kept_versions for name in one)
-    return StoredResults(
-        np.array([row.number for row in rows], np.int64),
-        [row.key for row in rows],
-        [row.status for row in rows],
-        [row.reason for row in rows],
-        np.array([row.seed for row in rows], np.int64),
-        np.array([row.seconds for row in rows], float),
-        figures_of(reading.texts, rows),
-        {name: [one.get(name, "") for one in kept_versions] for name in kinds},
-        [row.details for row in rows],
-        reading.unreadable,
-        reading.strays,
-        wrong,
-    )
+    return replace(reading, damage=wrong)
 
 
 def unread(

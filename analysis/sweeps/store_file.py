@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
+from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.inputs.messages import in_one_line
 
 # The second format has digests of what it keeps; rows that came from the first have none.
@@ -82,7 +83,7 @@ WORDS = {
 }
 
 
-class StoreError(Exception):
+class StoreError(UnusableError):
     """A store cannot be used; the text says why, and what would help."""
 
     def __init__(self, text: str) -> None:

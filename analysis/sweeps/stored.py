@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -14,8 +13,16 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from ballplate.simulator.inputs.messages import in_lines
-from ballplate.simulator.machines.protocol import Array
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
+from ballplate.simulator.machines.protocol import Array, Integers
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    TypeAdapter,
+    ValidationError,
+)
 
 from .columns import is_reserved
 
@@ -33,20 +40,38 @@ class UnreadableError(Exception):
     """A row cannot be read; the text says why."""
 
 
+def _names(found: list[str]) -> tuple[str, ...]:
+    """Names of figures.
+
+    :raises ValueError: some are none, or are there twice.
+    """
+    if len(set(found)) < len(found) or not all(map(_is_figure, found)):
+        raise ValueError
+    return tuple(found)
+
+
+def _is_figure(name: str) -> bool:
+    is_own = name in OWN or name.endswith("_version")
+    return name.isprintable() and not is_own and (is_reserved(name) or name.startswith("tasks_"))
+
+
+Plain = Annotated[str, AfterValidator(in_lines)]
+
+
 class _Kept(BaseModel):
     model_config = ConfigDict(strict=True, extra="ignore")
 
 
 class _Axis(_Kept):
-    name: str
-    column: str
+    name: Plain
+    column: Plain
     unit: Literal["m", "rad", "1", ""]
-    labels: Annotated[list[str], Field(min_length=1)]
+    labels: Annotated[list[Plain], Field(min_length=1)]
     values: list[FiniteFloat]
 
 
 class _Definition(_Kept):
-    title: str
+    title: Plain
     source: str
     base: str
     sweep: Any
@@ -56,21 +81,21 @@ class _Definition(_Kept):
     cells: Annotated[list[list[Annotated[int, Field(ge=0)]]], Field(min_length=1)]
     trials: int | None
     seed: int
-    record: list[str]
+    record: list[Plain]
 
 
 class _Details(_Kept):
-    undetermined: list[str] = []
-    weak: list[str] = []
-    largest_at: dict[str, str] = {}
-    monte_carlo: str = ""
+    undetermined: list[Plain] = []
+    weak: list[Plain] = []
+    largest_at: dict[Plain, Plain] = {}
+    monte_carlo: Plain = ""
     not_converged: list[int] = []
-    flags: dict[str, list[str]] = {}
+    flags: dict[Plain, list[Plain]] = {}
 
 
-_DETAILS = TypeAdapter(_Details)
-_VERSIONS = TypeAdapter(dict[str, str], config=ConfigDict(strict=True))
-_STRINGS = TypeAdapter(list[str], config=ConfigDict(strict=True))
+STRICT = ConfigDict(strict=True)
+_VERSIONS: TypeAdapter[Any] = TypeAdapter(dict[Plain, Plain], config=STRICT)
+_NAMES: TypeAdapter[Any] = TypeAdapter(Annotated[list[str], AfterValidator(_names)], config=STRICT)
 
 
 def digest_of(*values: object) -> bytes:
@@ -131,7 +156,7 @@ def checked_definition(number: object, text: object, digest: object) -> dict[str
             raise UnreadableError(
                 f"the axis {axis.name} has {len(axis.labels)} labels and {len(axis.values)} values"
             )
-    columns = [in_lines(axis.column) for axis in kept.axes]
+    columns = [axis.column for axis in kept.axes]
     if len(set(columns)) < len(columns) or any(map(is_reserved, columns)):
         raise UnreadableError("the axes have no columns of their own")
     counts = [len(axis.labels) for axis in kept.axes]
@@ -140,26 +165,13 @@ def checked_definition(number: object, text: object, digest: object) -> dict[str
             k >= count for k, count in zip(cell, counts, strict=True)
         ):
             raise UnreadableError("cells has values that the axes do not have")
-    axes = [
-        {
-            **axis.model_dump(),
-            "name": in_lines(axis.name),
-            "column": in_lines(axis.column),
-            "labels": [in_lines(label) for label in axis.labels],
-        }
-        for axis in kept.axes
-    ]
-    return {
-        **found,
-        **{name: in_lines(found[name]) for name in ("title",)},
-        "axes": axes,
-        "record": [in_lines(name) for name in kept.record],
-    }
+    axes = [axis.model_dump() for axis in kept.axes]
+    return {**found, "title": kept.title, "axes": axes, "record": kept.record}
 
 
 @dataclass(frozen=True)
 class StoredRow:
-    """A result as it is stored; `names` and `versions` are the numbers of their texts."""
+    """A result as it is stored; `figures` are 64-bit numbers, one for each of the `names`."""
 
     number: int
     key: str
@@ -167,8 +179,8 @@ class StoredRow:
     reason: str
     seed: int
     seconds: float
-    names: int
-    versions: int
+    names: tuple[str, ...]
+    versions: dict[str, str]
     figures: bytes
     details: dict[str, Any]
 
@@ -178,45 +190,34 @@ class Texts:
     """Texts of a store by number, and what was made of them: names of figures, and versions."""
 
     raw: dict[int, str]
-    names: dict[int, tuple[str, ...]] = field(default_factory=dict)
-    versions: dict[int, dict[str, str]] = field(default_factory=dict)
+    made: dict[tuple[int, str], Any] = field(default_factory=dict)
 
     def names_of(self, number: object) -> tuple[str, ...]:
         """Names of the figures of a row.
 
         :raises UnreadableError: no such text, or no names of figures.
         """
-        if not isinstance(number, int) or number not in self.raw:
-            raise UnreadableError("the names of its figures are not there")
-        if number not in self.names:
-            try:
-                found = tuple(_STRINGS.validate_python(json_of(self.raw[number])))
-            except (UnreadableError, ValidationError):
-                raise UnreadableError("the names of its figures are none") from None
-            if len(set(found)) < len(found) or not all(map(_is_figure, found)):
-                raise UnreadableError("the names of its figures are none")
-            self.names[number] = found
-        return self.names[number]
+        found: tuple[str, ...] = self._made(number, "the names of its figures", _NAMES)
+        return found
 
     def versions_of(self, number: object) -> dict[str, str]:
         """Versions that a row was computed with.
 
         :raises UnreadableError: no such text, or no versions.
         """
+        what = "the versions that it was computed with"
+        found: dict[str, str] = self._made(number, what, _VERSIONS)
+        return found
+
+    def _made(self, number: object, what: str, form: TypeAdapter[Any]) -> Any:
         if not isinstance(number, int) or number not in self.raw:
-            raise UnreadableError("the versions that it was computed with are not there")
-        if number not in self.versions:
+            raise UnreadableError(f"{what} are not there")
+        if (number, what) not in self.made:
             try:
-                found = _VERSIONS.validate_python(json_of(self.raw[number]))
+                self.made[number, what] = form.validate_python(json_of(self.raw[number]))
             except (UnreadableError, ValidationError):
-                raise UnreadableError("the versions that it was computed with are none") from None
-            self.versions[number] = {in_lines(name): in_lines(text) for name, text in found.items()}
-        return self.versions[number]
-
-
-def _is_figure(name: str) -> bool:
-    is_own = name in OWN or name.endswith("_version")
-    return name.isprintable() and not is_own and (is_reserved(name) or name.startswith("tasks_"))
+                raise UnreadableError(f"{what} are none") from None
+        return self.made[number, what]
 
 
 def check_key(sweep: int, number: object, key: object, digest: object) -> None:
@@ -236,7 +237,7 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
     :raises UnreadableError: a value that none can be, or not as it was stored.
     """
     block, status, reason, seed, seconds, names, versions, figures, details, tally, digest = raw
-    of_names, _ = texts.names_of(names), texts.versions_of(versions)
+    of_names, of_versions = texts.names_of(names), texts.versions_of(versions)
     if digest is not None:
         kept = (
             key,
@@ -259,50 +260,58 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
         or not isinstance(reason, str)
     ):
         raise UnreadableError("its block, status or reason is none")
-    if not isinstance(seed, int) or not isinstance(seconds, float) or not math.isfinite(seconds):
+    if not isinstance(seed, int) or not isinstance(seconds, float) or not np.isfinite(seconds):
         raise UnreadableError("its seed or duration is no number")
     if not isinstance(figures, bytes) or len(figures) != 8 * len(of_names):
         raise UnreadableError(f"its figures are not {len(of_names)} numbers")
     if tally is not None and not isinstance(tally, bytes):
         raise UnreadableError("its sums over data sets are none")
     try:
-        found = _DETAILS.validate_python(json_of(details)).model_dump(exclude_unset=True)
+        told = _Details.model_validate(json_of(details)).model_dump(exclude_unset=True)
     except (UnreadableError, ValidationError):
         raise UnreadableError("what was told of it cannot be read") from None
     return StoredRow(
-        number,
-        key,
-        status,
-        in_lines(reason),
-        seed,
-        seconds,
-        names,
-        versions,
-        figures,
-        _plain(found),
+        number, key, status, in_lines(reason), seed, seconds, of_names, of_versions, figures, told
     )
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {in_lines(name): _plain(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return in_lines(value) if isinstance(value, str) else value
-
-
 @dataclass(frozen=True)
-class Reading:
-    """Rows of a sweep in the order of their cells; `unreadable` says of other cells why they are
-    not among them.
+class StoredResults:
+    """StoredResults of a sweep in the order of their cells; those not done yet are left out.
 
-    `strays` counts entries that belong to no cell of the sweep.
+    `unreadable` says of other cells why they are not among them, and `strays` counts entries that
+    belong to no cell of the sweep. `damage` is what SQLite finds wrong with the store, empty where
+    nothing.
     """
 
     rows: list[StoredRow]
     unreadable: dict[int, str]
-    texts: Texts
     strays: int = 0
+    damage: str = ""
+
+    @property
+    def cells(self) -> Integers:
+        """Cells (rows,), which count from 0."""
+        return np.array([row.number for row in self.rows], np.int64)
+
+    @property
+    def keys(self) -> list[str]:
+        return [row.key for row in self.rows]
+
+    @property
+    def figures(self) -> dict[str, Array]:
+        """Figures by name, (rows,) each, NaN where a row has no such figure."""
+        figures: dict[str, Array] = {}
+        # Rows with the same names make a matrix.
+        of_names: dict[int, list[int]] = {}
+        for place, row in enumerate(self.rows):
+            of_names.setdefault(id(row.names), []).append(place)
+        for places in of_names.values():
+            content = b"".join(self.rows[place].figures for place in places)
+            matrix = np.frombuffer(content, "<f8").reshape(len(places), -1)
+            for k, name in enumerate(self.rows[places[0]].names):
+                figures.setdefault(name, np.full(len(self.rows), np.nan))[places] = matrix[:, k]
+        return figures
 
 
 def texts_of(connection: sqlite3.Connection) -> Texts:
@@ -325,7 +334,9 @@ def _salvaged_texts(connection: sqlite3.Connection) -> Texts:
     return Texts(found)
 
 
-def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool) -> Reading:
+def read_rows(
+    connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
+) -> StoredResults:
     """The rows of the first `count` cells of a sweep, from a database that is sound.
 
     :raises sqlite3.Error: it is not, or cannot be read.
@@ -362,16 +373,17 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
                 checked_row(0, key, tuple(raw), texts)
             except UnreadableError:
                 strays += 1
-    return Reading(rows, unreadable, texts, strays)
+    return StoredResults(rows, unreadable, strays)
 
 
 def salvaged_rows(
     connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
-) -> Reading:
+) -> StoredResults:
     """The rows of a sweep that can be read in a damaged database, each looked for by itself."""
     texts = _salvaged_texts(connection)
-    by_key = _scanned(connection, has_digests)
     digest = "digest" if has_digests else "NULL"
+    # Of block 0 by key, as far as the pages of their table can be read.
+    by_key = {key: tuple(raw) for key, *raw in _walked(connection, digest) if raw[0] == 0}
     rows: list[StoredRow] = []
     unreadable: dict[int, str] = {}
     for number in range(count):
@@ -384,11 +396,9 @@ def salvaged_rows(
             check_key(sweep, number, *cell)
             raw = by_key.get(cell[0]) or _of_index(connection, cell[0], digest)
             rows.append(checked_row(number, cell[0], raw, texts))
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, UnreadableError) as error:
             unreadable[number] = str(error)
-        except UnreadableError as error:
-            unreadable[number] = str(error)
-    return Reading(rows, unreadable, texts)
+    return StoredResults(rows, unreadable)
 
 
 def _of_index(connection: sqlite3.Connection, key: str, digest: str) -> tuple[Any, ...]:
@@ -397,15 +407,6 @@ def _of_index(connection: sqlite3.Connection, key: str, digest: str) -> tuple[An
     if found is None:
         raise UnreadableError("no result of it is found")
     return tuple(found)
-
-
-def _scanned(connection: sqlite3.Connection, has_digests: bool) -> dict[str, tuple[Any, ...]]:
-    """Results of block 0 by key, as far as the pages of their table can be read."""
-    found: dict[str, tuple[Any, ...]] = {}
-    for key, *raw in _walked(connection, "digest" if has_digests else "NULL"):
-        if raw[0] == 0 and isinstance(key, str):
-            found[key] = tuple(raw)
-    return found
 
 
 def _walked(connection: sqlite3.Connection, digest: str) -> Iterator[tuple[Any, ...]]:
@@ -423,19 +424,3 @@ def _walked(connection: sqlite3.Connection, digest: str) -> Iterator[tuple[Any, 
         except sqlite3.DatabaseError:
             # Behind the page that cannot be read there may be others.
             place, misses = place + 1, misses + 1
-
-
-def figures_of(texts: Texts, rows: list[StoredRow]) -> dict[str, Array]:
-    """Figures by name, (rows,) each, NaN where a row has no such figure."""
-    figures: dict[str, Array] = {}
-    # Rows with the same names make a matrix.
-    of_names: dict[int, list[int]] = {}
-    for place, row in enumerate(rows):
-        of_names.setdefault(row.names, []).append(place)
-    for number, places in of_names.items():
-        matrix = np.frombuffer(b"".join(rows[place].figures for place in places), "<f8").reshape(
-            len(places), -1
-        )
-        for k, name in enumerate(texts.names_of(number)):
-            figures.setdefault(name, np.full(len(rows), np.nan))[places] = matrix[:, k]
-    return figures

@@ -16,7 +16,8 @@ from .summaries import point_pairs
 # Points along x and y of a slice.
 POINTS = 21
 
-LEVELS = (("low", 0.0), ("middle", 0.5), ("high", 1.0))
+# From the bottom of the volume to its top, evenly spaced.
+LEVELS = ("low", "middle", "high")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +56,18 @@ def error_map(experiment: Experiment) -> ErrorMap:
     volume = design.machine.volume
     x, y = (np.linspace(volume.lower[k], volume.upper[k], POINTS) for k in (0, 1))
     levels: list[tuple[str, float | None]] = [("", None)]
-    grid = np.stack(np.meshgrid(y, x, indexing="ij")[::-1], axis=-1)[None]
+    sides = [y, x]
     if design.dimension == 3:
-        heights = [float(volume.lower[2] + share * volume.size[2]) for _, share in LEVELS]
-        levels = [(name, height) for (name, _), height in zip(LEVELS, heights, strict=True)]
-        grid = np.stack(np.meshgrid(heights, y, x, indexing="ij")[::-1], axis=-1)
+        heights = np.linspace(volume.lower[2], volume.upper[2], len(LEVELS))
+        levels = list(zip(LEVELS, heights.tolist(), strict=True))
+        sides = [heights, y, x]
+    grid = np.stack(np.meshgrid(*sides, indexing="ij")[::-1], axis=-1)
     points = grid.reshape(-1, design.dimension)
     design = replace(design, evaluation=replace(design.evaluation, points=points))
     target = experiment.target_uncertainty
     limit = None if target is None else target.standard
     of_points, pairs = point_pairs(linearise(design), limit)
-    values = np.sqrt((of_points**2).mean(axis=1)).reshape(grid.shape[:-1])
+    values = np.sqrt((of_points**2).mean(axis=1)).reshape(len(levels), len(y), len(x))
     slices = [
         Slice(name, level, found) for (name, level), found in zip(levels, values, strict=True)
     ]

@@ -59,8 +59,8 @@ def refused(file: object, text: str, path: str = "") -> ExperimentError:
     return ExperimentError([Message(str(file), 0, 0, path, text)])
 
 
-def _by_number(match: re.Match[str]) -> str:
-    number = ord(match[0])
+def _by_number(found: re.Match[str]) -> str:
+    number = ord(found[0])
     return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
 
 

@@ -392,7 +392,7 @@ def test_what_a_killed_sweep_left_in_its_log_is_read(store: Path, tmp_path: Path
     copy = tmp_path / "killed/small.sqlite"
     assert (tmp_path / "killed/small.sqlite-wal").stat().st_size > 0
     found = open_store(copy)
-    assert (results(found, 1).seconds == 17).all()
+    assert all(row.seconds == 17 for row in results(found, 1).rows)
     found.close()
     assert_same(rows(copy), right)
 

@@ -19,7 +19,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.sweeps.fingerprint import fingerprint
 from ballplate.sweeps.load import experiment_of, load_sweep
 from ballplate.sweeps.model import Sweep
-from ballplate.sweeps.store import files, keys, open_store, results, sweeps
+from ballplate.sweeps.store import definitions, files, keys, open_store, results
 from ballplate.sweeps.task import BLOCK, CellResult, CellTask, compute
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep
@@ -182,7 +182,7 @@ def test_a_changed_base_is_refused_with_what_changed(
     )
     assert sweep(path, "--beside") == 1
     store = open_store(tmp_path / "small.sqlite")
-    assert len(sweeps(store)) == 2
+    assert len(definitions(store)[0]) == 2
     assert keys(store, 1)[0] != keys(store, 2)[0]
     one, two = (results(store, k).figures["U1_average_m"][0] for k in (1, 2))
     assert two > 1.1 * one
@@ -249,7 +249,7 @@ def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
     assert sweep(path) == 0
     store = open_store(tmp_path / "small.sqlite")
     assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
-    assert "undetermined" in results(store, 1).details[0]
+    assert "undetermined" in results(store, 1).rows[0].details
     store.close()
     (tmp_path / "balls.csv").write_text(
         "ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8"
