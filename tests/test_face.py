@@ -294,7 +294,8 @@ def test_residuals_in_space_are_drawn_as_seen() -> None:
     away = own.residuals[k] / np.hypot(*own.residuals[k])
     assert abs(away @ seen) / np.hypot(*seen) > 0.9
     (axes, *_) = found.plot().axes
-    edges = [line for line in axes.lines if len(line.get_xdata()) == 2]
+    inside = [line for line in axes.lines if line.get_transform() == axes.transData]
+    edges = [line for line in inside if len(line.get_xdata()) == 2]
     assert len(edges) == 12 and not axes.axison
 
 
