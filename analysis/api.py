@@ -23,7 +23,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_type,
     ensure_whole,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
 
@@ -80,15 +80,13 @@ def load(path: PathLike, variant: str | None = None) -> Experiment:
         if variant in names:
             return found[names.index(variant)]
         told = hint(variant, names) if found[0].name is not None else "the file has no variants"
-        raise ExperimentError(
-            [Message(str(path), 0, 0, "variants", f'no variant "{variant}"; {told}')]
-        )
+        raise refused(path, f'no variant "{variant}"; {told}', "variants")
     if len(found) > 1:
         text = (
             "the file has several variants; choose one with variant=, or load_all:"
             f" {', '.join(names)}"
         )
-        raise ExperimentError([Message(str(path), 0, 0, "variants", text)])
+        raise refused(path, text, "variants")
     return found[0]
 
 

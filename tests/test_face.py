@@ -294,9 +294,9 @@ def test_residuals_in_space_are_drawn_as_seen() -> None:
     away = own.residuals[k] / np.hypot(*own.residuals[k])
     assert abs(away @ seen) / np.hypot(*seen) > 0.9
     (axes, *_) = found.plot().axes
-    straight = [line for line in axes.lines if len(line.get_xdata()) == 2]
-    # The edges of the volume, and the scale.
-    assert len(straight) == 12 + 1 and not axes.axison
+    inside = [line for line in axes.lines if line.get_transform() == axes.transData]
+    edges = [line for line in inside if len(line.get_xdata()) == 2]
+    assert len(edges) == 12 and not axes.axison
 
 
 def test_reach_draws_what_was_tried() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.yamltree import read_text
 
 from ..planning.repair.mending import mended, to_write
@@ -87,7 +87,7 @@ def _text(path: Path) -> tuple[str, str]:
     :raises ExperimentError: it is no file that could be changed.
     """
     if not path.is_file():
-        raise ExperimentError([Message(str(path), 0, 0, "", "is no file that could be changed")])
+        raise refused(path, "is no file that could be changed")
     text = read_text(path)
     return MARK if path.read_bytes().startswith(MARK.encode()) else "", text
 
@@ -100,7 +100,7 @@ def _write(path: Path, mark: str, text: str, new: str) -> int:
     check_overwritten(path)
     if _text(path) != (mark, text):
         changed = "the file has changed meanwhile; nothing was written, start again"
-        raise ExperimentError([Message(str(path), 0, 0, "", changed)])
+        raise refused(path, changed)
     content = (mark + new).encode()
     is_written = write_outputs({path: lambda place: place.write_bytes(content)}, force=True)
     return 0 if is_written else BAD_FILE

@@ -59,6 +59,9 @@ class ProgressDisplay:
         self.bar.total, self.bar.ncols = step.wanted, width()
         self.bar.set_postfix_str(step.remark, refresh=False)
         self.bar.update(step.done - self.bar.n)
+        if step.done == step.wanted:
+            # However soon after the one before.
+            self.bar.refresh()
 
     def step_aside(self) -> None:
         """Take the bar away while something else is printed; the next report brings it back."""

@@ -81,8 +81,7 @@ class LengthFit(FitResult):
     def headline(self) -> str:
         count = self.solution.deficiency
         rank = f"rank deficiency {count}" if count else "full rank"
-        status = "converged" if self.converged else "not converged"
-        return f"{self.solution.estimator}, {status}, {rank}"
+        return f"{self.solution.estimator}, {_status(self)}, {rank}"
 
     def lines(self) -> list[str]:
         return _lines(self)
@@ -273,7 +272,7 @@ def _data(fit: LengthFit) -> dict[str, Any]:
             "experiment": fit.label,
             "title": fit.title,
             **picked(found, "estimator", "equations", "degrees_of_freedom"),
-            "status": "converged" if found.converged else "not converged",
+            "status": _status(fit),
             "rank_deficiency": found.deficiency,
             "factors": dict(zip(FACTORS, fit.factors, strict=True)),
             "adjustments": adjustment_data(fit.adjustments),

@@ -11,7 +11,7 @@ import numpy as np
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
 
@@ -113,7 +113,7 @@ def begun(
             before = load(earlier)
             if len(before) > 1:
                 text = "the file has several variants; name a design that was chosen"
-                raise ExperimentError([Message(str(earlier), 0, 0, "variants", text)])
+                raise refused(earlier, text, "variants")
             chosen = earlier_choice(before[0], offered)
     except ExperimentError as error:
         messages += error.messages

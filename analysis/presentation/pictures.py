@@ -13,7 +13,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from ..uncertainty.error_map import ErrorMap, Slice
 from .formatting import number
-from .scene import Box, Place, Scene, scene
+from .scene import Box, DrawnPosition, Scene, scene
 from .svg import (
     DASHES,
     INK,
@@ -128,7 +128,7 @@ def _millimetres(value: float) -> str:
     return f"{1000 * value + 0.0:.6g}"
 
 
-def _place(axes: Axes, place: Place) -> None:
+def _place(axes: Axes, place: DrawnPosition) -> None:
     colour = SERIES[(place.number - 1) % len(SERIES)]
     dash = DASHES[(place.number - 1) % len(DASHES)]
     if len(place.outline) > 2:
@@ -152,7 +152,9 @@ def _place(axes: Axes, place: Place) -> None:
         axes.plot(*stylus[1], color=INK, marker="s", markersize=3.2)
 
 
-def _name(axes: Axes, place: Place, taken: list[Array], size: float, by_number: bool) -> None:
+def _name(
+    axes: Axes, place: DrawnPosition, taken: list[Array], size: float, by_number: bool
+) -> None:
     """A position's name at the corner of its outline that is furthest from other names."""
     centre = place.outline.mean(axis=0)
     corners = place.outline if len(place.outline) > 1 else np.array([centre])

@@ -17,7 +17,7 @@ MOST_BALLS = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class DrawnPosition:
     """A position on the paper: outline (k, 2), balls that are read (m, 2), styli (n, 2, 2) from tip
     to reference point.
 
@@ -60,7 +60,7 @@ class Scene:
     """
 
     box: Box
-    places: tuple[Place, ...]
+    places: tuple[DrawnPosition, ...]
     tips: tuple[tuple[str, Array], ...]
 
 
@@ -84,7 +84,7 @@ def scene(design: Design) -> Scene:
             [np.stack([middle, middle - design.probes.offsets[probe]]) for probe in used]
         )
         places.append(
-            Place(
+            DrawnPosition(
                 k + 1,
                 name,
                 design.artefacts.names[design.positions.artefact[k]],

@@ -20,10 +20,14 @@ from typing import TextIO
 import numpy as np
 
 from ..design.arrays import Design, State
-from ..design.observations.calibration import FAR_FROM_DRAWING, CertifiedValue, far_from_drawing
+from ..design.observations.calibration import (
+    FAR_FROM_DRAWING,
+    CertifiedValue,
+    far_from_drawing,
+)
 from ..design.observations.priors import Priors
 from ..experiment.model import Experiment
-from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path
+from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path, refused
 from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
@@ -157,7 +161,7 @@ def ensure_certified(experiment: Experiment) -> None:
             "there is no certificate, prior or probe offset with an uncertainty; leave"
             " --certificate out"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)])
+        raise refused(experiment.source, text)
 
 
 def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experiment:
@@ -174,7 +178,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
             "the experiment has no certificate, prior or probe offset with an uncertainty; leave"
             " the file out"
         )
-        raise ExperimentError([Message(str(path), 0, 0, "", text)])
+        raise refused(path, text)
     place = {one.key: k for k, one in enumerate(known)}
     pairs = {one.item for one in known if one.is_pair}
     values, lines = np.full(len(known), np.nan), dict[int, FileRow]()

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.results.study import check
-from ballplate.simulator.experiment import ExperimentError, load
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines import custom
 
 # A machine of straight axes in space: three scales and three angles.

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.simulator.experiment import ExperimentError, load
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import TrueMachine, true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 
