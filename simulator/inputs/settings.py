@@ -29,7 +29,10 @@ Mapped = TypeVar("Mapped")
 NonEmpty = Annotated[tuple[One, ...], Field(min_length=1)]
 """A list of one entry at least."""
 
-Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=1000)]
+# Entries of a list whose entries are compared with one another or combined.
+MOST_SEVERAL = 1000
+
+Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=MOST_SEVERAL)]
 """A list of up to a thousand entries."""
 
 Forms = Annotated[
