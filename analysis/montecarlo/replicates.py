@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Replicates
+from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.elimination import Factor
@@ -38,6 +39,9 @@ PASSES = 20
 # errors are left at the most.
 SMALLEST_STEP = 1e-4
 
+# Share of the replicates looked at from which on those left go on alone: copying them takes time.
+FEW_LEFT = 0.5
+
 
 @dataclass(frozen=True)
 class Deviations:
@@ -54,6 +58,17 @@ class Deviations:
     a: Array
     offsets: Array
     shared: Array
+
+    def select(self, chosen: Integers | Flags) -> Deviations:
+        """Those of some replicates."""
+        return Deviations(*(value[chosen] for value in vars(self).values()))
+
+    def with_rows(self, chosen: Integers, others: Deviations) -> Deviations:
+        """With others in the places of those chosen."""
+        found = Deviations(*(value.copy() for value in vars(self).values()))
+        for value, other in zip(vars(found).values(), vars(others).values(), strict=True):
+            value[chosen] = other
+        return found
 
 
 @dataclass(frozen=True)
@@ -76,6 +91,11 @@ class Draw:
     moved: Single
     errors: tuple[Array, ...]
     ends: tuple[Array, Array]
+
+    def select(self, chosen: Integers | Flags) -> Draw:
+        """That of some replicates."""
+        errors, (first, second) = tuple(one[chosen] for one in self.errors), self.ends
+        return Draw(self.moved[chosen], errors, (first[chosen], second[chosen]))
 
 
 def draw(shared: Reference, seed: int, batch: int) -> Draw:
@@ -104,30 +124,34 @@ def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Arra
 
 
 @single_threaded
-def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
-    """Estimates of the `BATCH` replicates of one batch."""
+def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH) -> Estimates:
+    """Estimates of the `BATCH` replicates of one batch, or of the first `count` of them."""
     drawn = draw(shared, seed, batch)
+    if count < BATCH:
+        drawn = drawn.select(np.arange(count))
     design, layout = shared.design, shared.factor.layout
     columns, offset = layout.pose_columns, layout.offset_columns
     n, d = design.balls.places.shape
     k, turns = columns.shape[0], columns.shape[1] - d
     at = Deviations(
-        np.zeros((BATCH, d, n)),
-        np.zeros((BATCH, k, turns)),
-        np.zeros((BATCH, k, d)),
-        np.zeros((BATCH, len(shared.start.a))),
-        np.zeros((BATCH, *design.probes.offsets.shape)),
-        np.zeros((BATCH, len(layout))),
+        np.zeros((count, d, n)),
+        np.zeros((count, k, turns)),
+        np.zeros((count, k, d)),
+        np.zeros((count, len(shared.start.a))),
+        np.zeros((count, *design.probes.offsets.shape)),
+        np.zeros((count, len(layout))),
     )
-    passes, converged = np.zeros(BATCH, np.int64), np.zeros(BATCH, bool)
-    squares, first = np.full(BATCH, np.nan), np.zeros(BATCH)
+    passes, converged = np.zeros(count, np.int64), np.zeros(count, bool)
+    squares, first = np.full(count, np.nan), np.zeros(count)
+    # Those still looked at, and what all were at when fewer were left.
+    chosen, ended = np.arange(count), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
             now, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
             balls, common = _step(shared.factor, by_ball, by_shared)
             # A replicate that has converged is left alone, so that its end does not depend on its
             # neighbours.
-            active = ~converged
+            active = ~converged[chosen]
             balls, common = balls * active[:, None, None], common * active[:, None]
             poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
             turn = poses[:, :, d:]
@@ -142,20 +166,26 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
             # S^2 after the step, which the quadratic that the factor stands for foretells to its
             # own accuracy.
             after = now + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
-            squares = np.where(active, after, squares)
+            squares[chosen[active]] = after[active]
             size = np.maximum(
                 np.abs(common / layout.scale).max(axis=1, initial=0.0),
                 np.abs(balls).max(axis=(1, 2), initial=0.0),
             )
-            passes += active
+            passes[chosen] += active
             if number == 0:
                 first = size
             else:
-                converged |= size <= SMALLEST_STEP * first
-            if converged.all():
+                converged[chosen] |= size <= SMALLEST_STEP * first[chosen]
+            left = ~converged[chosen]
+            if not left.any():
                 break
+            if left.sum() <= FEW_LEFT * len(chosen):
+                # Some may take many passes; the others need not be looked at any more.
+                ended = at if ended is None else ended.with_rows(chosen, at)
+                drawn, at, chosen = drawn.select(left), at.select(left), chosen[left]
     converged &= np.isfinite(squares)
-    return Estimates(batch * BATCH + np.arange(BATCH), at, squares, passes, converged)
+    found = at if ended is None else ended.with_rows(chosen, at)
+    return Estimates(batch * BATCH + np.arange(count), found, squares, passes, converged)
 
 
 def _gradient(
@@ -166,10 +196,10 @@ def _gradient(
     At the start all deviations are zero, and less is to be computed.
     """
     layout, d = shared.factor.layout, shared.design.dimension
-    squares = np.zeros(BATCH)
+    squares = np.zeros(len(at.a))
     by_ball = np.zeros_like(at.balls)
-    by_pose = np.zeros((BATCH, *layout.pose_columns.shape))
-    by_shared = np.zeros((BATCH, len(layout)))
+    by_pose = np.zeros((len(at.a), *layout.pose_columns.shape))
+    by_shared = np.zeros((len(at.a), len(layout)))
     step = None if is_start else at.a
     less = _turns_less_one(at.rotations)
     for group in shared.groups:

@@ -93,7 +93,7 @@ def sum_of_task(
         count = min(BATCH, trials - batch * BATCH)
         if count <= 0:
             break
-        part = accumulate(shared, aims, estimate_batch(shared, seed, batch), count)
+        part = accumulate(shared, aims, estimate_batch(shared, seed, batch, count), count)
         total = part if total is None else total + part
     assert total is not None
     return total
