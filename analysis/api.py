@@ -152,7 +152,7 @@ def check(
     >>> check("designs/quickstart.yaml").verdict.deficiency
     0
     >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
-    ('goal not met: average U6 at most 0.1 um; average U6 0.1428 um',)
+    ('goal not met: average U6 at most 0.1 um; average U6 0.1426 um',)
     """
     from .cli.check_files import Wanted, checked_design
     from .planning.requirements.goals import parse_goal
