@@ -26,11 +26,14 @@ One = TypeVar("One")
 Listed = TypeVar("Listed")
 Mapped = TypeVar("Mapped")
 
+# Measuring tasks, values of a pool's lists: each is a row or a candidate.
+MOST_LISTED = 1000
+
 NonEmpty = Annotated[tuple[One, ...], Field(min_length=1)]
 """A list of one entry at least."""
 
-Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=1000)]
-"""A list of up to a thousand entries."""
+Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=MOST_LISTED)]
+"""A list of one entry at least and not too many."""
 
 Forms = Annotated[
     Annotated[One, Tag("<one>")]
