@@ -26,14 +26,14 @@ One = TypeVar("One")
 Listed = TypeVar("Listed")
 Mapped = TypeVar("Mapped")
 
-# Measuring tasks, values of a pool's lists: each is a row or a candidate.
-MOST_LISTED = 1000
-
 NonEmpty = Annotated[tuple[One, ...], Field(min_length=1)]
 """A list of one entry at least."""
 
-Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=MOST_LISTED)]
-"""A list of one entry at least and not too many."""
+# Entries of a list whose entries are compared with one another or combined.
+MOST_SEVERAL = 1000
+
+Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=MOST_SEVERAL)]
+"""A list of up to a thousand entries."""
 
 Forms = Annotated[
     Annotated[One, Tag("<one>")]

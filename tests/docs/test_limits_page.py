@@ -32,7 +32,7 @@ from ballplate.simulator.experiment import (
 )
 from ballplate.simulator.geometry import artefacts, directions
 from ballplate.simulator.inputs import messages, tables, yamltree
-from ballplate.simulator.inputs import settings as settings_of_files
+from ballplate.simulator.inputs import settings as input_settings
 from ballplate.simulator.splines import read
 from ballplate.sweeps import axes, bundle, load
 from ballplate.sweeps import sweep_settings as settings
@@ -56,7 +56,7 @@ LIMITS = {
     "directions of a gauge": (directions.MOST_DIRECTIONS,),
     "evaluation points |": (sections.MOST_POINTS,),
     "derivatives of": (checks.MOST_DERIVATIVES,),
-    "measuring tasks": (settings_of_files.MOST_LISTED,),
+    "measuring tasks": (input_settings.MOST_SEVERAL,),
     "priors": (priors.MOST_PRIORS,),
     "variants": (variants.MOST_VARIANTS,),
     "points of a curve": (curves.MOST_POINTS,),
