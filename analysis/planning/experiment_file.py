@@ -55,8 +55,7 @@ def experiment_text(
     :raises ExperimentError: the source cannot be read any more.
     """
     source = experiment.source
-    text, root = _source(experiment)
-    tree = experiment.tree
+    text, root, tree = _source(experiment)
     assert isinstance(root, MappingNode) and isinstance(tree, MappingNode)
     content = _content(tree, experiment, chosen)
     if title is not None:
@@ -106,20 +105,23 @@ def to_list(value: Any) -> Any:
     return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
 
 
-def _source(experiment: Experiment) -> tuple[str, Node]:
-    """The text that an experiment was loaded from, and the tree of it; without a text the
-    experiment's own, where it is not what the text says.
+def _source(experiment: Experiment) -> tuple[str, Node, Node]:
+    """The text that an experiment was loaded from, its tree, and that of the experiment, which
+    shares with it the nodes that no variant overrides; without a text the experiment's own, where
+    it is not what the text says.
 
     :raises ExperimentError: the source cannot be read any more.
     """
     source = experiment.source
     if source.name == "experiment" and not source.is_file():
-        return "", experiment.tree
+        return "", experiment.tree, experiment.tree
     text = read_text(source)
     root = parse_tree(text, str(source))
     assert isinstance(root, MappingNode)
     tree = root if experiment.name is None else variant_trees(root, Problems(root))[experiment.name]
-    return (text, root) if to_python(tree) == to_python(experiment.tree) else ("", experiment.tree)
+    if to_python(tree) != to_python(experiment.tree):
+        return "", experiment.tree, experiment.tree
+    return text, root, tree
 
 
 def _content(

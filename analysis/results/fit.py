@@ -213,7 +213,7 @@ class Fit(FitResult):
 
         :raises ValueError: the estimate has not converged.
         """
-        if self.estimated is None:
+        if self.estimated is None or not self.converged:
             raise ValueError(
                 f"the estimate has {self.solution.status}; nothing is known of its uncertainty"
             )

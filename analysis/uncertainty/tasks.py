@@ -65,7 +65,8 @@ def task_uncertainties(
     `sigma` multiplies all stated uncertainties.
     """
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
-    told = zip(given.names, tile.lengths.tolist(), values.tolist(), given.targets, strict=True)
+    targets = given.targets or (None,) * len(given.names)
+    told = zip(given.names, tile.lengths.tolist(), values.tolist(), targets, strict=True)
     return tuple(
         (
             TaskUncertainty(name, length, value, None)
