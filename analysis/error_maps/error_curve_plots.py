@@ -9,6 +9,7 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.splines.read import CurvePoints
 
+from ..presentation.formatting import micro
 from ..presentation.svg import (
     INK,
     MUTED,
@@ -16,7 +17,6 @@ from ..presentation.svg import (
     SERIES,
     common_legend,
     drawing,
-    micro,
     placed_axes,
     round_number,
     save,

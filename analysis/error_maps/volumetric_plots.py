@@ -25,7 +25,6 @@ from ..presentation.svg import (
     blank_axes,
     drawing,
     legend_above,
-    micro,
     placed_axes,
     round_number,
     save,
@@ -181,7 +180,7 @@ def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
     :raises OSError: the file cannot be written.
     """
     positions = 1e3 * along.positions
-    name, unit = along.error.name, micro(SHOWN[along.unit])
+    name, unit = along.error.name, SHOWN[along.unit]
     with drawing(280.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
         band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"

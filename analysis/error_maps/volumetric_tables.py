@@ -14,7 +14,15 @@ from ballplate.simulator.machines.curves import NAMES
 from ballplate.simulator.machines.protocol import Array, Parameter
 from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
 
-from ..presentation.formatting import SHOWN, aligned, as_data, csv_lines, number, records
+from ..presentation.formatting import (
+    SHOWN,
+    aligned,
+    as_data,
+    ascii_units,
+    csv_lines,
+    number,
+    records,
+)
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = (
@@ -132,8 +140,8 @@ def diagonal_lines(errors: LengthErrors) -> list[str]:
             "from",
             "to",
             "length, mm",
-            "error, um",
-            *(["random, um"] if is_random else []),
+            "error, µm",
+            *(["random, µm"] if is_random else []),
         ]
     ]
     for k in range(len(errors.error)):
@@ -156,17 +164,17 @@ def diagonal_lines(errors: LengthErrors) -> list[str]:
 def length_line(errors: LengthErrors) -> str:
     """The length error of a single line."""
     random = (
-        f", random {number(1e6 * float(errors.deviation[0]))} um" if errors.deviation.any() else ""
+        f", random {number(1e6 * float(errors.deviation[0]))} µm" if errors.deviation.any() else ""
     )
     return (
         f"length {1e3 * errors.nominal[0]:.3f} mm, length error"
-        f" {number(1e6 * float(errors.error[0]))} um{random}"
+        f" {number(1e6 * float(errors.error[0]))} µm{random}"
     )
 
 
 def error_lines(errors: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
-    heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant"]
+    heads = ["x, mm", "y, mm", "z, mm", "X, µm", "Y, µm", "Z, µm", "resultant"]
     is_random = bool(errors.deviation.any())
     rows = [[*heads, *(["random X", "Y", "Z"] if is_random else [])]]
     for point, error, resultant, random in zip(
@@ -194,8 +202,8 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
     resultant = errors.resultant
     return [
         (
-            f"range in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
-            f"largest resultant {number(1e6 * float(resultant[worst]))} um at {at}"
+            f"range in µm: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
+            f"largest resultant {number(1e6 * float(resultant[worst]))} µm at {at}"
         ),
     ]
 
@@ -252,7 +260,7 @@ def along_csv(along: AlongAxis) -> Iterator[str]:
     """A parametric error along its axis as lines of a CSV file."""
     given = _given(along, along.error.name)
     return csv_lines(
-        ["position_mm", *(f"{name}_{_unit(along)}" for name in given)],
+        ["position_mm", *(f"{name}_{ascii_units(_unit(along))}" for name in given)],
         1e3 * along.positions,
         *(1e6 * values for values in given.values()),
     )
