@@ -152,7 +152,7 @@ def check(
     >>> check("designs/quickstart.yaml").verdict.deficiency
     0
     >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
-    ('goal not met: average U6 at most 0.1 um; average U6 0.1428 um',)
+    ('goal not met: average U6 at most 0.1 µm; average U6 0.1426 µm',)
     """
     from .cli.check_files import Wanted, checked_design
     from .planning.requirements.goals import parse_goal
@@ -217,7 +217,7 @@ def run(
     as accurate as `until`.
 
     >>> run(quickstart())
-    <Prediction of quickstart: full rank, U6 0.143 um on average, 0.325 um at most>
+    <Prediction of quickstart: full rank, U6 0.143 µm on average, 0.325 µm at most>
     """
     from dataclasses import replace
 
@@ -436,7 +436,7 @@ def plan(
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
     >>> pool = {"candidates": [places | {"probes": ["down"]}]}
     >>> plan(quickstart().with_(pool=pool), positions=7)
-    <Campaign of quickstart: 7 of 8 candidates, U6 0.137 um>
+    <Campaign of quickstart: 7 of 8 candidates, U6 0.137 µm>
     """
     from .planning.campaign import Request, campaign
     from .planning.constraints import HOUR, Budget
@@ -579,7 +579,7 @@ def map(
     still, or two points.
 
     >>> map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
-    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 um at most>
+    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
     """
     from .error_maps.volumetric_errors import MOST_POINTS
     from .error_maps.volumetric_results import machine_errors, parse_places

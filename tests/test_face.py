@@ -274,7 +274,7 @@ def test_a_check_has_a_table() -> None:
 def test_an_experiment_shows_itself() -> None:
     given = bp.quickstart().with_({"positions[z low].name": "<b>"})
     html = given._repr_html_()
-    assert "1000 x 1000 x 1000 mm" in html and "0.2 um" in html and "plate: 25 balls" in html
+    assert "1000 x 1000 x 1000 mm" in html and "0.2 µm" in html and "plate: 25 balls" in html
     assert "position &lt;b&gt;" in html and "<b>" not in html
     assert html.count("<tr>") == html.count("</tr>") == 12
 

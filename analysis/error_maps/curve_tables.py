@@ -14,7 +14,7 @@ from ballplate.simulator.splines.constraints import Constraint
 from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
 from ballplate.simulator.splines.read import Column
 
-from ..presentation.formatting import aligned, number
+from ..presentation.formatting import aligned, ascii_units, micro, number
 from .error_curve import ErrorCurve
 
 ORDERS = {
@@ -30,12 +30,12 @@ NOTHING = 1e-13
 
 def shown(value: float, column: Column, digits: int = 6) -> str:
     """A value in metres or radians in the unit of its column."""
-    return f"{value / column.factor + 0.0:.{digits}g} {column.unit}"
+    return f"{value / column.factor + 0.0:.{digits}g} {micro(column.unit)}"
 
 
 def derivative_unit(curve: ErrorCurve, derivative: int) -> str:
-    """Unit of a derivative: um, um/mm, um/mm^2."""
-    x, y = curve.points.x_column.unit, curve.points.y_column.unit
+    """Unit of a derivative: µm, µm/mm, µm/mm^2."""
+    x, y = micro(curve.points.x_column.unit), micro(curve.points.y_column.unit)
     return y if derivative == 0 else f"{y}/{x}" if derivative == 1 else f"{y}/{x}^{derivative}"
 
 
@@ -65,7 +65,7 @@ def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) ->
     knots = [knot for knot in space.knots if knot not in curve.boundaries]
     listed = ", ".join(f"{knot / x.factor:.6g}" for knot in knots[:MOST_LISTED])
     more = f" and {len(knots) - MOST_LISTED} more" if len(knots) > MOST_LISTED else ""
-    where = f" at {listed} {x.unit}{more}" if knots else ""
+    where = f" at {listed} {micro(x.unit)}{more}" if knots else ""
     what = ORDERS.get(space.order, f"spline of order {space.order}")
     lines.append(
         f"{what}, {_number_of(len(knots), 'knot')}{where}; "
@@ -148,7 +148,8 @@ def _piece_lines(curve: ErrorCurve, powers: Powers) -> list[str]:
     found, coefficients = _coefficients(curve, powers)
     x = curve.points.x_column
     head = ["from", "to", *(f"u^{k}" if k else "1" for k in range(coefficients.shape[1]))]
-    units = [x.unit, x.unit, *(derivative_unit(curve, k) for k in range(coefficients.shape[1]))]
+    unit = micro(x.unit)
+    units = [unit, unit, *(derivative_unit(curve, k) for k in range(coefficients.shape[1]))]
     rows = [head, units]
     for start, end, row in zip(found.breaks, found.breaks[1:], coefficients, strict=False):
         # What adds less to the curve than rounding does is told as zero.
@@ -168,7 +169,7 @@ def _piece_lines(curve: ErrorCurve, powers: Powers) -> list[str]:
             " larger"
         ]
     return [
-        f"polynomials of u, the {_variable(curve, powers)}, in {x.unit}; their coefficients of",
+        f"polynomials of u, the {_variable(curve, powers)}, in {unit}; their coefficients of",
         *aligned(rows, [True] * len(head)),
         *note,
     ]
@@ -181,9 +182,8 @@ def _value_lines(curve: ErrorCurve, at: np.ndarray) -> list[str]:
         np.abs(slopes) * curve.fit.space.length < NOTHING * np.abs(curve.fit.coefficients).max()
     ] = 0.0
     spread = curve.standard_uncertainty(at)
-    rows = [
-        [f"{x.words}, {x.unit}", f"curve, {y.unit}", "standard uncertainty", "expanded", "slope"]
-    ]
+    heads = [f"{x.words}, {micro(x.unit)}", f"curve, {micro(y.unit)}"]
+    rows = [[*heads, "standard uncertainty", "expanded", "slope"]]
     for place, value, slope, u in zip(at, values, slopes, spread, strict=True):
         rows.append(
             [
@@ -280,7 +280,7 @@ def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:
     text.write(f"# {y.name} = {sum_}, where u is {_variable(curve, powers)}\n")
     writer = CsvWriter(text)
     names = [
-        f"c{k}_{derivative_unit(curve, k).replace('/', '_per_').replace('^', '')}"
+        f"c{k}_{ascii_units(derivative_unit(curve, k)).replace('/', '_per_').replace('^', '')}"
         for k in range(count)
     ]
     writer.writerow([f"start_{x.unit}", f"end_{x.unit}", *names])

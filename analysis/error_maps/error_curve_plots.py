@@ -9,13 +9,13 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.splines.read import CurvePoints
 
+from ..presentation.formatting import micro
 from ..presentation.svg import (
     INK,
     MUTED,
     PAPER,
     SERIES,
     drawing,
-    micro,
     placed_axes,
     round_number,
     save,

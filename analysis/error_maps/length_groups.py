@@ -90,9 +90,9 @@ class GroupedLengths:
 
 
 def target_words(target: LengthFunction) -> str:
-    """The target as it is written in a file.
+    """The target in words.
 
     >>> target_words(LengthFunction(5e-7, 1e-6))
-    '0.5 um + L/1000000'
+    '0.5 µm + L/1000000'
     """
     return format_length(target.constant) + (f" + L/{1 / target.slope:.9g}" if target.slope else "")

@@ -20,7 +20,6 @@ from ..presentation.svg import (
     PAPER,
     SERIES,
     drawing,
-    micro,
     placed_axes,
     save,
 )
@@ -95,7 +94,7 @@ def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figur
         shares = [percent(float(found.whole.share(expanded)[0])) for expanded in (False, True)]
         k = f"{found.settings.coverage_factor:g}"
         words = (
-            f"target {micro(target_words(found.settings.target))}: u within it for {shares[0]} of"
+            f"target {target_words(found.settings.target)}: u within it for {shares[0]} of"
             " the lengths, "
         )
         return save(figure, path, f"{words}{k} u for {shares[1]} of them")

@@ -195,7 +195,7 @@ def _table(
         head,
         "lengths",
         "undetermined",
-        "u average, um",
+        "u average, µm",
         "maximum",
         f"{k} u maximum",
         "target",

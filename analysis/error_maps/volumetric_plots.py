@@ -23,7 +23,6 @@ from ..presentation.svg import (
     SERIES,
     blank_axes,
     drawing,
-    micro,
     placed_axes,
     round_number,
     save,
@@ -217,7 +216,7 @@ def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
     :raises OSError: the file cannot be written.
     """
     positions = 1e3 * along.positions
-    name, unit = along.error.name, micro(SHOWN["rad" if along.error.is_rotation else "m"])
+    name, unit = along.error.name, SHOWN["rad" if along.error.is_rotation else "m"]
     with drawing(280.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
         band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"

@@ -88,7 +88,7 @@ class ErrorsAtPoints(MachineErrors):
 
     def headline(self) -> str:
         largest = 1e6 * float(self.errors.resultant.max())
-        return f"{len(self.errors.points)} points, resultant {largest:.4g} um at most"
+        return f"{len(self.errors.points)} points, resultant {largest:.4g} µm at most"
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each point, in metres."""
@@ -153,7 +153,7 @@ class ErrorAlongAxis(MachineErrors):
     along: AlongAxis
 
     def headline(self) -> str:
-        error, unit = self.along.error, "urad" if self.along.error.is_rotation else "um"
+        error, unit = self.along.error, "µrad" if self.along.error.is_rotation else "µm"
         return f"{error.name}, {meaning(error.name)}, range {1e6 * self.along.range:.4g} {unit}"
 
     def lines(self) -> list[str]:

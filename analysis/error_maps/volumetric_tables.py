@@ -141,8 +141,8 @@ def diagonal_lines(errors: LengthErrors) -> list[str]:
             "from",
             "to",
             "length, mm",
-            "error, um",
-            *(["random, um"] if is_random else []),
+            "error, µm",
+            *(["random, µm"] if is_random else []),
         ]
     ]
     for k in range(len(errors.error)):
@@ -165,17 +165,17 @@ def diagonal_lines(errors: LengthErrors) -> list[str]:
 def length_line(errors: LengthErrors) -> str:
     """The length error of a single line."""
     random = (
-        f", random {number(1e6 * float(errors.deviation[0]))} um" if errors.deviation.any() else ""
+        f", random {number(1e6 * float(errors.deviation[0]))} µm" if errors.deviation.any() else ""
     )
     return (
         f"length {1e3 * errors.nominal[0]:.3f} mm, length error"
-        f" {number(1e6 * float(errors.error[0]))} um{random}"
+        f" {number(1e6 * float(errors.error[0]))} µm{random}"
     )
 
 
 def error_lines(errors: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
-    heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant"]
+    heads = ["x, mm", "y, mm", "z, mm", "X, µm", "Y, µm", "Z, µm", "resultant"]
     is_random = bool(errors.deviation.any())
     rows = [[*heads, *(["random X", "Y", "Z"] if is_random else [])]]
     for point, error, resultant, random in zip(
@@ -203,8 +203,8 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
     resultant = errors.resultant
     return [
         (
-            f"range in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
-            f"largest resultant {number(1e6 * float(resultant[worst]))} um at {at}"
+            f"range in µm: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
+            f"largest resultant {number(1e6 * float(resultant[worst]))} µm at {at}"
         ),
     ]
 
@@ -267,7 +267,7 @@ def error_csv(errors: VolumetricErrors) -> Iterator[str]:
 
 def along_csv(along: AlongAxis) -> Iterator[str]:
     """A parametric error along its axis as lines of a CSV file."""
-    unit = SHOWN["rad" if along.error.is_rotation else "m"]
+    unit = "urad" if along.error.is_rotation else "um"
     columns = [
         ("stated", along.stated),
         (along.error.name, along.values),

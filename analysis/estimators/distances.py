@@ -124,7 +124,7 @@ class EstimatorComparison(Result):
     published: Mapping[str, float | None] = field(default_factory=dict)
 
     def headline(self) -> str:
-        median = f"{1e6 * float(np.median(self.rms)):.3g} um" if len(self.rms) else "unknown"
+        median = f"{1e6 * float(np.median(self.rms)):.3g} µm" if len(self.rms) else "unknown"
         failed = f", {len(self.failed)} not converged" if self.failed else ""
         return (
             f"{self.estimator}, {self.trials} data sets, median of the differences {median}{failed}"
@@ -484,7 +484,7 @@ def _comparison_lines(comparison: EstimatorComparison) -> list[str]:
         (
             f"estimator {comparison.estimator} ({used}{across}) against the full one: corrected"
             f" distances of {comparison.points} random pairs of points in each of"
-            f" {comparison.trials} data sets, differences in um"
+            f" {comparison.trials} data sets, differences in µm"
         ),
     ]
     if comparison.failed:

@@ -183,9 +183,9 @@ def _lines(fit: ReversalFit) -> list[str]:
             f' "{fit.first}"'
         ),
         (
-            f"sigma = {number(1e6 * found.sigma)} um with {found.degrees_of_freedom} degrees of"
+            f"sigma = {number(1e6 * found.sigma)} µm with {found.degrees_of_freedom} degrees of"
             " freedom, of the difference of two readings; of a single one"
-            f" {number(1e6 * found.single)} um"
+            f" {number(1e6 * found.single)} µm"
         ),
         (
             "what the first-order equations neglect changes no result by more than"
@@ -220,8 +220,8 @@ def _ball_lines(fit: ReversalFit) -> list[str]:
             "y, mm",
             "multiple redundancy: x, mm",
             "y, mm",
-            "standard uncertainty of x, um",
-            "of y, um",
+            "standard uncertainty of x, µm",
+            "of y, µm",
         ]
     ]
     plate = fit.full.plates[0] if fit.full.plates else None
@@ -290,4 +290,4 @@ def _by_ball(names: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:
 
 
 def _length(value: float) -> str:
-    return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} um"
+    return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} µm"

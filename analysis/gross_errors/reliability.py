@@ -18,7 +18,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..presentation.formatting import SHOWN, aligned, finite, number
+from ..presentation.formatting import SHOWN, aligned, ascii_units, finite, number
 from ..presentation.panels import RowOfPoints, draw_rows
 from ..presentation.result import Result
 from ..rank.proposed_bars import listed
@@ -147,8 +147,8 @@ class Reliability(Result):
                 ],
             )
             for name, values in (
-                ("minimal detectable bias of a reading, um", self.minimal_detectable),
-                ("what it changes in U6 at most, um", _effect(self, "U6")),
+                ("minimal detectable bias of a reading, µm", self.minimal_detectable),
+                ("what it changes in U6 at most, µm", _effect(self, "U6")),
             )
         ]
         words = f"{self.title}: minimal detectable biases of readings, and their effects on U6"
@@ -250,11 +250,11 @@ def _positions(result: Reliability) -> list[str]:
         "readings",
         "redundancy: smallest",
         "average",
-        "MDB, um",
-        "by fit, um",
+        "MDB, µm",
+        "by fit, µm",
         "largest at",
     ]
-    rows = [[*head, "effect on U6, um", "largest at"]]
+    rows = [[*head, "effect on U6, µm", "largest at"]]
     position = design.readings.position[given.subject[readings]]
     of_u6 = _effect(result, "U6")
     for k in np.unique(position):
@@ -294,7 +294,7 @@ def _table(
             "MDB",
             "by fit",
             "unit",
-            *(f"{s}, um" for s in SYMBOLS),
+            *(f"{s}, µm" for s in SYMBOLS),
         ]
     ]
     rows[0].append("U6 at")
@@ -386,7 +386,7 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     for k in [k for k in hidden if k not in set(harmless)][: 4 * MOST]:
         unit = result.patterns.unit(k)
         parts = [
-            f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} um per {SHOWN[unit]}"
+            f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} µm per {SHOWN[unit]}"
             for symbol in LENGTHS
             if result.effects[symbol].change[k] > 0.0
         ]
@@ -534,7 +534,7 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             *names,
             name(given, k),
             repr(float(result.left[k])),
-            SHOWN[unit],
+            ascii_units(SHOWN[unit]),
         ]
         cells += [_cell(result.minimal_detectable[k]), _cell(result.found_by_fit[k])]
         for symbol in SYMBOLS:

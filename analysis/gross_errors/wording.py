@@ -201,7 +201,7 @@ def _from(ball: int, suspect: Suspect) -> str:
             1e6 * abs(value), 1e6 * float(suspect.standard_uncertainties[place])
         )
         other = ends[second if first == ball else first]
-        parts.append(f"to {other} {size} um too {'long' if value > 0 else 'short'}")
+        parts.append(f"to {other} {size} µm too {'long' if value > 0 else 'short'}")
     return listed(parts)
 
 
@@ -212,7 +212,7 @@ def _significant(suspect: Suspect) -> Integers:
 
 
 def _sizes(suspect: Suspect, how: str) -> str:
-    """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "…
+    """Sizes of a cause by direction, those that are significant: "1.2(0.2) µm too high in x" or "…
     along x".
     """
     given = suspect.patterns

@@ -87,7 +87,7 @@ class Campaign(Selection, Result):
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
         if not self.is_determined:
             return f"{count}; something stays undetermined"
-        value = f"{1e6 * self.value:.4g} um" if self.unit == "m" else f"{self.value:.4g}"
+        value = f"{1e6 * self.value:.4g} µm" if self.unit == "m" else f"{self.value:.4g}"
         return f"{count}, {self.criterion} {value}"
 
     def lines(self) -> list[str]:
@@ -210,7 +210,7 @@ def _comparison(campaign: Campaign) -> list[str]:
 def _value(campaign: Campaign, value: float) -> list[str]:
     if math.isinf(value):
         return ["-", "deficient"]
-    return [number(1e6 * value), "um"] if campaign.unit == "m" else [number(value), ""]
+    return [number(1e6 * value), "µm"] if campaign.unit == "m" else [number(value), ""]
 
 
 def _spent(spent: Spent) -> list[str]:

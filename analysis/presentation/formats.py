@@ -10,7 +10,7 @@ from html import escape
 
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 
-from .formatting import aligned
+from .formatting import aligned, ascii_units
 from .table import Block, Row, Table
 
 WIDTH = 120
@@ -115,10 +115,13 @@ def as_csv(title: str, tables: Sequence[Table]) -> str:
         writer = CsvWriter(found)
         first = [table.block] if table.block else []
         headings = [heading or "figure" for heading in table.headings]
-        writer.writerow([*first, *headings, *table.spanned])
+        writer.writerow([*first, *map(ascii_units, [*headings, *table.spanned])])
         for block in table.blocks:
             label = [block.title.removeprefix(f"{table.block} ")] if table.block else []
-            writer.writerows([*label, *_texts(row)] for row in block.rows)
+            writer.writerows(
+                [*label, *map(ascii_units, row.headings), *(e.text for e in row.entries)]
+                for row in block.rows
+            )
         parts.append(found.getvalue())
     return "\n".join(parts)
 
@@ -165,6 +168,8 @@ LATEX = {
     "[": "{[}",
     "]": "{]}",
     "*": "{*}",
+    "µ": r"$\mu$",
+    "μ": r"$\mu$",
     **{character: f"\\{character}" for character in "&%$#_{}"},
 }
 
@@ -174,9 +179,11 @@ def _latex(text: str) -> str:
 
     >>> _latex("50 % of a_b, um")
     '50 \\% of a\\_b, $\\mu$m'
+    >>> _latex("0.5 µm")
+    '0.5 $\\mu$m'
     """
-    if text in ("-", "um", "urad"):
-        return {"-": "--", "um": r"$\mu$m", "urad": r"$\mu$rad"}[text]
+    if text == "-":
+        return "--"
     escaped = "".join(LATEX.get(character, character) for character in text)
     return re.sub(r"(^|, | or )u(m|rad)\b", r"\1$\\mu$\2", escaped)
 

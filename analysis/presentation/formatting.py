@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from ballplate.simulator.computing.rounding import printable
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
-SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
+SHOWN = {"m": "µm", "rad": "µrad", "1": "ppm"}
 
 
 def shown_unit(unit: str) -> str:
     """Unit in which tables show values of a unit.
 
     >>> shown_unit("m, rad")
-    'um, urad'
+    'µm, µrad'
     """
     return ", ".join(SHOWN[part] for part in unit.split(", "))
+
+
+def micro(text: str) -> str:
+    """Units of micrometres as they are printed.
+
+    >>> micro("U2 maximum, um or urad"), micro("um")
+    ('U2 maximum, µm or µrad', 'µm')
+    """
+    return re.sub(r"(^|, | or )u(m|rad)\b", r"\1µ\2", text)
+
+
+def ascii_units(text: str) -> str:
+    """Units as programs read them.
+
+    >>> ascii_units("U4 average, µm"), ascii_units("µm or µrad"), ascii_units("at 0.5 µm")
+    ('U4 average, um', 'um or urad', 'at 0.5 µm')
+    """
+    return re.sub(r"(^|, | or |/)[µμ](m|rad)\b", r"\1u\2", text)
 
 
 def number(value: float, digits: int = 4) -> str:

@@ -11,7 +11,8 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from .svg import INK, MARKERS, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
+from .formatting import micro
+from .svg import INK, MARKERS, MUTED, PAPER, SERIES, drawing, placed_axes, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,7 +87,7 @@ def draw_tried(
             _scale(axes, one.values, "x")
             _scale(axes, one.distances, "y")
             axes.grid(True)
-            axes.set_xlabel(f"{one.name}, {micro(one.unit)}" if one.unit else one.name)
+            axes.set_xlabel(f"{one.name}, {one.unit}" if one.unit else one.name)
             axes.set_ylabel(axis)
             if k == 0:
                 axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.0)

@@ -120,15 +120,6 @@ def blank_axes(figure: Figure) -> Axes:
     return axes
 
 
-def micro(text: str) -> str:
-    """Units of micrometres as they are printed.
-
-    >>> micro("U2 maximum, um or urad"), micro("um")
-    ('U2 maximum, µm or µrad', 'µm')
-    """
-    return re.sub(r"(^|, | or )u(m|rad)\b", r"\1µ\2", text)
-
-
 def as_svg(figure: Figure, name: str, words: str) -> str:
     """The figure as an element of a page, with `name` in front of its ids and a text for those who
     do not see it.

@@ -489,11 +489,11 @@ def length(value: float) -> str:
     """A small length in micrometres.
 
     >>> length(2.5e-7)
-    '0.25 um'
+    '0.25 µm'
     """
     return _amount(value, "m")
 
 
 def _amount(value: float, unit: str) -> str:
-    shown = {"m": "um", "rad": "urad", "1": "ppm"}[unit]
+    shown = {"m": "µm", "rad": "µrad", "1": "ppm"}[unit]
     return f"{printable(value * 1e6):.3g} {shown}"

@@ -18,10 +18,9 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
 
-from ..presentation.formatting import number, percent, uncertainty_words
+from ..presentation.formatting import micro, number, percent, uncertainty_words
 from ..presentation.pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
 from ..presentation.scene import MOST_BALLS, Scene, scene
-from ..presentation.svg import micro
 from ..presentation.table import Block, Entry, Row, Table
 from ..sweeps.store import Store
 from ..uncertainty.error_map import error_map

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..presentation.formatting import number
+from ..presentation.formatting import micro, number
 from ..presentation.svg import (
     DASHES,
     INK,
@@ -17,7 +17,6 @@ from ..presentation.svg import (
     WIDTH,
     as_svg,
     drawing,
-    micro,
     placed_axes,
 )
 from .series import Panel, Plot, SeriesLine
@@ -63,7 +62,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     from matplotlib.ticker import NullLocator
 
     axes.set_title(panel.measure.name, loc="left")
-    axes.set_ylabel(micro(plot.unit))
+    axes.set_ylabel(plot.unit)
     axes.grid(True)
     for k, line in enumerate(panel.lines):
         _line(axes, line, k)
@@ -142,7 +141,7 @@ def words(plot: Plot) -> str:
             if not len(known):
                 continue
             ends = [
-                f"{number(line.y[k], 3)} {micro(plot.unit)} at {line.x[k]:.6g}"
+                f"{number(line.y[k], 3)} {plot.unit} at {line.x[k]:.6g}"
                 f" {micro(plot.axis.unit)}".rstrip()
                 for k in sorted({known[0], known[-1]})
             ]

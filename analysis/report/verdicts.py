@@ -12,7 +12,7 @@ from .results import ReportedSweep, cell_list, common_values
 MOST_GROUPS, MOST_LINES = 30, 8
 
 # Amounts, by which alone cells of a sweep may differ in what is told of them.
-AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?= (um|urad|ppm)\b)")
+AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)? ([uµμ](?=(m|rad)\b)|(?=ppm\b))")
 
 
 @dataclass(frozen=True)

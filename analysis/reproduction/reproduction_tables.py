@@ -135,7 +135,7 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
         )
         blocks.append(_factors(section.columns))
         text = (
-            "Published and computed U in um and urad; the ratio as it is, and after the common"
+            "Published and computed U in µm and µrad; the ratio as it is, and after the common"
             " factor. Notes refer to the exceptions and open differences at the end."
         )
         blocks.append(Paragraph(text))
@@ -153,7 +153,7 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
         blocks.append(
             Paragraph(
                 f"Not legible in the copy at hand: Table {block.table}, {block.what}"
-                + ("; ours, in um and urad, for whoever has it:" if block.told else ".")
+                + ("; ours, in µm and µrad, for whoever has it:" if block.told else ".")
             )
         )
     if section.told:
@@ -359,7 +359,7 @@ def _differences(section: Section) -> list[Block]:
     first = section.differences[0].comparison
     text = (
         "Corrected distances by an estimator of distances alone, less those by the full one, in"
-        f" um: the figure of the one published data set, and the quantiles of {first.trials} data"
+        f" µm: the figure of the one published data set, and the quantiles of {first.trials} data"
         " sets of ours, into whose range it has to fall, and within a factor"
         f" {section.differences[0].limit:g} of whose median."
     )

@@ -139,7 +139,7 @@ def _scale(axis: str, value: float, against: str = "") -> str:
     if np.isnan(value):
         return "cannot be told"
     return (
-        f"let {axis} read {_amount(1e6 * abs(value))} um per m"
+        f"let {axis} read {_amount(1e6 * abs(value))} µm per m"
         f" {'more' if value > 0 else 'less'}{against}"
     )
 
@@ -147,7 +147,7 @@ def _scale(axis: str, value: float, against: str = "") -> str:
 def _turn(guideway: str, other: str, lean: float) -> str:
     if np.isnan(lean):
         return "cannot be told"
-    angle = f"{_amount(abs(lean) / ARCSECOND)} arcsec ({_amount(1e6 * abs(lean))} um per m)"
+    angle = f"{_amount(abs(lean) / ARCSECOND)} arcsec ({_amount(1e6 * abs(lean))} µm per m)"
     return f"turn the {guideway} guideway by {angle} towards {'-' if lean > 0 else '+'}{other}"
 
 

@@ -368,7 +368,7 @@ class Fit(FitResult):
 
     def _residual_table(self) -> list[str]:
         """The largest residuals as lines of text."""
-        rows = [["largest residuals", "", "", "", "um", "standard uncertainties"]]
+        rows = [["largest residuals", "", "", "", "µm", "standard uncertainties"]]
         for one in self.largest[:SHOWN_RESIDUALS]:
             rows.append(
                 [

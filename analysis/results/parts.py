@@ -69,9 +69,9 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
 
 def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
     """Measuring tasks as lines of text."""
-    expanded = f"expanded (k = {tasks[0].expansion:g}), um"
+    expanded = f"expanded (k = {tasks[0].expansion:g}), µm"
     rows = [
-        ["task", "length, mm", "standard uncertainty, um", expanded, "target, um", "within target"]
+        ["task", "length, mm", "standard uncertainty, µm", expanded, "target, µm", "within target"]
     ]
     for task in tasks:
         rows.append(
@@ -152,8 +152,8 @@ def _lengths_words(lengths: Quantity) -> str:
     # Beside a share that is of an expanded uncertainty, it has to be said what this is.
     symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
     words = (
-        f"{symbol} {number(1e6 * lengths.average)} um on the average,"
-        f" {number(1e6 * lengths.maximum)} um at most"
+        f"{symbol} {number(1e6 * lengths.average)} µm on the average,"
+        f" {number(1e6 * lengths.maximum)} µm at most"
     )
     open_ = (
         f", {lengths.undetermined} of {lengths.count} distances undetermined"
@@ -204,9 +204,9 @@ def scale_lines(scale: Scale | None) -> list[str]:
             number(1e6 * value) for value in (loose.average, loose.maximum, loose.before)
         )
         warning += (
-            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but"
-            f" one, U6 would be {average} um on the average and {most} um at most instead of"
-            f" {before} um on the average"
+            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} µm of each but"
+            f" one, U6 would be {average} µm on the average and {most} µm at most instead of"
+            f" {before} µm on the average"
         )
     return [
         *lines,
@@ -256,7 +256,7 @@ def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_B
     """
     title = "co-ordinates of the balls in the plate's own axes"
     lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
-    rows = [["ball", "x, mm", "y, mm", "standard uncertainty of x, um", "of y, um"]]
+    rows = [["ball", "x, mm", "y, mm", "standard uncertainty of x, µm", "of y, µm"]]
     for name, values, uncertainties in zip(
         plate.names, plate.coordinates, plate.standard_uncertainties, strict=True
     ):
@@ -282,7 +282,7 @@ def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
             for v in (one.value, one.standard_uncertainty, one.expanded_uncertainty)
         )
         rows.append(
-            [one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "um/m", one.words]
+            [one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "µm/m", one.words]
         )
     return [
         *aligned(rows, [False, True, True, True, False, False]),

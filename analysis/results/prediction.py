@@ -178,4 +178,4 @@ def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:
     lengths = quantities.get("U6")
     if lengths is None or np.isnan(lengths.average):
         return []
-    return [f"U6 {1e6 * lengths.average:.3g} um on average, {1e6 * lengths.maximum:.3g} um at most"]
+    return [f"U6 {1e6 * lengths.average:.3g} µm on average, {1e6 * lengths.maximum:.3g} µm at most"]

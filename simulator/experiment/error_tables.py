@@ -24,7 +24,7 @@ COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
 
 # Words that may be meant for a key, and what a value without its colon looks like.
 OTHER_WORDS = {"offset": "probe", "reflector": "probe", "criterion": "straightness"}
-VALUE = re.compile(r"=|\d\s*(mm|m|um|in)\b|^(table|end points|least squares|minimum zone)$")
+VALUE = re.compile(r"=|\d\s*(mm|m|[uµμ]m|in)\b|^(table|end points|least squares|minimum zone)$")
 MOST_WORDS = 3
 
 # Part of an axis by which a table may go beyond it, or fall short of it; with wide spacing it may

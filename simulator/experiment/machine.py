@@ -12,7 +12,7 @@ import numpy as np
 from ..geometry.artefacts import frozen
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems
-from ..inputs.quantities import LengthFunction, Target, format_length
+from ..inputs.quantities import LengthFunction, Target, format_length, typed_length
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
@@ -64,7 +64,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     if largest >= LARGE_REPEATABILITY:
         text = (
             f"{format_length(largest)} is far more than the readings of a co-ordinate measuring"
-            f" machine scatter; write {format_length(largest / 1000)} if that is meant"
+            f" machine scatter; write {typed_length(largest / 1000)} if that is meant"
         )
         problems.doubt(steps, text)
     lower_corner, upper_corner = zip(*ends.values(), strict=True)

@@ -348,7 +348,7 @@ class Experiment:
         repeatability = {f"{1e6 * value:.4g}" for value in self.machine.repeatability.tolist()}
         rows = [
             ("volume", f"{sides} mm"),
-            ("repeatability", f"{', '.join(sorted(repeatability))} um"),
+            ("repeatability", f"{', '.join(sorted(repeatability))} µm"),
             ("error model", self.error_model.kind),
             *(
                 (f"artefact {name}", f"{len(one.names)} balls")

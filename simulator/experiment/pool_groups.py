@@ -23,7 +23,7 @@ from ..geometry.positions import (
     nominal_pose,
 )
 from ..inputs.messages import Steps
-from ..inputs.quantities import format_length, length_text
+from ..inputs.quantities import length_text, typed_length
 from ..inputs.yamltree import to_python, written
 from .model import Floats, Indices, Position, ReadingGroup, Volume
 from .placements import check_turns
@@ -221,7 +221,7 @@ def _candidates(
             name = (
                 f"{group.prefix}{where}"
                 if d == 2
-                else f"{group.prefix}{plane} {format_length(level)} {where}"
+                else f"{group.prefix}{plane} {typed_length(level)} {where}"
             )
             placed: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": length_text(level)}
             placed[group.anchor] = {axis: length_text(length) for axis, length in at.items()}
@@ -252,7 +252,7 @@ def _candidates(
 
 
 def _both(first: float, second: float) -> str:
-    one, other = format_length(first), format_length(second)
+    one, other = typed_length(first), typed_length(second)
     number, _, unit = one.partition(" ")
     return f"{number if other.endswith(f' {unit}') else one}, {other}"
 

@@ -320,23 +320,32 @@ def format_duration(seconds: float) -> str:
     return f"{seconds / float(DURATION_UNITS[unit]):.9g} {unit}"
 
 
-def format_length(length: float) -> str:
-    """Write a length in metres with a unit that reads well.
+def typed_length(length: float) -> str:
+    """Write a length in metres as it is typed into a file, with a unit that reads well.
 
-    >>> format_length(0.75), format_length(2e-7), format_length(-0.0)
+    >>> typed_length(0.75), typed_length(2e-7), typed_length(-0.0)
     ('750 mm', '0.2 um', '0 mm')
     """
     unit = "mm" if length == 0 or abs(length) >= 1e-4 else "um" if abs(length) >= 1e-8 else "nm"
     return f"{length / float(LENGTH_UNITS[unit]) + 0.0:.9g} {unit}"
 
 
+def format_length(length: float) -> str:
+    """Write a length in metres for people.
+
+    >>> format_length(0.75), format_length(2e-7)
+    ('750 mm', '0.2 µm')
+    """
+    return typed_length(length).replace(" um", " µm")
+
+
 def format_angle(angle: float) -> str:
     """Write an angle in radians in microradians.
 
     >>> format_angle(2e-6)
-    '2 urad'
+    '2 µrad'
     """
-    return f"{1e6 * angle + 0.0:.9g} urad"
+    return f"{1e6 * angle + 0.0:.9g} µrad"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ def test_a_scale_that_reads_too_short_is_to_read_more(k: int, sign: float) -> No
     values = sign * 50e-6 * np.eye(6)[k]
     one = adjustments(values, np.eye(6))[k]
     true_length = MODEL.axes(values)[k, k]
-    assert one.words == f"let {'XYZ'[k]} read 50 um per m {'more' if true_length > 1.0 else 'less'}"
+    assert one.words == f"let {'XYZ'[k]} read 50 µm per m {'more' if true_length > 1.0 else 'less'}"
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -30,7 +30,7 @@ def test_a_guideway_is_turned_back_to_square(
     cosine = axes[:, guideway] @ axes[:, other]
     assert one.value == pytest.approx(np.arccos(cosine) - 0.5 * np.pi, rel=1e-9)
     assert one.name == f"angle {'xyz'[other]}{'xyz'[guideway]}"
-    turn = f"turn the {'XYZ'[guideway]} guideway by 20.6 arcsec (100 um per m) towards"
+    turn = f"turn the {'XYZ'[guideway]} guideway by 20.6 arcsec (100 µm per m) towards"
     assert one.words == f"{turn} {'-' if cosine > 0 else '+'}{'XYZ'[other]}"
 
 

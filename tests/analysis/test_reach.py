@@ -266,7 +266,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     file = str(written(tmp_path, TEXT))
     assert main(["reach", file, "--by", "repeats", "--goal", "U6 average 0.09 um"]) == 0
     out, err = capsys.readouterr()
-    assert err == "" and out.splitlines()[1] == "goal: average U6 at most 0.09 um"
+    assert err == "" and out.splitlines()[1] == "goal: average U6 at most 0.09 µm"
     assert any(
         line.startswith("repeats of every reading") and "at least " in line
         for line in out.splitlines()

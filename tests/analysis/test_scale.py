@@ -254,6 +254,6 @@ def test_a_certificate_is_suggested_and_does_what_is_told(
     )
     loose = with_offsets(experiment_of(tmp_path, text), 1e-6)
     average = predict(loose).quantities["U6"].average
-    assert f"average U6 {1e6 * average:.4f} um with 1 um on the probe offsets" in told
+    assert f"average U6 {1e6 * average:.4f} µm with 1 µm on the probe offsets" in told
     assert main(["check", str(file), "--suggest"]) == 0
     assert "warning" not in capsys.readouterr().out

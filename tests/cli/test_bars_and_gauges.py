@@ -37,7 +37,7 @@ def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
         "reason: no length is known (gauge: radius): the overall scale of the machine stays open"
         in out
     )
-    assert "gauge: radius (0.3 um): change together without changing any observation" in out
+    assert "gauge: radius (0.3 µm): change together without changing any observation" in out
     (flat,) = [
         one for one in json_of(capsys, "check", BARS) if one["experiment"] == "bar-bell[flat]"
     ]
@@ -74,7 +74,7 @@ def test_what_to_do_is_told_with_its_direction(capsys: pytest.CaptureFixture[str
     for words in (
         "let X read 2",
         "let Y read 2",
-        "um per m less",
+        "µm per m less",
         "towards +X",
         "towards +Y",
         "pivots: pivot (500.0",

@@ -93,7 +93,7 @@ def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines if line[:1] == "U"] == list(SYMBOLS)
     # Lengths and angles have rows of their own, and points their place.
-    assert not any("um, urad" in line for line in lines)
+    assert not any("µm, µrad" in line for line in lines)
     points = lay_out(load(QUICKSTART)[0]).evaluation.points
     places = dict(re.findall(r"(point [0-9]+) at \(([0-9., ]+)\) mm", "\n".join(lines)))
     named = re.findall(
@@ -352,7 +352,7 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert run("map", path) == 0
     listed = " ".join(capsys.readouterr().out.split())
     assert (
-        "EYX δy(x) straightness of X in Y 2.000 um polynomial at y = 300 mm, z = 400 mm, end points"
+        "EYX δy(x) straightness of X in Y 2.000 µm polynomial at y = 300 mm, z = 400 mm, end points"
         in listed
     )
     text = path.read_text(encoding="utf-8")

@@ -48,7 +48,7 @@ def test_a_length_that_hardly_any_machine_explains_is_doubted(
     assert fit(tmp_path, name, 1.003) == 0
     out, err = capsys.readouterr()
     assert f"warning: {TOLD[name].partition('{}')[0]}0.997" in err and "correct the " in err
-    assert " um per m more" in out and "e+0" not in out.split("what to do")[1]
+    assert " µm per m more" in out and "e+0" not in out.split("what to do")[1]
     assert fit(tmp_path, name, 1.0001) == 0
     assert "of the stated" not in capsys.readouterr().err
 

@@ -89,20 +89,20 @@ volume: [1 m, 1 m, 1 m]
     [
         (
             "EXZ: {polynomial: [2 um, 3 um, 1 um]}",
-            "the straight line through its end points, from 2 um to 6 um,",
+            "the straight line through its end points, from 2 µm to 6 µm,",
         ),
         (
             "EXZ: {polynomial: [0 um, 3 um]}",
-            "the straight line through its end points, from 0 mm to 3 um,",
+            "the straight line through its end points, from 0 mm to 3 µm,",
         ),
         ("EXZ: {polynomial: [0 um, -7.1 um, 7.1 um]}", ""),
         ("EXZ: {polynomial: [1 um, 3 um], straightness: least squares}", ""),
         (
             "EXX: {polynomial: [5 um, 3 um]}",
-            "5 um is taken off, as errors are zero at the reference point",
+            "5 µm is taken off, as errors are zero at the reference point",
         ),
         ("EXX: {polynomial: [0 um, 3 um]}", ""),
-        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 urad is taken off"),
+        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 µrad is taken off"),
         ("EXZ: {bandwidth: 1 um}", ""),
     ],
 )

@@ -46,7 +46,7 @@ def scales(tmp_path: Path) -> Path:
 def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("map", scales, "--grid", "2,2,2") == 0
     out, err = capsys.readouterr()
-    assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 um is taken off" in err
+    assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 µm is taken off" in err
     lines = out.split("\n")
     assert lines[1].startswith(
         "FB1: x carries z carries the probe, y carries the workpiece; errors are where the tip is"
@@ -60,7 +60,7 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "Y",
         "6.000",
         "1.000",
-        "um",
+        "µm",
         "polynomial",
     ] in [line.split() for line in lines]
     # (0.4 x 4 + 0.3 x 6 + 1.2 x 36) / 1.3 = 35.85 along every diagonal; random: 0.3 / 1.3 of 1 um
@@ -68,7 +68,7 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     diagonals = [line.split() for line in lines if line.startswith(("1  ", "2  ", "3  ", "4  "))]
     assert [row[-2:] for row in diagonals] == [["35.85", "0.3264"]] * 4
     assert (
-        "range in um: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 um at x"
+        "range in µm: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 µm at x"
         " = 400" in out
     )
 
@@ -146,7 +146,7 @@ def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:
         and found["length"]["random"] == second.deviation[1]
     )
     assert run("map", BRIDGE, "--line", diagonal, "--points", "3") == 0
-    assert "length 1514.100 mm, length error 21.65 um, random 5.762 um" in capsys.readouterr().out
+    assert "length 1514.100 mm, length error 21.65 µm, random 5.762 µm" in capsys.readouterr().out
 
 
 def test_a_parametric_error_on_its_line_and_at_the_reference_point(
@@ -167,7 +167,7 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(
     assert abs(np.polyfit(at[points], values[points], 1)[0]) < 1e-16
     assert run("map", MEASURED, "--error", "EYX") == 0
     assert capsys.readouterr().out.startswith(
-        "EYX δy(x): straightness of X in Y, range 3.062 um\n"
+        "EYX δy(x): straightness of X in Y, range 3.062 µm\n"
         "stated as table of 17 points at y = 100 mm, z = 400 mm, least squares\n"
     )
     assert run("map", ARM, "--error", "EYX") == 0
@@ -282,7 +282,7 @@ def test_wrong_usage(
         (("--error", "EXY"), "does not state EXY, straightness of Y in X; it is zero (stated: EAY"),
         (
             ("--error", "EC0Y"),
-            "EC0Y is the squareness of Y to X, a single number: -45.00 urad at the reference point",
+            "EC0Y is the squareness of Y to X, a single number: -45.00 µrad at the reference point",
         ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
         (("--points", "10"), "points go with a line; leave them out"),

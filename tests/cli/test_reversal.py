@@ -30,7 +30,7 @@ def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
     out, err = told(capsys, "fit", *DUMMY, *REVERSAL)
     lines = [line.split() for line in out.splitlines()]
     assert err == ""
-    assert ["alpha", "4.8079", "4.8062", "0.0252", "urad"] in lines
+    assert ["alpha", "4.8079", "4.8062", "0.0252", "µrad"] in lines
     assert ["2", "318.1723719", "0", "318.1723704", "0", "0.0103", "0"] in lines
     assert '"turned" is turned by 89.992480 degrees, clockwise, from "first"' in out
     assert "(origin: ball 1, x axis through ball 2)" in out
@@ -134,8 +134,8 @@ def test_too_far_from_a_quarter_turn(
     ]
     assert found["neglected_coordinates"] == pytest.approx(np.abs(off).max(), rel=0.01)
     size = 1e6 * found["neglected_coordinates"]
-    unit = f"{size / 1e3:.2g} mm" if size > 1e3 else f"{size:.2g} um"
-    assert f"changes co-ordinates of balls by up to {unit}" in err.replace("0.020 um", "0.02 um")
+    unit = f"{size / 1e3:.2g} mm" if size > 1e3 else f"{size:.2g} µm"
+    assert f"changes co-ordinates of balls by up to {unit}" in err.replace("0.020 µm", "0.02 µm")
     shift = max(
         abs(found["estimates"][name]["value"] - full["relation"][name]["value"])
         for name in ("offset x", "offset y")

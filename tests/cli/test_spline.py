@@ -40,7 +40,7 @@ def test_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert "prescribed: slope 0 at 0 mm" in out
     assert "cubic spline, 4 knots" in out and "7 free coefficients, 14 degrees of freedom" in out
     assert out.splitlines()[-2].split()[:2] == ["0", "12.17"]
-    assert out.splitlines()[-2].endswith("0 um/mm")
+    assert out.splitlines()[-2].endswith("0 µm/mm")
 
 
 def test_json_is_in_metres_and_its_pieces_give_its_points(
@@ -228,7 +228,8 @@ def test_drawings(tmp_path: Path) -> None:
             plot.read_bytes().startswith(b"<?xml")
             and b"<title>semi finish error against arc length" in plot.read_bytes()
         )
-        assert b"32 points, magnified 300 times; the largest is 94.17 um" in bars.read_bytes()
+        drawn = bars.read_text(encoding="utf-8")
+        assert "32 points, magnified 300 times; the largest is 94.17 µm" in drawn
     assert (tmp_path / "True/fit.svg").read_bytes() == (tmp_path / "False/fit.svg").read_bytes()
 
 

@@ -73,7 +73,7 @@ def test_the_text_quotes_what_the_command_says() -> None:
     chosen, bound, drawn = (parts(line)[1][0] for line in lines[1:4])
     text = " ".join(page[page.index("## Six positions") :].split())
     for figure in (chosen, bound, drawn):
-        assert f"{figure:.4f} um" in text.partition("```console")[0] + text.rpartition("```")[2]
+        assert f"{figure:.4f} µm" in text.partition("```console")[0] + text.rpartition("```")[2]
     for share in (1 - chosen / drawn, 1 - bound / chosen, 1 - bound / drawn):
         assert f"{100 * share:.0f} %" in text
 

@@ -64,7 +64,7 @@ def _worth(repair: Repair, judged: Verdict) -> str:
         words += f"; removes {_directions(repair, judged)}"
     u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
     if u6 is not None:
-        words += f"; average U6 {number(1e6 * u6.average)} um"
+        words += f"; average U6 {number(1e6 * u6.average)} µm"
     return f"{words}; smallest singular value {repair.smallest:.3g}"
 
 
@@ -120,7 +120,7 @@ def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
         ]
     u, average = f"{1e6 * certificate.offset_uncertainty:g}", number(1e6 * certificate.average)
     words = (
-        f"scale: {certificate.change.words}: average U6 {average} um with {u} um on the probe"
+        f"scale: {certificate.change.words}: average U6 {average} µm with {u} µm on the probe"
         " offsets"
     )
     return [words, *(f"scale, in the file: {edit}" for edit in certificate.edits)]

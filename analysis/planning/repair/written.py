@@ -21,7 +21,7 @@ from ballplate.simulator.geometry.positions import (
     plane_rotation,
 )
 from ballplate.simulator.inputs.messages import Step, format_path
-from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
+from ballplate.simulator.inputs.quantities import LengthFunction, parse_length, typed_length
 from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.machines.protocol import Array
 
@@ -211,7 +211,7 @@ def written_length(value: float) -> str:
     ('125 mm', '0.03333333333333333 m')
     """
     value = float(value)
-    text = format_length(value)
+    text = typed_length(value)
     if abs(parse_length(text) - value) <= 1e-15:
         return text
     return f"{value!r} m"

@@ -92,8 +92,8 @@ class Reach(Result):
 def _panel(answer: Answer) -> TriedValues:
     """What was tried of an unknown, lengths in micrometres and sizes of plates in millimetres."""
     unit, factor = {
-        "repeatability": ("um", 1e6),
-        "certificate": ("um", 1e6),
+        "repeatability": ("µm", 1e6),
+        "certificate": ("µm", 1e6),
         "size": ("mm", 1e3),
     }.get(answer.name, ("", 1.0))
     values, distances, is_met = (np.array(column) for column in zip(*answer.tried, strict=True))

@@ -58,7 +58,7 @@ class Goal:
             return f"{share} lengths (U6) within the target uncertainty"
         if self.kind == "tasks":
             return "every task within its target"
-        unit = "urad" if self.symbol.endswith("angles") else "um"
+        unit = "µrad" if self.symbol.endswith("angles") else "µm"
         return f"{self.statistic} {self.symbol} at most {1e6 * self.limit:.9g} {unit}"
 
 
@@ -81,7 +81,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     :raises GoalError: it is none.
 
     >>> str(parse_goal("U6 average 0.3 um"))
-    'average U6 at most 0.3 um'
+    'average U6 at most 0.3 µm'
     >>> str(parse_goal("lengths", 0.95))
     '95 % of lengths (U6) within the target uncertainty'
     """
@@ -155,7 +155,7 @@ def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
         )
     found = prediction.quantities["U6"]
     share = found.within_target or 0.0
-    average = "" if math.isnan(found.average) else f", average U6 {number(1e6 * found.average)} um"
+    average = "" if math.isnan(found.average) else f", average U6 {number(1e6 * found.average)} µm"
     # An exact count: the share is a ratio of two whole numbers.
     missing = found.count - round(share * found.count)
     is_met = missing <= (1.0 - goal.share) * found.count * (1.0 + 1e-12)

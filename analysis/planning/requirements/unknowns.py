@@ -16,8 +16,8 @@ from ballplate.simulator.experiment.variants import node_at, override
 from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
 from ballplate.simulator.inputs.quantities import (
     LengthFunction,
-    format_length,
     parse_length_function,
+    typed_length,
 )
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, child
@@ -176,7 +176,7 @@ def _text(leaf: LengthFunction, factor: Fraction) -> str:
     constant = exact(leaf.constant)
     if constant and factor != 1:
         constant = round_down(times(constant, factor))
-    told = format_length(float(constant))
+    told = typed_length(float(constant))
     if not leaf.slope:
         return told
     divisor = 1 / exact(leaf.slope)
@@ -324,7 +324,7 @@ def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknow
 
     def texts(step: int) -> list[str]:
         factor = Fraction(at_step(step)) / Fraction(lead)
-        return [format_length(float(round_down(times(exact(edge), factor), 6))) for edge in edges]
+        return [typed_length(float(round_down(times(exact(edge), factor), 6))) for edge in edges]
 
     def tree(step: int) -> Node:
         scalars = tuple(Scalar(mark, text) for text in texts(step))
@@ -334,7 +334,7 @@ def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknow
     def words(step: int) -> str:
         return " x ".join(texts(step))
 
-    present = " x ".join(map(format_length, edges))
+    present = " x ".join(map(typed_length, edges))
     first, drawn, last = (step_of(one) for one in (lead / SMALLEST, lead, lead * LARGEST))
     return Unknown(
         "size", "size of the plate", present, drawn, first, last, True, False, tree, words, _metres
