@@ -179,6 +179,8 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(
     assert "stated as polynomial; a rotation is the same on all lines\n" in capsys.readouterr().out
     assert run("map", MEASURED, "--error", "EYX", "--format", "csv") == 0
     assert capsys.readouterr().out.startswith("position_mm,stated_um,EYX_um,random_um\n0,3,0,0.5\n")
+    assert run("map", ARM, "--error", "EBX", "--format", "csv") == 0
+    assert "EBX_urad" in capsys.readouterr().out.splitlines()[0]
 
 
 @pytest.mark.parametrize(

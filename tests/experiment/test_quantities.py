@@ -25,6 +25,7 @@ from ballplate.simulator.inputs.quantities import (
     parse_length_function,
     parse_positive_length,
     parse_ratio,
+    typed_length,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -80,7 +81,9 @@ def test_any_length_is_rounded_once(number: object, unit: str) -> None:
 
 @given(st.floats(-1e3, 1e3).filter(lambda length: length == 0 or abs(length) > 1e-17))
 def test_formatted_lengths_are_read_again(length: float) -> None:
-    assert parse_length(format_length(length)) == pytest.approx(length, rel=1e-8, abs=1e-18)
+    for text in (format_length(length), typed_length(length)):
+        assert parse_length(text) == pytest.approx(length, rel=1e-8, abs=1e-18)
+    assert typed_length(length).isascii()
 
 
 @given(st.floats(1e-9, 1e-3), st.floats(1.00001e4, 1e9))
@@ -95,6 +98,7 @@ def test_no_text_breaks_the_parsers(text: str) -> None:
         parse_length,
         parse_angle,
         parse_ratio,
+        typed_length,
         parse_positive_length,
         parse_length_function,
     ):

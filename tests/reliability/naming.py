@@ -269,12 +269,12 @@ def nothing(world: World, data: DataSet, generator: Generator) -> DataSet:
 
 
 MODEL_ERRORS: dict[str, Draw] = {
-    "a wave in a scale, 0.2 to 1 um": wave,
+    "a wave in a scale, 0.2 to 1 µm": wave,
     "polynomials of degree 6, not 4": other_machine(richer),
     "full rotations, 0.2 to 1 mrad": other_machine(full_rotations),
     "another arrangement": other_machine(other_arrangement),
-    "tilting axes, 2 to 10 urad": tilted_axes,
-    "a drift, 2 to 10 um": drift,
+    "tilting axes, 2 to 10 µrad": tilted_axes,
+    "a drift, 2 to 10 µm": drift,
 }
 MISTAKES: dict[str, Draw] = {
     "a reading": a_reading,

@@ -173,7 +173,8 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
                 "U6_undetermined": 0.0,
                 "rank_deficiency": float(k % 5 == 0),
             }
-            lines = [f"EXX by {k} um: changes no observation"] if k % 5 == 0 else []
+            unit = "um" if k % 10 else "µm"
+            lines = [f"EXX by {k} {unit}: changes no observation"] if k % 5 == 0 else []
             yield done(k, figures | {"as_expected": 1.0}, undetermined=lines)
 
     store = made_up(tmp_path / "large.sqlite", "large", axes, rows())

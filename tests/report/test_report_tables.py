@@ -82,7 +82,7 @@ def test_csv_is_read_back(small: Store) -> None:
         "a_b|c & 5 % [z]",
     ]
     assert {len(row) for row in first + second} == {6}
-    assert ["550 mm", "U4 average", "µm", "0.402", "failed", "left"] in first
+    assert ["550 mm", "U4 average", "um", "0.402", "failed", "left"] in first
 
 
 def as_rows(text: str) -> list[list[list[str]]]:
