@@ -31,7 +31,7 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "DANGEROUS" not in out and "scale of the certificate of plate" in out
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 754
-    assert {row["unit"] for row in rows} == {"um", "ppm"} and "MDB, µm" in out
+    assert {row["unit"] for row in rows} == {"um"} and "MDB, µm" in out
     assert sum(float(row["redundancy"]) for row in rows) == pytest.approx(580.0)
     worst = max(
         (row for row in rows if row["kind"] == "reading"),
