@@ -158,8 +158,7 @@ def _told(error: OSError, options: argparse.Namespace) -> str:
         os.getcwd()
     except FileNotFoundError:
         return (
-            f"ballplate {options.command}: the current folder is not there any more; change to"
-            " another"
+            f"ballplate {options.command}: the current folder no longer exists; change to another"
         )
     where = error.filename or f"ballplate {options.command}"
     return (
@@ -169,7 +168,7 @@ def _told(error: OSError, options: argparse.Namespace) -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Tells wrong usage in one line, whatever stands in the arguments, and what was probably meant.
+    """Reports wrong usage in one line, whatever the arguments contain, with the probable intention.
 
     The parsers of commands are of this class as well.
     """

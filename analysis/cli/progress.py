@@ -1,4 +1,4 @@
-"""How far a long step has come, on standard error: a bar on a terminal, plain lines now and then
+"""Progress of a long step on standard error: a bar on a terminal, occasional plain lines
 elsewhere.
 """
 

@@ -70,7 +70,7 @@ def run(options: Namespace) -> int:
     from .progress import progress
 
     if options.power <= options.false_alarm:
-        raise UsageError("--power must be above --false-alarm; any test has that much")
+        raise UsageError("--power must be above --false-alarm; any test has at least that power")
     chosen = experiments(options)
     if options.csv is not None and len(chosen) > 1:
         names = ", ".join(str(one.name or one.label) for one in chosen)

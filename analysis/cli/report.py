@@ -87,7 +87,7 @@ def run(options: Namespace) -> int:
 
             text = FORMATS[form](results.title, report_tables(results))
         if not results.count("done") and not is_damaged:
-            told = f"none of its {len(results.cells)} cells is done; ballplate sweep goes on"
+            told = f"none of its {len(results.cells)} cells is done; ballplate sweep continues"
             complain(f"{store.path}: {told}")
     if output is None:
         sys.stdout.write(text)

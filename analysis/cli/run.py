@@ -46,7 +46,7 @@ def add_options(parser: ArgumentParser) -> None:
 def _trial_count(text: str) -> int:
     found = trial_count(text)
     if found < 2:
-        raise ArgumentTypeError(f'one data set has no scatter; ask for 2 at least, not "{text}"')
+        raise ArgumentTypeError(f'one data set has no scatter; give at least 2, not "{text}"')
     return found
 
 
@@ -58,7 +58,7 @@ def run(options: Namespace) -> int:
     plans, found, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
-        raise UsageError("--seed and --workers have a meaning with --trials or --until only")
+        raise UsageError("--seed and --workers go with --trials or --until only; leave them out")
     kept = options.interruption.kept
     for experiment in experiments(options):
         plans.append(predict(experiment, with_scale=True))

@@ -1,4 +1,4 @@
-"""What the estimate, and suspects taken out of it, leave of residuals and of biases."""
+"""Residuals and biases that remain after the estimate and the removal of suspects."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def too_many_entries(design: Design) -> str:
     if rows * columns <= MOST_ENTRIES:
         return ""
     text = (
-        f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; at"
+        f"{rows} observations, each co-ordinate counted, are too many to test for gross errors; at"
         " most "
     )
     return (

@@ -1,4 +1,4 @@
-"""What replicates come to: bias, spread and coverage beside the linearised uncertainties, with
+"""Results of replicates: bias, spread and coverage beside the linearised uncertainties, with
 standard errors.
 """
 

@@ -1,4 +1,4 @@
-"""Runs replicates, on one processor or on several, until there are enough, and sums them up in
+"""Computation of replicates, on one processor or several, until there are enough, summed in
 order.
 """
 

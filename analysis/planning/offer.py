@@ -1,4 +1,4 @@
-"""What a plan may choose from when a campaign goes on: candidates, what is done, and interrupted
+"""Candidates for the continuation of a campaign: those left, those done, and interrupted
 positions.
 
 A position that was interrupted is offered twice: for completion, as long as the artefact stands
@@ -132,8 +132,8 @@ class Offer:
 def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Offer:
     """What may be chosen from a pool after some set-ups have been read.
 
-    `standing` tells whether the artefact still is where it was read last, so that this position can
-    be completed.
+    `standing` states whether the artefact still is where it was read last, so that this position
+    can be completed.
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}

@@ -68,8 +68,8 @@ class DrawnMap:
 def page(
     store: Store, results: ReportedSweep, run_modules: bool = False, report: Report = unreported
 ) -> str:
-    """The page. Experiments with code of their own are drawn only with `run_modules`; `report` is
-    told what is drawn.
+    """The page. Experiments with code of their own are drawn only with `run_modules`; `report`
+    receives what is drawn.
 
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
@@ -231,7 +231,7 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
     if len(drawn.places) > MOST_NAMES:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
-        caption += " Of many balls only some are drawn."
+        caption += " Only some of the balls are drawn."
     has_offsets = any(tip.any() for _, tip in drawn.tips)
     probes = (
         probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}")

@@ -1,4 +1,4 @@
-"""What the plots of a report show: an uncertainty along a swept axis, for each setting of the other
+"""Data of a report's plots: an uncertainty along a swept axis, for each setting of the other
 axes.
 """
 

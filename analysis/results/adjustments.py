@@ -1,5 +1,4 @@
-"""What a mechanic would change on a machine of straight axes: scales, and the directions of
-guideways.
+"""Mechanical adjustments of a machine of straight axes: scales, and the directions of guideways.
 
 Readings that are too short have a positive scale error. A squareness error is the turn that a
 guideway has suffered about the positive axis in its name, so that the adjustment turns it back.
@@ -51,7 +50,7 @@ def adjustments(
     """From scale errors of X, Y and Z and C0Y, B0Z and A0Z (6,), or the latter alone (3,).
 
     `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where
-    scales are open and their differences are not, those of Y and Z against X are told as well.
+    scales are open and their differences are not, those of Y and Z against X are reported as well.
     `degrees_of_freedom` are those of the scatter that `spread` comes from, infinite where
     uncertainties are as stated.
     """
@@ -137,7 +136,7 @@ def few_degrees_of_freedom(degrees_of_freedom: int, what: str, instead: str) -> 
 
 def _scale(axis: str, value: float, against: str = "") -> str:
     if np.isnan(value):
-        return "cannot be told"
+        return "cannot be determined"
     return (
         f"let {axis} read {_amount(1e6 * abs(value))} µm per m"
         f" {'more' if value > 0 else 'less'}{against}"
@@ -146,7 +145,7 @@ def _scale(axis: str, value: float, against: str = "") -> str:
 
 def _turn(guideway: str, other: str, lean: float) -> str:
     if np.isnan(lean):
-        return "cannot be told"
+        return "cannot be determined"
     angle = f"{_amount(abs(lean) / ARCSECOND)} arcsec ({_amount(1e6 * abs(lean))} µm per m)"
     return f"turn the {guideway} guideway by {angle} towards {'-' if lean > 0 else '+'}{other}"
 

@@ -1,4 +1,4 @@
-"""What a fit estimates, as functions of its parameters: names, values, uncertainties and
+"""Estimates of a fit as functions of its parameters: names, values, uncertainties and
 covariances.
 """
 

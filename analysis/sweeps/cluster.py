@@ -1,4 +1,4 @@
-"""Runs tasks of a sweep on a dask.distributed cluster; workers may come and go."""
+"""Execution of a sweep's tasks on a dask.distributed cluster; workers may come and go."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ PATIENCE = 30.0
 LOGGERS = ("distributed", "tornado", "asyncio")
 
 RESTART = (
-    "install the same wherever a worker runs; what is done is stored, and the same command goes on"
-    " from there"
+    "install the same wherever a worker runs; finished cells are stored, and the same command"
+    " continues from there"
 )
 
 
@@ -73,7 +73,9 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     try:
         get_address_host_port(address)
     except ValueError:
-        text = f"{address}: is no address of a scheduler; give one such as tcp://127.0.0.1:8786"
+        text = (
+            f"{address}: is not the address of a scheduler; give one such as tcp://127.0.0.1:8786"
+        )
         raise ClusterError(text) from None
     try:
         client = Client(address, timeout=10, set_as_default=False)
@@ -97,7 +99,7 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
             else:
                 text = f"the scheduler at {address} has ended"
             raise ClusterError(
-                f"{text}; what is done is stored, and the same command goes on from there"
+                f"{text}; finished cells are stored, and the same command continues from there"
             ) from None
 
     try:
@@ -122,7 +124,7 @@ def _is_there(client: Any) -> bool:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep to ourselves what dask logs, tracebacks among it: errors are told in words."""
+    """Keep to ourselves what dask logs, tracebacks among it: errors are reported in words."""
     with suppress(ImportError):
         import distributed  # noqa: F401
     # Each of dask's loggers has a level of its own, once dask is loaded.

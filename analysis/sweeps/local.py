@@ -1,4 +1,4 @@
-"""Runs tasks of a sweep in processes of this machine; a process that is killed costs nothing but
+"""Execution of a sweep's tasks in processes of this machine; a process that is killed costs only
 time.
 """
 

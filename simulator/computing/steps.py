@@ -1,4 +1,4 @@
-"""Steps of a long computation, for whoever wants to show how far it has come."""
+"""Steps of a long computation, for display of its progress."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ProgressStep:
 
 
 Report = Callable[[ProgressStep], object]
-"""Is told of each step that has come further."""
+"""Receives each step of the progress."""
 
 
 def unreported(step: ProgressStep) -> None:

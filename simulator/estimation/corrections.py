@@ -1,4 +1,4 @@
-"""How corrected points depend on the shared parameters: the rows behind U4, U6 and measuring
+"""Derivatives of corrected points by the shared parameters: the rows behind U4, U6 and measuring
 tasks.
 """
 

@@ -1,3 +1,1 @@
-"""Experiment files: loading them, what they may say, and the messages about what is wrong with
-them.
-"""
+"""Experiment files: their keys, loading, and messages about errors in them."""

@@ -1,4 +1,4 @@
-"""From the settings of a calibration to ball indices, values and uncertainties."""
+"""Conversion of the settings of a calibration into ball indices, values and uncertainties."""
 
 from __future__ import annotations
 

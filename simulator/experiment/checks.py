@@ -1,5 +1,5 @@
-"""Checks that need several sections: names used twice, balls outside the volume, balls nobody
-reads.
+"""Checks that need several sections: names used twice, balls outside the volume, balls never
+read.
 """
 
 from __future__ import annotations
@@ -423,8 +423,8 @@ def check_radii(calibrations: Mapping[int, Calibration], problems: Problems) -> 
             continue
         if calibration.artefact in first:
             text = (
-                f'the radius of "{calibration.artefact}" stands in'
-                f" calibration[{first[calibration.artefact]}] already"
+                f'the radius of "{calibration.artefact}" is already in'
+                f" calibration[{first[calibration.artefact]}]"
             )
             problems.add(("calibration", i), f"{text}; remove one of the two")
         first.setdefault(calibration.artefact, i)

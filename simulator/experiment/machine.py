@@ -1,4 +1,4 @@
-"""From the settings of the machine and of its evaluation to volume, repeatability, points and
+"""Conversion of the settings of machine and evaluation into volume, repeatability, points and
 tasks.
 """
 

@@ -1,5 +1,5 @@
-"""From the settings of a pool to candidates, those that stand there twice left out, and limits on
-choosing them.
+"""Conversion of the settings of a pool into candidates, without duplicates, and limits on the
+choice.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60
 
 @dataclass
 class Candidates:
-    """Positions to choose from as far as they are right; `complete` tells whether all that is
+    """Positions to choose from as far as they are right; `complete` states whether all that is
     written is.
     """
 
@@ -230,8 +230,9 @@ def resolve_pool(
         if isinstance(item, RadiusCalibration):
             if item.artefact in fixed:
                 text = (
-                    f'the radius of "{item.artefact}" stands in calibration[{fixed[item.artefact]}]'
-                    " already; "
+                    f'the radius of "{item.artefact}" is already in'
+                    f" calibration[{fixed[item.artefact]}]"
+                    "; "
                 )
                 problems.add(steps, f"{text}remove one of the two")
             radii.setdefault(item.artefact, []).append(len(found))

@@ -1,4 +1,5 @@
-"""Artefacts: what an experiment file says about one, and where its balls are in its own frame.
+"""Artefacts: their keys in an experiment file, and the places of their balls in their own
+frames.
 
 A further kind of artefact is one settings class with a ``layout`` and one line in ``ARTEFACTS``.
 """
@@ -98,8 +99,8 @@ BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 
 
 class AxesSettings(Settings):
-    """The axes that a plate's co-ordinates are told in: the ball at the origin, and one on the x or
-    the y axis.
+    """The axes in which a plate's co-ordinates are reported: the ball at the origin, and one on the
+    x or the y axis.
     """
 
     origin: Name = Field(description="the ball at the origin")
@@ -136,8 +137,8 @@ class ArtefactSettings(Settings):
     axes: AxesSettings | None = Field(
         None,
         description=(
-            "axes in which a two-dimensional fit tells the co-ordinates of the balls; default: from"
-            " the first ball through the farthest one that nominally lies on its x axis"
+            "axes in which a two-dimensional fit reports the co-ordinates of the balls; default:"
+            " from the first ball through the farthest one that nominally lies on its x axis"
         ),
     )
 

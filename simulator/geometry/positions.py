@@ -1,4 +1,4 @@
-"""Positions of an artefact in the machine: from what an experiment file says to a rotation and an
+"""Positions of an artefact in the machine: conversion of their keys into a rotation and an
 origin.
 """
 

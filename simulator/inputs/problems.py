@@ -1,4 +1,4 @@
-"""Collects what is wrong with an experiment file while it is read, so that everything is said at
+"""Collection of the errors in an experiment file while it is read, so that all are reported at
 once.
 """
 

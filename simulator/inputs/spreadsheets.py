@@ -1,4 +1,4 @@
-"""Text in CSV files that spreadsheets show as text: names such as =A1 or @home would be computed as
+"""Escaping of text in CSV files: spreadsheets would compute names such as =A1 or @home as
 formulas.
 """
 

@@ -1,4 +1,4 @@
-"""Readings that cannot be of the ball they are said to be of, and what they probably are.
+"""Detection of readings that cannot be of the stated ball, and of their probable cause.
 
 Two comparisons are made before anything is fitted, both of places after the best rigid motion of
 each position:
@@ -62,7 +62,7 @@ class WrongReading:
 class WrongPosition:
     """A position whose readings fit the artefact turned onto itself, or in no pose at all.
 
-    `turned` tells the turn in words and is empty in the latter case, where only `agreeing` of
+    `turned` states the turn in words and is empty in the latter case, where only `agreeing` of
     `count` readings fit.
     """
 

@@ -30,12 +30,12 @@ def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", BARS, GAUGE]) == 0
     out = capsys.readouterr().out
     assert (
-        "reason: every bar lies parallel to the xy plane: nothing tells the scale of Z nor its"
+        "reason: every bar lies parallel to the xy plane: nothing determines the scale of Z nor its"
         " squareness" in out
     )
     assert (
-        "reason: no length is known (gauge: radius): the overall scale of the machine stays open"
-        in out
+        "reason: no length is known (gauge: radius): the overall scale of the machine is"
+        " undetermined" in out
     )
     assert "gauge: radius (0.3 µm): change together without changing any observation" in out
     (flat,) = [
@@ -91,7 +91,7 @@ def test_what_to_do_is_told_with_its_direction(capsys: pytest.CaptureFixture[str
 def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fit", *KNOWN, "--estimator", "sphere-then-metric", "--json"]) == 0
     out, err = capsys.readouterr()
-    assert "warning: the pivot is the centre of a sphere, as if the machine were right" in err
+    assert "warning: the pivot is the centre of a sphere, as if the machine had no errors" in err
     two = json.loads(out)["adjustments"]
     joint = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")["adjustments"]
     assert abs(two["angle yz"]["value"]) < 0.4 * abs(joint["angle yz"]["value"])
@@ -233,7 +233,7 @@ def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -
         main(["compare", GAUGE, "--variant", "radius unknown", "--estimator", "length-equations"])
         == 3
     )
-    assert "the design leaves errors open" in capsys.readouterr().err
+    assert "the design leaves errors undetermined" in capsys.readouterr().err
     assert main(["compare", "designs/quickstart.yaml", "--estimator", "length-equations"]) == 3
     assert "has no ball bar or Bryan gauge" in capsys.readouterr().err
     assert main(["compare", BARS, "--variant", "length known", "--trials", "1"]) == 0
@@ -250,7 +250,7 @@ def test_length_equations_refuse_plates_alone_and_planes(
     )
     assert "has no ball bar or Bryan gauge whose lengths are read" in capsys.readouterr().err
     assert main(["fit", *BAR_READINGS, "--estimator", "reversal"]) == 3
-    assert "the reversal is about two dimensions, not three" in capsys.readouterr().err
+    assert "the reversal needs two dimensions, not three" in capsys.readouterr().err
     plane = ["designs/hocken_borchardt/dummy.yaml", "designs/hocken_borchardt/dummy-readings.csv"]
     assert main(["fit", *plane, "--variant", "with scale", "--estimator", "length-equations"]) == 3
     assert "has two dimensions" in capsys.readouterr().err
@@ -268,9 +268,7 @@ def test_length_equations_tell_what_they_pass_over(
     assert main(arguments) == 0
     err = capsys.readouterr().err
     assert (
-        "takes no notice of priors" in err
-        and "whatever the file's error model" in err
-        and "plates" not in err
+        "ignores priors" in err and "whatever the file's error model" in err and "plates" not in err
     )
 
 
@@ -460,15 +458,15 @@ priors:
             " radius"
         ),
         (
-            '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is none; use'
+            '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is not one; use'
             " kind: distances"
         ),
         (
             "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing;"
-            " correct the one or the other"
+            " correct one of the two"
         ),
         (
-            '25:5: calibration[4]: the radius of "over" stands in calibration[3] already; remove'
+            '25:5: calibration[4]: the radius of "over" is already in calibration[3]; remove'
             " one of the two"
         ),
         '26:5: calibration[5].standard_uncertainty: missing; add "standard_uncertainty"',

@@ -57,7 +57,8 @@ def test_quarter_turns_in_degrees_are_refused(tmp_path: Path, turns: int, meant:
     assert "quarter_turns: 1" in text
     path.write_text(text.replace("quarter_turns: 1", f"quarter_turns: {turns}"))
     with pytest.raises(
-        ExperimentError, match=rf"\.quarter_turns: {turns} is no number of turns .*; write {meant}"
+        ExperimentError,
+        match=rf"\.quarter_turns: {turns} is not a number of turns .*; write {meant}",
     ):
         load(path)
 
@@ -100,10 +101,10 @@ volume: [1 m, 1 m, 1 m]
         ("EXZ: {polynomial: [1 um, 3 um], straightness: least squares}", ""),
         (
             "EXX: {polynomial: [5 um, 3 um]}",
-            "5 µm is taken off, as errors are zero at the reference point",
+            "5 µm is subtracted, because errors are zero at the reference point",
         ),
         ("EXX: {polynomial: [0 um, 3 um]}", ""),
-        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 µrad is taken off"),
+        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 µrad is subtracted"),
         ("EXZ: {bandwidth: 1 um}", ""),
     ],
 )

@@ -46,10 +46,10 @@ def scales(tmp_path: Path) -> Path:
 def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("map", scales, "--grid", "2,2,2") == 0
     out, err = capsys.readouterr()
-    assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 µm is taken off" in err
+    assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 µm is subtracted" in err
     lines = out.split("\n")
     assert lines[1].startswith(
-        "FB1: x carries z carries the probe, y carries the workpiece; errors are where the tip is"
+        "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
     )
     assert [
         "EYY",
@@ -259,7 +259,7 @@ def test_magnification_is_round() -> None:
         (("--line", "1 m, 1 m to 1 m, 1 m, 1 m"), "has 2 co-ordinates; give three"),
         (
             ("--line", "y = 600 mm"),
-            "two axes stand still on a line; write for example y = 600 mm, z = 600 mm",
+            "a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm",
         ),
         (
             ("--line", "y = 600 mm, z = 600 mm", "--points", "1"),

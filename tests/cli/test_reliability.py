@@ -22,7 +22,7 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
     table = tmp_path / "all.csv"
     assert main(["reliability", QUICKSTART, "--csv", str(table)]) == 0
     out = capsys.readouterr().out
-    assert "754 observations; redundancy 580.0 in all" in out
+    assert "754 observations; redundancy 580.0 in total" in out
     assert "estimated from the other residuals: 4.152 standard deviations" in out
     assert (
         "cannot be detected, harmless: offset x of probe down, offset y of probe down, offset z of"
@@ -217,8 +217,8 @@ def waves(rows: Rows) -> None:
         (
             probe,
             [
-                "offset z of probe (left|right) stated [12].* too .*; it cannot be told from offset"
-                " z of probe "
+                "offset z of probe (left|right) stated [12].* too .*; it cannot be distinguished"
+                " from offset z of probe "
             ],
             [2e-6],
         ),
@@ -296,7 +296,7 @@ def test_a_wave_in_a_scale_is_laid_to_the_model(
         (one,) = suspected(waves, sigma, clean, tmp_path, capsys)
         assert (
             one["kind"] == "model"
-            and "what explains most is an error in x that depends on x" in one["words"]
+            and "the best explanation is an error in x that depends on x" in one["words"]
         )
         assert one["value"] > 1.5 and one["lines"] == []
 

@@ -175,7 +175,7 @@ variants:
 """,
             "own",
             "11:17: variants.own.positions[0].quarter_turns",
-            "stands elsewhere, where this alias leads",
+            "is elsewhere, at the anchor of this alias",
         ),
         (
             """\
@@ -205,7 +205,7 @@ variants:
 """,
             "own",
             "9:9: variants.own",
-            "the repair changes positions[0].corner, of which this is a part",
+            "the repair changes positions[0].corner, which includes this",
         ),
     ],
 )
@@ -214,7 +214,7 @@ def test_what_others_share_is_refused(
 ) -> None:
     text = SHARED + positions
     repair = first_repair(text, variant)
-    if "corner, of" in words:
+    if "corner, which" in words:
         # As where the position is moved, too.
         (edit,) = repair.edits
         moved = {**edit.value, "corner": {"x": "210 mm", "y": "260 mm"}}

@@ -1,6 +1,4 @@
-"""What a changed experiment would determine: everything but the words of a verdict, as many are
-compared.
-"""
+"""Fast assessment of changed experiments: the verdict without its words."""
 
 from __future__ import annotations
 
@@ -102,7 +100,7 @@ def removed(before: Array, after: Array) -> tuple[int, ...]:
     """Which null directions, told by what they do to the machine (parameters, k), are no part of
     those afterwards.
 
-    Directions that do nothing to the machine, or the same as others, are never told as removed.
+    Directions that do nothing to the machine, or the same as others, are never reported as removed.
     """
     if not after.shape[1]:
         return tuple(range(before.shape[1]))

@@ -1,4 +1,4 @@
-"""What further observations say of null directions, without a factorisation of the changed
+"""Effect of further observations on null directions, without a factorisation of the changed
 design.
 """
 

@@ -1,4 +1,4 @@
-"""What is needed for a goal, and how it is told."""
+"""Answers of the search for what a goal needs, as text and data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Answer:
     """What an unknown must be for the goal to be met, the others as they are.
 
-    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that
+    `status`: a value was `found` beside which the next, `beside`, is not enough; `any` value that
     was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
     unknown cannot be `varied`. `words` and `value`, in metres or a number, are the value needed, or
     without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
@@ -49,7 +49,7 @@ class Answer:
 
 @dataclass(frozen=True, repr=False)
 class Reach(Result):
-    """A goal, what the design as it is makes of it, and what each unknown must be."""
+    """A goal, whether the design as drawn meets it, and the necessary value of each unknown."""
 
     label: str
     title: str
@@ -101,7 +101,7 @@ def _panel(answer: Answer) -> TriedValues:
 
 
 def _lines(reach: Reach) -> list[str]:
-    """The goal, what the design makes of it, and a row for each unknown."""
+    """The goal, whether the design meets it, and a row for each unknown."""
     now = "met" if reach.present.is_met else "not met"
     lines = [
         f"{reach.label}: {reach.title}",
@@ -110,10 +110,10 @@ def _lines(reach: Reach) -> list[str]:
     ]
     if reach.present.undetermined:
         lines.append(
-            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check tells"
+            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check shows"
             " what is undetermined"
         )
-    rows = [["changed alone", "as drawn", "needed", "what comes of it"]]
+    rows = [["changed alone", "as drawn", "needed", "result"]]
     for one in reach.answers:
         rows.append([one.title, one.present, _needed(one), _outcome(one)])
     lines += ["", *aligned(rows, [False] * 4)]

@@ -225,4 +225,4 @@ def far_spread(values: Array, drawn: Array) -> str:
     if abs(found - expected) <= FAR_FROM_DRAWING * expected + HARDLY_FLAT:
         return ""
     times = f"{found / expected:.3g} times as far apart as in the artefact's drawing"
-    return f"the balls of these co-ordinates are {times}; correct the one or the other"
+    return f"the balls of these co-ordinates are {times}; correct one of the two"

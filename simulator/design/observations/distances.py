@@ -251,7 +251,7 @@ def _pairs(
         text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
         is_right &= references.require(names[0] != names[1], (*steps, i), text)
         pair = frozenset(names)
-        text = f"stands already in entry [{seen.get(pair)}]; remove one of the two"
+        text = f"is already in entry [{seen.get(pair)}]; remove one of the two"
         is_right &= references.require(pair not in seen, (*steps, i), text)
         seen.setdefault(pair, i)
     return (
@@ -320,7 +320,7 @@ def _certified_distances(
             and distance > 0
             and not abs(distance - expected) <= FAR_FROM_DRAWING * expected
         ):
-            text = f"{far_from_drawing(distance, expected)}; correct the one or the other"
+            text = f"{far_from_drawing(distance, expected)}; correct one of the two"
             problems.add_at(mark, place, text)
     if missing and len(problems.messages) == before:
         problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")

@@ -1,4 +1,4 @@
-"""What is known beforehand of shared parameters: poses, probe offsets, machine errors."""
+"""Prior knowledge of shared parameters: poses, probe offsets, machine errors."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ..parameters import shared_layout
 
 @dataclass(frozen=True)
 class Priors(Observations):
-    """What is known beforehand of shared parameters; arrays (m,), metres, radians or ratios.
+    """Prior knowledge of shared parameters; arrays (m,), metres, radians or ratios.
 
     Each row is about a pose parameter (`position` and `component`, by place among origin and
     rotation), about a probe offset (`probe` and `component`), or about a linear function of the
     model's parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
-    told as co-ordinates, pose angles as deviations from the nominal pose.
+    stated as co-ordinates, pose angles as deviations from the nominal pose.
     """
 
     word: ClassVar[str] = "prior"
@@ -112,6 +112,6 @@ def _pose_values(design: Design, state: State) -> Array:
 
 
 def no_priors() -> Priors:
-    """Nothing known beforehand."""
+    """No prior knowledge."""
     none, empty = np.zeros(0, np.int64), np.zeros(0)
     return Priors((), none, none, none, np.zeros((0, 0)), empty, empty)

@@ -64,11 +64,11 @@ def read_radius(
 ) -> RadiusCalibration | None:
     gauge = references.artefacts[artefact]
     if not isinstance(gauge, BryanGaugeSettings):
-        text = f'only a Bryan gauge has a radius, and "{artefact}" is none; use kind: distances'
+        text = f'only a Bryan gauge has a radius, and "{artefact}" is not one; use kind: distances'
         references.problems.add((*steps, "kind"), text)
         return None
     value = gauge.radius if settings.value is None else settings.value
-    text = f"{far_from_drawing(value, gauge.radius)}; correct the one or the other"
+    text = f"{far_from_drawing(value, gauge.radius)}; correct one of the two"
     if not references.require(
         abs(value - gauge.radius) <= FAR_FROM_DRAWING * gauge.radius, (*steps, "value"), text
     ):
