@@ -1,4 +1,4 @@
-"""Plans and evaluates ball-plate experiments for co-ordinate measuring machines.
+"""Planning and evaluation of ball-plate experiments for co-ordinate measuring machines.
 
 `import ballplate as bp` gives the functions of `ballplate.api`, each loaded when it is first used.
 """

@@ -196,7 +196,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
             continue
         found = to_write(repairs(with_pool(one)), judged)
         if found is None:
-            words = "no changes were found after which nothing is undetermined"
+            words = "no changes were found that determine everything"
             raise ExperimentError([one.message((), words)])
         text = mended(text, Path(path), one.name, found)
     return text
@@ -575,8 +575,8 @@ def map(
     """Volumetric errors of a machine file: on a grid over the volume, along a line of so many
     points, or one parametric error along its axis.
 
-    `line` is a text as in `ballplate map --line`, the places in metres of the two axes that stand
-    still, or two points.
+    `line` is a text as in `ballplate map --line`, the places in metres of the two fixed
+    axes, or two points.
 
     >>> map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
     <ErrorsOnLine of npl-like: 3 points, resultant 16.17 um at most>
@@ -753,6 +753,6 @@ def _experiment(given: Any) -> Experiment:
         return given
     if isinstance(given, str | os.PathLike):
         return load(given)
-    what = "make one of it with experiment()" if isinstance(given, Mapping) else "give either"
+    what = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
     kind = type(given).__name__
     raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")

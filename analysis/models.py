@@ -1,4 +1,4 @@
-"""What an error model of one's own is made of; see the how-to page on error models.
+"""Classes for a user's own error model; see the how-to page on error models.
 
 >>> Parameter("scale x", "1", "EXX", "scale of x", 0.5).unit
 '1'

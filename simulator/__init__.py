@@ -1,1 +1,1 @@
-"""Plans ball-plate experiments for coordinate measuring machines."""
+"""Designs, readings and estimates of ball-plate experiments for co-ordinate measuring machines."""

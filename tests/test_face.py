@@ -160,7 +160,7 @@ def test_a_fit_that_is_of_no_use_says_why() -> None:
 
 WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.run(5), TypeError, "int is neither an experiment nor the path of a file"),
-    (lambda: bp.run({}), TypeError, r"dict is neither .* make one of it with experiment\(\)"),
+    (lambda: bp.run({}), TypeError, r"dict is neither .* convert it with experiment()"),
     (lambda: bp.load(None), TypeError, "path=None; give the path of a file"),
     (lambda: bp.load(QUICKSTART, variant=3), TypeError, "variant=3; give the name of a variant"),
     (lambda: bp.experiment([]), TypeError, r"sections=\[\]; give a mapping"),

@@ -177,8 +177,7 @@ def _told(error: OSError, options: argparse.Namespace) -> str:
         os.getcwd()
     except FileNotFoundError:
         return (
-            f"ballplate {options.command}: the current folder is not there any more; change to"
-            " another"
+            f"ballplate {options.command}: the current folder no longer exists; change to another"
         )
     where = error.filename or f"ballplate {options.command}"
     return (

@@ -1,6 +1,5 @@
-"""The rank of every design in some files; one that cannot be used does not keep the others from
-being checked.
-"""
+"""Rank of every design in several files; a file that cannot be used does not prevent the check
+of the others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands share: experiments of the files named, and JSON."""
+"""Common parts of the commands: experiments of the files named, and JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words for a computation that found no memory."""
+"""Messages for a computation that runs out of memory."""
 
 from __future__ import annotations
 

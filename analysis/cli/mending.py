@@ -84,10 +84,10 @@ def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
 def _text(path: Path) -> tuple[str, str]:
     """The byte order mark of a file, or nothing, and its text.
 
-    :raises ExperimentError: it is no file that could be changed.
+    :raises ExperimentError: it is not a file that can be changed.
     """
     if not path.is_file():
-        raise ExperimentError([Message(str(path), 0, 0, "", "is no file that could be changed")])
+        raise ExperimentError([Message(str(path), 0, 0, "", "is not a file that can be changed")])
     text = read_text(path)
     return MARK if path.read_bytes().startswith(MARK.encode()) else "", text
 

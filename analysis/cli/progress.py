@@ -1,6 +1,5 @@
-"""How far a long step has come, on standard error: a bar on a terminal, plain lines now and then
-elsewhere.
-"""
+"""Progress of a long step on standard error: a bar on a terminal, occasional plain lines
+elsewhere."""
 
 from __future__ import annotations
 

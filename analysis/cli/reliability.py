@@ -83,7 +83,8 @@ def run(options: Namespace) -> int:
 
     if options.power <= options.false_alarm:
         print(
-            "ballplate reliability: --power must be above --false-alarm; any test has that much",
+            "ballplate reliability: --power must be above --false-alarm; any test has at least"
+            " that power",
             file=sys.stderr,
         )
         return WRONG_USAGE

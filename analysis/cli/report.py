@@ -95,7 +95,7 @@ def run(options: Namespace) -> int:
 
                 text = FORMATS[form](results.title, report_tables(results))
             if not results.count("done") and not is_damaged:
-                told = f"none of its {len(results.cells)} cells is done; ballplate sweep goes on"
+                told = f"none of its {len(results.cells)} cells is done; ballplate sweep continues"
                 print(in_one_line(f"{store.path}: {told}"), file=sys.stderr)
     except StoreError as error:
         print(error, file=sys.stderr)

@@ -54,7 +54,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 def _trial_count(text: str) -> int:
     found = trial_count(text)
     if found < 2:
-        raise ArgumentTypeError(f'one data set has no scatter; ask for 2 at least, not "{text}"')
+        raise ArgumentTypeError(f'one data set has no scatter; give at least 2, not "{text}"')
     return found
 
 
@@ -67,7 +67,7 @@ def run(options: Namespace) -> int:
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
         print(
-            "ballplate run: --seed and --workers have a meaning with --trials or --until only",
+            "ballplate run: --seed and --workers go with --trials or --until only; leave them out",
             file=sys.stderr,
         )
         return WRONG_USAGE

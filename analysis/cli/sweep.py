@@ -123,7 +123,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     for remark in entered.remarks:
         print(remark, file=sys.stderr)
     options.interruption.kept = lambda: (
-        f"what is done is in {store.path}, and the same command goes on from there"
+        f"finished cells are in {store.path}, and the same command continues from there"
     )
     try:
         with progress(options) as shown:
@@ -140,7 +140,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
             options.interruption.answer()
     except ChangedError:
         text = (
-            "the files of the sweep have been changed while it ran; what is done is stored, start"
+            "the files of the sweep were changed while it ran; finished cells are stored; start"
             " it again"
         )
         print(in_one_line(f"{options.file}: {text}"), file=sys.stderr)

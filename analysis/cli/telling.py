@@ -1,6 +1,4 @@
-"""How much a command tells on standard error beside errors and warnings: options that all commands
-have.
-"""
+"""Options of all commands for the amount of notes on standard error."""
 
 from __future__ import annotations
 

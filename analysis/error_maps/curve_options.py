@@ -1,4 +1,4 @@
-"""What is asked for of an error curve, as texts with units, and what comes of it."""
+"""Options of an error curve, as texts with units, and the fitted curve."""
 
 from __future__ import annotations
 

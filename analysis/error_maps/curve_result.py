@@ -94,7 +94,7 @@ class FittedCurve(Result):
 
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else, or there is no profile.
-        :raises ExperimentError: two neighbouring points stand at the same place.
+        :raises ExperimentError: two neighbouring points are at the same place.
         """
         if self.everything.places is None:
             raise ValueError("bars need a profile, of the columns nominal_x_mm and nominal_z_mm")

@@ -1,6 +1,5 @@
-"""An error curve through measured points: a spline with what is prescribed for it, and how well it
-is known.
-"""
+"""Error curve through measured points: a spline with prescribed values and slopes, and its
+uncertainty."""
 
 from __future__ import annotations
 
@@ -118,7 +117,8 @@ def fit_curve(
         raise SplineError(
             [
                 SplineProblem(
-                    "all points are at {0}, where there is no curve; give points at several",
+                    "all points are at {0}, which defines no curve; give points at several"
+                    " abscissae",
                     (lower,),
                 )
             ]
@@ -153,10 +153,7 @@ def fit_curve(
     if stated is None and uncertainty is not None:
         stated = np.full(len(x), uncertainty)
     if stated is None and sigma == "given":
-        text = (
-            "no uncertainty is given that could be believed; add a column such as u_um, or give"
-            " --uncertainty"
-        )
+        text = "no uncertainties are stated; add a column such as u_um, or give --uncertainty"
         raise SplineError([SplineProblem(text)])
     fitted = fit(space, x, points.y, stated, constraints)
     is_estimated = (sigma or ("estimated" if stated is None else "given")) == "estimated"
@@ -231,7 +228,7 @@ def _located(
     if points.x is not None:
         if nominal or any(isinstance(end, tuple) for end in ends):
             text = (
-                "nominal co-ordinates tell a place on the profile, but the abscissa is"
+                "nominal co-ordinates define a place on the profile, but the abscissa is"
                 f" {points.x_column.words}"
             )
             raise SplineError(
@@ -336,7 +333,7 @@ def _refuse_coincident(places: Array) -> None:
     """
     same = [
         SplineProblem(
-            "two neighbouring points stand at ({0}, {1}); leave one of them out", tuple(one)
+            "two neighbouring points are at ({0}, {1}); leave one of them out", tuple(one)
         )
         for one, two in pairwise(places.tolist())
         if one == two

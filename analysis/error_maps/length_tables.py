@@ -106,8 +106,8 @@ def _lines(lengths: LengthMap) -> list[str]:
         )
     elif lengths.deficiency:
         lines.append(
-            "what is undetermined changes none of these lengths; those of another --grid it may"
-            " change"
+            "undetermined directions change none of these lengths, but may change those of another"
+            " --grid"
         )
     if lengths.worst is not None:
         i, j = lengths.worst

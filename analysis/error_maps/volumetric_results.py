@@ -177,7 +177,7 @@ class ErrorAlongAxis(MachineErrors):
 
 
 Line = Mapping[str, float] | Sequence[Sequence[float]]
-"""The places in metres of the two axes that stand still, by their names, or two points."""
+"""The places in metres of the two fixed axes, by their names, or two points."""
 
 
 def parse_places(text: str) -> Line:
@@ -196,7 +196,7 @@ def parse_places(text: str) -> Line:
         return ends
     found = parse_line(text)
     if len(found) != 2:
-        raise ValueError("two axes stand still on a line; write for example y = 600 mm, z = 600 mm")
+        raise ValueError("a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm")
     return found
 
 

@@ -18,9 +18,11 @@ from ..presentation.formatting import SHOWN, aligned, number
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = (
-    "errors are where the tip is, less where the scales say: corrections, to be added to readings"
+    "errors are the tip's position less that of the scales: corrections, to be added to readings"
 )
-RANDOM = "random: one standard deviation; what each approach draws and what lasts, in quadrature"
+RANDOM = (
+    "random: one standard deviation; parts new at each approach and lasting ones, in quadrature"
+)
 
 
 def machine_lines(built: Volumetric) -> list[str]:

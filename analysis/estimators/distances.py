@@ -82,7 +82,7 @@ class AlternativeFit(FitResult):
         if not self.converged:
             return f"the estimate has {self.solution.status}; see the record of iterations"
         count = self.solution.deficiency
-        return f"rank deficiency {count}: what is undetermined is left out" if count else ""
+        return f"rank deficiency {count}: undetermined parameters are left out" if count else ""
 
     def headline(self) -> str:
         count = self.solution.deficiency
@@ -249,8 +249,8 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         )
     elif as_drawn(design).deficiency:
         text = (
-            "the design leaves errors open, and then estimates differ by what they hold; see"
-            " ballplate check"
+            "the design leaves errors undetermined, so that estimates differ by what they hold"
+            " fixed; see ballplate check"
         )
     if text:
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
@@ -424,8 +424,8 @@ def _fit_lines(fit: AlternativeFit) -> list[str]:
         f"estimator {fit.solution.estimator}: {used}, {fit.solution.observations} terms; {rank}",
         (
             f"{fit.solution.status} after {len(record) - 1} iterations; S^2 ="
-            f" {record[-1].sum_of_squares:.6g} (its terms are not independent, so that it estimates"
-            " no sigma and the values have no uncertainty here)"
+            f" {record[-1].sum_of_squares:.6g} (its terms are not independent, so that no sigma"
+            " is estimated and no uncertainties are given here)"
         ),
         "",
     ]

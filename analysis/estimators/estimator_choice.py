@@ -1,4 +1,4 @@
-"""The estimators of readings by name, and what each of them takes beside the readings.
+"""The estimators by name, and the options of each.
 
 What computes is loaded where it is used, so that the names are at hand at once.
 """

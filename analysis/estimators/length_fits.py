@@ -183,9 +183,9 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
     """What should be known beside the figures."""
     remarks = []
     if len(design.plate_readings):
-        remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
+        remarks.append(f"{estimator} ignores plates and calibrated co-ordinates")
     if len(design.priors):
-        remarks.append(f"{estimator} takes no notice of priors")
+        remarks.append(f"{estimator} ignores priors")
     if design.probes.free.any():
         remarks.append(
             f"{estimator} takes the probes' offsets as the file states them, though they are"
@@ -198,16 +198,17 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
         )
     if design.lengths.free is not None and (design.lengths.free >= 0).all():
         remarks.append(
-            "no length is known: scales are told against one another, and the overall scale stays"
-            " open"
+            "no length is known: ratios of scales are determined, but the overall scale is not"
         )
     if estimator == "sphere-then-metric" and len(design.gauge_positions):
         remarks.append(
-            "the pivot is the centre of a sphere, as if the machine were right: the errors that it"
-            " takes up are missing; see length-equations, or the full estimator"
+            "the pivot is the centre of a sphere, as if the machine had no errors: those that"
+            " it absorbs are missing; see length-equations, or the full estimator"
         )
     if not np.isfinite(solution.scatter):
-        remarks.append("there are no more equations than unknowns, and hence no uncertainties")
+        remarks.append(
+            "there are no more equations than unknowns, so that no uncertainties can be estimated"
+        )
     instead = "the full estimator with --sigma given takes the uncertainties as stated"
     doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
     remarks += [doubt] if doubt else []

@@ -121,7 +121,7 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
 
     if not isinstance(experiment.error_model, MetricSettings):
         kind = experiment.error_model.kind
-        text = 'the reversal is about a machine of kind "metric" in two dimensions'
+        text = 'the reversal needs a machine of kind "metric" in two dimensions'
         solid = experiment.dimension == 3
         remedy = "write metric" + (
             " and leave z out of the volume and of all places" if solid else ""
@@ -130,11 +130,11 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
             ("error_model", "kind"), f'{text}, not "{kind}"{" in three" if solid else ""}; {remedy}'
         )
     elif experiment.dimension != 2:
-        say(("machine", "volume"), "the reversal is about two dimensions, not three; leave z out")
+        say(("machine", "volume"), "the reversal needs two dimensions, not three; leave z out")
     elif scale not in (None, experiment.error_model.plane_scale) and experiment.priors:
         say(
             ("priors",),
-            f"priors are about the file's error model; write scale: {scale} there instead of"
+            f"priors refer to the file's error model; write scale: {scale} there instead of"
             " --scale",
         )
     if len(experiment.artefacts) != 1:

@@ -1,3 +1,2 @@
-"""Reliability in the sense of Baarda: which biases of the observations would be noticed, and what
-the others do.
-"""
+"""Reliability in the sense of Baarda: biases of observations that a test finds, and the effects
+of those that it does not find."""

@@ -1,6 +1,4 @@
-"""What a bias that nobody notices changes in the quantities that do not depend on the frame, at the
-most.
-"""
+"""Largest effects of an undetected bias on the quantities that do not depend on the frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Events as groups of patterns: one cause in whatever direction."""
+"""Events as groups of patterns: one cause in any direction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the estimate, and suspects taken out of it, leave of residuals and of biases."""
+"""Residuals and biases that remain after the estimate and the removal of suspects."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""What may be wrong with observations: a single one, or an event that touches many, each as a
-pattern over all rows.
+"""Possible errors of observations, single ones and events, each as a pattern over all rows.
 
 A pattern is what one unit of the bias changes in the whitened residuals. Single observations come
 first, in the order of their rows; the events after them.

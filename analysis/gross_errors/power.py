@@ -1,6 +1,4 @@
-"""How large a bias must be, in standard deviations, for a two-sided test to find it with a stated
-power.
-"""
+"""Size of a bias, in standard deviations, that a two-sided test finds with a stated power."""
 
 from __future__ import annotations
 

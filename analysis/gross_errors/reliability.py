@@ -100,8 +100,7 @@ class Reliability(Result):
         observations = self.design.observations
         mean = (float(self.redundancy.sum()) + self.among_repeats) / observations
         return (
-            f"redundancy {mean:.3g} of an observation on average; {len(self.patterns)} biases"
-            " judged"
+            f"redundancy {mean:.3g} per observation on average; {len(self.patterns)} biases judged"
         )
 
     def lines(self, with_all: bool = False) -> list[str]:
@@ -134,7 +133,7 @@ class Reliability(Result):
         """
         readings = self.patterns.of_kind("reading")
         if not len(readings):
-            raise ValueError("no readings of plates are judged, so that there is nothing to draw")
+            raise ValueError("no readings of plates are tested, so that there is nothing to draw")
         design = self.design
         position = design.readings.position[self.patterns.subject[readings]]
         panels = [
@@ -214,7 +213,7 @@ def _heading(result: Reliability) -> list[str]:
         f"{result.label}: {result.title}",
         (
             f"{rank}; {design.parameter_count} parameters, {count} observations; redundancy"
-            f" {number(total)} in all, {number(total / count, 3)} of an observation on average"
+            f" {number(total)} in total, {number(total / count, 3)} per observation on average"
         ),
         (
             "MDB: minimal detectable bias, found with a power of"
@@ -227,8 +226,8 @@ def _heading(result: Reliability) -> list[str]:
             f"{number(result.fit_noncentrality)} standard deviations"
         ),
         (
-            f"effects: the most that a bias of the size of the MDB changes in {listed(effects)},"
-            " with the standard uncertainty there in brackets"
+            f"effects: the largest change that a bias of the size of the MDB causes in"
+            f" {listed(effects)}, with the standard uncertainty there in brackets"
         ),
     ]
     if result.among_repeats:
@@ -377,9 +376,7 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     harmless = [k for k in hidden if result.is_harmless(k)]
     if harmless:
         told = _listed(name(result.patterns, k) for k in harmless)
-        which = (
-            "no distance that is determined changes" if result.deficiency else "no distance changes"
-        )
+        which = "it changes no determined distance" if result.deficiency else "no distance changes"
         lines.append(
             f"cannot be detected, harmless: {told}: {which}, between balls or corrected points"
         )

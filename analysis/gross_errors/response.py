@@ -1,4 +1,4 @@
-"""What patterns change in the estimate, and what of them is left in the residuals."""
+"""Effects of patterns on the estimate and on the residuals."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Smooth errors: what residuals look like when the error model lacks something, or when something
-drifts.
-"""
+"""Smooth errors: patterns of residuals for an incomplete error model or a drift."""
 
 from __future__ import annotations
 

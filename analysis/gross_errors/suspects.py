@@ -1,6 +1,5 @@
-"""What the residuals of a fit make suspect: observations, events, the scatter of some readings, or
-the model.
-"""
+"""Suspected causes of a fit's residuals: observations, events, the scatter of some readings, or
+the model."""
 
 from __future__ import annotations
 

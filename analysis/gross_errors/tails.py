@@ -1,6 +1,5 @@
-"""Chances of large sums of squares, as logarithms: those of gross mistakes are too small for a
-number.
-"""
+"""Logarithms of the tail probabilities of sums of squares, which may be too small for a
+floating-point number."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def suspect_words(suspect: Suspect, marks: Sequence[Mark] = ()) -> str:
         *(_cause_name(suspect.patterns, columns) for columns in suspect.alternatives),
         *suspect.of_model,
     ]
-    told = f"; it cannot be told from {listing(others)}" if others else ""
+    told = f"; it cannot be distinguished from {listing(others)}" if others else ""
     return f"{what} {_significance(suspect)}{told}; {cure}"
 
 
@@ -65,12 +65,12 @@ def scatter_words(scatter: MoreScatter) -> str:
 def unexplained_words(unexplained: Unexplained) -> str:
     """That no single mistake explains the residuals, and what may."""
     best = (
-        f"what explains most is {unexplained.words} {_significance(unexplained)}"
+        f"the best explanation is {unexplained.words} {_significance(unexplained)}"
         if unexplained.words
         else f"{_significance(unexplained)[1:-1]}"
     )
     return (
-        "the error model, a drift or the noise, for no single mistake explains the residuals,"
+        "the error model, a drift or the noise: no single mistake explains the residuals,"
         f" which are {number(unexplained.times, 3)} times as large as stated; {best}; try a"
         f" richer error model{', or larger uncertainties' if unexplained.too_large else ''}"
     )
@@ -151,7 +151,7 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         if len(suspect.columns) > 1:
             sizes = _sizes(suspect, "too high")
             told = f"offset of probe {design.probes.names[subject]} stated {sizes}"
-        return told, "qualify the probe again, or let its offset be estimated"
+        return told, "qualify the probe again, or estimate its offset"
     place = design.positions.names[subject] if kind in ("shift", "turn", "expansion") else ""
     if kind in ("ball", "moved"):
         ball = design.ball_label(int(design.readings.ball[subject]))
@@ -165,7 +165,7 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         )
         return (
             told,
-            "look whether it is loose, dirty or another one; from there on it is a ball of its own",
+            "check whether it is loose, dirty or replaced; it counts as another ball from there on",
         )
     artefact = design.artefacts.names[design.positions.artefact[subject]]
     if kind in ("shift", "turn"):

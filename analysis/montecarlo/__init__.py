@@ -1,1 +1,1 @@
-"""What repeated estimates of synthetic readings tell beside the linearised uncertainties."""
+"""Monte Carlo: repeated estimates of synthetic readings beside the linearised uncertainties."""

@@ -1,5 +1,4 @@
-"""Running sums over replicates, and the figures that they come to, each with its own standard
-error.
+"""Running sums over replicates, and the resulting figures, each with its standard error.
 
 A replicate's errors in one quantity, say all distances of U5, are far from independent of one
 another; replicates are. Each figure is therefore a mean over replicates of one number for each, and

@@ -91,7 +91,7 @@ def trials_lines(done: Trials) -> list[str]:
     sampled = [symbol for symbol, one in outcome.comparisons.items() if one.sampled]
     if sampled:
         count = outcome.comparisons[sampled[0]].count
-        lines.append(f"of {' and '.join(sampled)} a sample of {count} distances is followed")
+        lines.append(f"{' and '.join(sampled)} for a sample of {count} distances")
     if any(one.flags for one in outcome.comparisons.values()):
         lines.append(f"<- differs from linear theory by more than {BEYOND:g} standard errors")
     if outcome.failed:
@@ -127,7 +127,7 @@ def _misfit_lines(done: Trials, outcome: MonteCarloOutcome) -> list[str]:
         "",
         ("Too optimistic? " if too_optimistic else "")
         + "The fitted model cannot follow the true machine exactly.",
-        f"actual errors are, as root mean squares, in units of those predicted: {', '.join(ratios)}"
+        f"ratios of actual to predicted errors, as root mean squares: {', '.join(ratios)}"
         + ("" if too_optimistic else f"; none is above 1 by more than {BEYOND:g} standard errors"),
         (
             f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2"

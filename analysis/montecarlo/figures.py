@@ -1,6 +1,5 @@
-"""What replicates come to: bias, spread and coverage beside the linearised uncertainties, with
-standard errors.
-"""
+"""Results of replicates: bias, spread and coverage beside the linearised uncertainties, with
+standard errors."""
 
 from __future__ import annotations
 

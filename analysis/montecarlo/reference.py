@@ -1,6 +1,5 @@
-"""What all replicates share: the readings without noise, the estimate from them and one
-factorisation there.
-"""
+"""Common parts of all replicates: the readings without noise, the estimate from them and its
+factorisation."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What is compared between replicates and the truth: the quantities behind U1 to U6, one vector
-each.
-"""
+"""Quantities compared between replicates and the truth: those behind U1 to U6, one vector each."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""Runs replicates, on one processor or on several, until there are enough, and sums them up in
-order.
-"""
+"""Computation of replicates, on one processor or several, until there are enough, summed in
+order."""
 
 from __future__ import annotations
 

@@ -1,3 +1,1 @@
-"""What is to be read: positions chosen from a pool, the order to read them in, the design as a
-file, and its repair.
-"""
+"""Planning: positions chosen from a pool, their order, the design as a file, and its repair."""

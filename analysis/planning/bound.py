@@ -1,5 +1,4 @@
-"""What no selection can do better than: the convex relaxation in which candidates may count in
-part.
+"""Bound of all selections: the convex relaxation in which candidates may count in part.
 
 The reciprocal square of the criterion is a concave function of the information, which is linear in
 the weights of candidates. Its tangent at any weights is a linear function that no selection

@@ -1,6 +1,5 @@
-"""The plan of a campaign: what to choose from a pool, how near it is to the best possible, what
-each choice gains.
-"""
+"""Plan of a campaign: the choice from a pool, its distance from the bound, and the gain of each
+candidate."""
 
 from __future__ import annotations
 
@@ -80,7 +79,7 @@ def campaign(
         raise _impossible(
             experiment,
             "pool",
-            "missing; add candidates to choose from, or see what check --suggest tells",
+            "missing; add candidates to choose from, or see check --suggest",
         )
     refuse_many_points(experiment, request.criterion)
     offered = offered or offer(pool)
@@ -251,7 +250,7 @@ def _refuse_lacking(
     """Refuse a choice without what every choice needs."""
     for plate, others in begun.items():
         if set(others).isdisjoint(best.chosen):
-            text = f'"{plate}" was begun, and no position of its other balls can be read with'
+            text = f'"{plate}" was begun, but no position of its other balls can be read with'
             raise _impossible(
                 experiment, "pool", f"{text} {problem.constraints.budget}; allow more"
             )
@@ -267,7 +266,9 @@ def _refuse_lacking(
     ]
     if missing:
         names, name = listing(f'"{one}"' for one in missing), problem.criterion.name
-        text = f"{name} takes in the distances of {names}, of which no position can be read with "
+        text = (
+            f"{name} includes the distances of {names}, but no position of these can be read with "
+        )
         text += (
             f"{problem.constraints.budget}; allow more, keep one, or take the artefact out of the"
             " pool"
@@ -283,7 +284,7 @@ def _as_drawn(
         raise _impossible(
             experiment,
             "positions",
-            "there are none to take the budget from; say --hours, or --positions",
+            "there are none to take the budget from; give --hours or --positions",
         )
     return free.spent(reference).budget
 

@@ -1,5 +1,4 @@
-"""In which order positions cost least change-over: planes, artefacts and probes are changed as
-seldom as possible.
+"""Order of positions with the least change-over of planes, artefacts and probes.
 
 Going on to another plane or artefact takes `ChangeTimes.plane`; if the last probe of a position is
 not the first of the next, `ChangeTimes.probe` comes on top. The probes of a position are read one

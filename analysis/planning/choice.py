@@ -1,4 +1,4 @@
-"""A choice of positions and certificates: what was chosen, and what each gains."""
+"""Choice of positions and certificates, and the gain of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a selection may cost and contain."""
+"""Limits on the cost and the contents of a selection."""
 
 from __future__ import annotations
 

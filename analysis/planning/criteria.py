@@ -1,4 +1,4 @@
-"""What a plan makes small: uncertainties that do not depend on the frame.
+"""Criteria that a plan minimises: uncertainties that do not depend on the frame.
 
 Every criterion is a standard uncertainty, or a mean or a largest of some, and falls with the root
 of the information: all of it fourfold makes it half. The reciprocal of its square is then a concave
@@ -106,7 +106,7 @@ class Criterion:
     `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded`
     counts functions that the pool leaves open, whatever is chosen. `functions` are None of criteria
     that are about eigenvalues; these are of the model's parameters, `scaled` (n, z), in metres.
-    `target` is the criterion at which the target uncertainty is met on the average, None where
+    `target` is the criterion at which the target uncertainty is met on average, None where
     there is none. `needed` holds, for each artefact whose own distances count, its name and the
     candidates that place it: without one of them the distances are undetermined, whatever
     certificates say of them.
@@ -443,7 +443,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         model = slice(0, len(drawn.design.model.parameters))
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
         if not kept.all():
-            text = f"{name} takes in parameters that even all candidates leave undetermined"
+            text = f"{name} includes parameters that even all candidates leave undetermined"
             raise refused(experiment.source, text, "pool")
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
@@ -463,7 +463,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         if not functions.count:
             left = "no selection determines any of it; offer other candidates"
             lacks = left if functions.excluded else f"the experiment has no {kind.needs}"
-            text = f"{name} has nothing to make small: {lacks}"
+            text = f"{name} has nothing to minimise: {lacks}"
             raise refused(experiment.source, text, "pool")
     excluded = 0 if functions is None else functions.excluded
     target = _target(experiment, name, functions)

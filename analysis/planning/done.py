@@ -1,4 +1,4 @@
-"""Positions that have been read already, in full or in part, as a file of readings tells."""
+"""Positions that have been read already, in full or in part, according to a file of readings."""
 
 from __future__ import annotations
 

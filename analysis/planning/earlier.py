@@ -1,4 +1,4 @@
-"""A design that was chosen from the same pool before, found again among its candidates."""
+"""Identification of a design that was chosen earlier from the same pool."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
     unknown = [position.name for position in chosen.positions if position.name not in places]
     if unknown:
         raise ExperimentError(
-            message(f'"{name}" is no candidate of the pool; {hint(name, places)}')
+            message(f'"{name}" is not a candidate of the pool; {hint(name, places)}')
             for name in unknown
         )
     moved = [
@@ -47,7 +47,7 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
         if not _same_place(one, candidates[places[one.name]].item)
     ]
     if moved:
-        told = "stands elsewhere, or of another artefact, in the pool; give it another name"
+        told = "is elsewhere, or of another artefact, in the pool; give it another name"
         raise ExperimentError(message(f'"{name}" {told}') for name in moved)
     found = [_now(offered, places[position.name], position) for position in chosen.positions]
     for k, candidate in enumerate(candidates):

@@ -1,5 +1,4 @@
-"""The chosen design as an experiment file of its own: what its source says, with other positions
-and no pool.
+"""The chosen design as an experiment file of its own, without a pool.
 
 Sections that stay as they are keep their text and comments. What is composed is read again and
 compared with what it should say, so that a file of unusual form is written anew as a whole, rather

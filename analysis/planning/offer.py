@@ -1,4 +1,4 @@
-"""What a plan may choose from when a campaign goes on: candidates, what is done, and interrupted
+"""Candidates for the continuation of a campaign: those left, those done, and interrupted
 positions.
 
 A position that was interrupted is offered twice: for completion, as long as the artefact stands

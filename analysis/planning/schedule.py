@@ -1,6 +1,4 @@
-"""Times of a campaign: the order that costs least change-over, and the run sheet that says what is
-done when.
-"""
+"""Schedule of a campaign: the order with the least change-over, and the run sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A selection of positions and certificates as it is told."""
+"""A selection of positions and certificates as text."""
 
 from __future__ import annotations
 
@@ -128,8 +128,8 @@ def _lines(campaign: Campaign) -> list[str]:
     ]
     if not campaign.is_determined:
         lines.append(
-            "no choice was found that determines everything; below is what the nearest one leaves"
-            " open"
+            "no choice was found that determines everything; what the nearest one leaves"
+            " undetermined follows"
         )
     elif math.isnan(campaign.bound):
         lines.append(f"there is no bound of {campaign.criterion}")
@@ -172,13 +172,13 @@ def _interrupted(campaign: Campaign) -> list[str]:
     if campaign.left_open:
         count = "one direction" if campaign.left_open == 1 else f"{campaign.left_open} directions"
         lines.append(
-            f"too little was read there to determine {count} of where it stood; nothing else"
+            f"too little was read there to determine {count} of its pose; nothing else"
             " depends on that"
         )
     for one in campaign.ignored:
         lines.append(
-            f"{one.name} is left out: nothing else worth its time reads the other balls of"
-            f" {one.item.artefact}; take its readings out of the file"
+            f"{one.name} is left out: nothing else that is worth its time reads the other balls of"
+            f" {one.item.artefact}; delete its readings from the file"
         )
     return lines
 

@@ -68,7 +68,7 @@ def summary(sheet: RunSheet) -> str:
     )
     text = f"{', '.join(words)}: {sheet.hours:.2f} h"
     change = sum(step.change_seconds for step in todo)
-    text += f", of which change-over {change / 3600.0:.2f} h" if change else ""
+    text += f", including change-over {change / 3600.0:.2f} h" if change else ""
     return f"{text}; {_count(done, 'position')} done before" if done else text
 
 

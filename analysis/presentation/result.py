@@ -168,7 +168,7 @@ class FitResult(Result):
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or there are no residuals to be drawn.
+        :raises ValueError: the path ends in something else, or there are no residuals to draw.
         """
         raise ValueError("residuals are drawn by the full estimator and reversal only")
 

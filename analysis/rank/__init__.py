@@ -1,1 +1,1 @@
-"""What a design leaves undetermined, and in which words."""
+"""Null directions of a design, and their description in words."""

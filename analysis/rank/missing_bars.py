@@ -1,5 +1,5 @@
-"""Why bars and gauges leave a machine's scales or squareness open: directions that are missing,
-lengths not known.
+"""Reasons why bars and gauges leave scales or squareness undetermined: missing directions,
+unknown lengths.
 
 A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S
 u: a sum of the six products of its direction cosines. From a Bryan gauge comes the same less what a
@@ -36,15 +36,15 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     if is_free:
         names = " and ".join(design.unknown_lengths.names)
         found.append(
-            f"no length is known ({names}): the overall scale of the machine stays open until one"
-            " is calibrated"
+            f"no length is known ({names}): the overall scale of the machine is undetermined"
+            " until one is calibrated"
         )
     left = _less(strains, overall) if is_free else strains
     missing = _what_is_missing(design, strains, left) if left.shape[1] else ""
     if missing:
         told = _told(strains, design.dimension, is_free)
         cure = bars_to_add(design, strains, overall if is_free else None)
-        found.append(f"{missing}: nothing tells {told}{f'; {cure}' if cure else ''}")
+        found.append(f"{missing}: nothing determines {told}{f'; {cure}' if cure else ''}")
     return tuple(found)
 
 
@@ -119,7 +119,7 @@ def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
             who = "every direction of the bar" if given.to_pivot.any() else "every bar"
             return f"{who} {_quadric(form - values.mean() * np.eye(d))}"
     who = "places of the ball" if only_gauges else "bars' directions"
-    return f"the {who} are too few or too much alike"
+    return f"the {who} are too few or too similar"
 
 
 def _quadric(form: Array) -> str:

@@ -1,6 +1,5 @@
-"""Bars, and places of a Bryan gauge, that would tell what others leave open: the smallest set of
-natural ones.
-"""
+"""Bars and places of a Bryan gauge that would determine what is undetermined: the smallest set
+of natural ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a design cannot determine, in the names of errors, balls and positions.
+"""Rank report of a design: null directions in the names of errors, balls and positions.
 
 A null direction is a change of parameters that no observation notices. It is told as what trades
 against what: error functions with their size and shape, the deformation of the artefact, the motion

@@ -46,7 +46,7 @@ def experiments(
         try:
             source = unpack(bundle, Path(folder))
         except ValueError as error:
-            raise NoExperimentError(f"the store is not to be trusted: {error}") from None
+            raise NoExperimentError(f"the store cannot be trusted: {error}") from None
         except OSError as error:
             raise NoExperimentError(
                 f"the store's files cannot be unpacked ({error.strerror})"

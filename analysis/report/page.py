@@ -232,7 +232,7 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
     if len(drawn.places) > MOST_NAMES:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
-        caption += " Of many balls only some are drawn."
+        caption += " Only some of the balls are drawn."
     has_offsets = any(tip.any() for _, tip in drawn.tips)
     probes = (
         probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}")

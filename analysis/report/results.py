@@ -1,4 +1,4 @@
-"""What a report tells of: a sweep of a store with its axes, figures and texts."""
+"""Contents of a report: a sweep of a store with its axes, figures and texts."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""What the plots of a report show: an uncertainty along a swept axis, for each setting of the other
-axes.
-"""
+"""Data of a report's plots: an uncertainty along a swept axis, for each setting of the other
+axes."""
 
 from __future__ import annotations
 

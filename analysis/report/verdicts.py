@@ -1,4 +1,4 @@
-"""What was told of the cells in words: rank, weak directions, flags of Monte Carlo, failures."""
+"""Statements on cells: rank, weak directions, flags of Monte Carlo, failures."""
 
 from __future__ import annotations
 

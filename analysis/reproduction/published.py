@@ -1,6 +1,5 @@
-"""What a document states, as data: figures, ranks, remarks, errata, and the assumptions that a
-comparison rests on.
-"""
+"""Statements of a document as data: figures, ranks, remarks, errata, and the assumptions of a
+comparison."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many digits of certified answers a program finds.
+"""Score of a program: the number of correct digits of certified answers.
 
 An uncertainty or a sum of squares v with the certified value c has -log10(|v - c| / |c|) digits.
 Estimates are judged against their own uncertainty, which is what matters of them: the largest error

@@ -1,5 +1,4 @@
-"""What a mechanic would change on a machine of straight axes: scales, and the directions of
-guideways.
+"""Mechanical adjustments of a machine of straight axes: scales, and the directions of guideways.
 
 Readings that are too short have a positive scale error. A squareness error is the turn that a
 guideway has suffered about the positive axis in its name, so that the adjustment turns it back.

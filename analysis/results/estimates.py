@@ -1,6 +1,5 @@
-"""What a fit estimates, as functions of its parameters: names, values, uncertainties and
-covariances.
-"""
+"""Estimates of a fit as functions of its parameters: names, values, uncertainties and
+covariances."""
 
 from __future__ import annotations
 

@@ -214,9 +214,7 @@ class Fit(FitResult):
         :raises ValueError: the estimate has not converged.
         """
         if self.estimated is None:
-            raise ValueError(
-                f"the estimate has {self.solution.status}; nothing is known of its uncertainty"
-            )
+            raise ValueError(f"the estimate has {self.solution.status}; its uncertainty is unknown")
         return self.estimated
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
@@ -313,7 +311,7 @@ class Fit(FitResult):
                 if self.converged
                 else f"the estimate has {self.solution.status}"
             )
-            raise ValueError(f"there are no residuals to be drawn: {why}")
+            raise ValueError(f"there are no residuals to draw: {why}")
         if design.dimension == 2:
             return draw_vectors(vectors, self.title, path)
         view, towards = projection(3)
@@ -331,10 +329,10 @@ class Fit(FitResult):
             times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
             cure = (
                 "no single mistake explains that: try a richer error model or larger uncertainties,"
-                " and think of drifts"
+                " and consider drifts"
             )
             if self.diagnosis.suspects or self.diagnosis.scatter:
-                cure = "look at what is suspected"
+                cure = "see what is suspected"
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
@@ -351,7 +349,7 @@ class Fit(FitResult):
         if self.converged:
             return self.verdict.complaint
         return (
-            f"the estimate has {self.solution.status} and nothing is made of it: see the record of"
+            f"the estimate has {self.solution.status}; no results are reported: see the record of"
             " iterations, and look for wrong units, balls or probes among the readings"
         )
 

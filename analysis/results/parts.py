@@ -130,7 +130,7 @@ def verdict_lines(
     values = judged.singular_values
     if len(values) and with_values:
         rank_of = len(values) - judged.deficiency
-        text = "no singular value counts"
+        text = "no singular value is above rounding"
         if rank_of:
             largest, smallest = printable(values[0]), printable(values[rank_of - 1])
             text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
@@ -152,7 +152,7 @@ def _lengths_words(lengths: Quantity) -> str:
     # Beside a share that is of an expanded uncertainty, it has to be said what this is.
     symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
     words = (
-        f"{symbol} {number(1e6 * lengths.average)} um on the average,"
+        f"{symbol} {number(1e6 * lengths.average)} um on average,"
         f" {number(1e6 * lengths.maximum)} um at most"
     )
     open_ = (
@@ -184,7 +184,7 @@ def scale_lines(scale: Scale | None) -> list[str]:
         return []
     if all(one.without is None for one in scale.carriers):
         # How well the other parameters are known says nothing of how right the scales are.
-        return [f"scale is that of {' and '.join(one.words for one in scale.carriers)}"]
+        return [f"scale comes from {' and '.join(one.words for one in scale.carriers)}"]
     told = []
     for one in scale.carriers:
         if one.without is None:
@@ -205,8 +205,8 @@ def scale_lines(scale: Scale | None) -> list[str]:
         )
         warning += (
             f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but"
-            f" one, U6 would be {average} um on the average and {most} um at most instead of"
-            f" {before} um on the average"
+            f" one, U6 would be {average} um on average and {most} um at most instead of"
+            f" {before} um on average"
         )
     return [
         *lines,
@@ -286,10 +286,7 @@ def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
         )
     return [
         *aligned(rows, [False, True, True, True, False, False]),
-        (
-            "(a scale is off by what readings lack of the true length; an angle by what it exceeds"
-            " 90 deg)"
-        ),
+        ("(errors of scales: true length less reading; errors of angles: excess over 90 deg)"),
     ]
 
 

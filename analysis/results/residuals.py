@@ -1,4 +1,4 @@
-"""What readings differ by from the estimate."""
+"""Residuals: differences of the readings from the estimate."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What the commands do, without a terminal: check a design, predict its uncertainties, fit readings
-to it.
-"""
+"""The work of the commands without a terminal: check, prediction and fit of a design."""
 
 from __future__ import annotations
 

@@ -1,3 +1,1 @@
-"""Families of experiments: what varies, the store of what came out, and the work spread over
-processes.
-"""
+"""Families of experiments: their axes, the store of results, and the distribution of the work."""

@@ -45,7 +45,7 @@ def read_axis(
         known = "values, from … to …, together, subsets or variants"
         problems.add(
             here,
-            f"{'nothing says' if not given else 'too much says'} what it varies; give one of"
+            f"{'does not say' if not given else 'says more than once'} what it varies; give one of"
             f" {known}",
         )
         return None
@@ -63,7 +63,7 @@ def read_axis(
     twice = next((one for one, times in counts.items() if times > 1), None)
     if twice is not None:
         problems.add(
-            here, f'has the value "{twice}" twice; take one away, or name the values differently'
+            here, f'has the value "{twice}" twice; remove one, or name the values differently'
         )
         return None
     _check_paths(here, choices, trees, problems)
@@ -158,7 +158,7 @@ def _variant_choices(
     names = [name for name in trees if name is not None]
     chosen = list(settings.variants or ()) if settings.variants != "all" else names
     if not names:
-        problems.add((*here, "variants"), "the base file has no variants; take this axis away")
+        problems.add((*here, "variants"), "the base file has no variants; remove this axis")
         return []
     for k, name in enumerate(chosen):
         if name not in names:
@@ -219,7 +219,7 @@ def _subset_choices(
     names = entry_names(place) if place is not None else None
     if names is None or not isinstance(place, Sequence):
         problems.add(
-            (*here, "path"), "leads to no list of entries with names; write for example positions"
+            (*here, "path"), "is not a list of entries with names; write for example positions"
         )
         return []
     before = len(problems.messages)

@@ -1,4 +1,4 @@
-"""Runs tasks of a sweep on a dask.distributed cluster; workers may come and go."""
+"""Execution of a sweep's tasks on a dask.distributed cluster; workers may come and go."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ PATIENCE = 30.0
 LOGGERS = ("distributed", "tornado", "asyncio")
 
 RESTART = (
-    "install the same wherever a worker runs; what is done is stored, and the same command goes on"
-    " from there"
+    "install the same wherever a worker runs; finished cells are stored, and the same command"
+    " continues from there"
 )
 
 
@@ -72,7 +72,9 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     try:
         get_address_host_port(address)
     except ValueError:
-        text = f"{address}: is no address of a scheduler; give one such as tcp://127.0.0.1:8786"
+        text = (
+            f"{address}: is not the address of a scheduler; give one such as tcp://127.0.0.1:8786"
+        )
         raise ClusterError(text) from None
     try:
         client = Client(address, timeout=10, set_as_default=False)
@@ -96,7 +98,7 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
             else:
                 text = f"the scheduler at {address} has ended"
             raise ClusterError(
-                f"{text}; what is done is stored, and the same command goes on from there"
+                f"{text}; finished cells are stored, and the same command continues from there"
             ) from None
 
     try:

@@ -38,7 +38,7 @@ def _bound(value: object, axis: SweepAxis, otherwise: float) -> float:
         return otherwise
     number, unit = numeric(value)
     if not axis.unit:
-        raise ValueError("the values of the axis are no numbers; name those that are meant")
+        raise ValueError("the values of the axis are not numbers; name those that are meant")
     if unit != axis.unit:
         example = {"m": "300 mm", "rad": "2 arcsec", "1": "5"}[axis.unit]
         raise ValueError(

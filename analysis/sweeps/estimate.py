@@ -1,4 +1,4 @@
-"""How long a sweep will take, judged by some of its cells."""
+"""Estimate of a sweep's duration from some of its cells."""
 
 from __future__ import annotations
 

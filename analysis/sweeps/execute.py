@@ -1,4 +1,4 @@
-"""Does the tasks of a sweep that are left, and stores what comes."""
+"""Execution of the remaining tasks of a sweep, and storage of their results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loads a sweep file: its axes, its cells, or everything that is wrong with it."""
+"""Loading of a sweep file: its axes and cells, or all errors in it."""
 
 from __future__ import annotations
 

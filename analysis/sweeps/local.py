@@ -1,6 +1,5 @@
-"""Runs tasks of a sweep in processes of this machine; a process that is killed costs nothing but
-time.
-"""
+"""Execution of a sweep's tasks in processes of this machine; a process that is killed costs only
+time."""
 
 from __future__ import annotations
 

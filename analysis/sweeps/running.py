@@ -146,8 +146,8 @@ def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
     if number is None and unreadable and not beside:
         which, why = next(iter(unreadable.items()))
         text = (
-            f"what sweep {which} in it is of cannot be read ({why}); enter this one anew with"
-            " --beside, where what"
+            f"the definition of sweep {which} in it cannot be read ({why}); enter this one anew"
+            " with --beside, where what"
         )
         raise StoreError(f"{store.path}: {text} is the same is not computed again")
     if number is None and stored and has_results and not beside:

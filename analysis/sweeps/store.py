@@ -1,5 +1,4 @@
-"""The store of a sweep: one SQLite file, written by one process, that survives whatever happens to
-it.
+"""The store of a sweep: one SQLite file, written by one process, that survives interruptions.
 
 Every row is on disk before it is reported. The key of a result is the fingerprint of what was
 computed, and the replicate block; so a cell that was computed once is never computed again,
@@ -180,7 +179,7 @@ def ensure_in_place(store: Store) -> None:
             "the sweep ends here, and nothing was written to what is there now; if the store was"
             " moved, it has the "
         )
-        text += "rows computed until then, and --store goes on with it"
+        text += "rows computed until then, and --store continues with it"
         raise StoreError(f"{store.path}: {what} while the sweep ran; {text}")
 
 
@@ -281,8 +280,8 @@ def definition_of(store: Store, sweep: int) -> dict[str, Any]:
         return checked_definition(sweep, *row)
     except (sqlite3.DatabaseError, UnreadableError) as error:
         text = (
-            f"what sweep {sweep} is of cannot be read ({error}); ballplate export gives its cells"
-            " by their numbers"
+            f"the definition of sweep {sweep} cannot be read ({error}); ballplate export gives"
+            " its cells by their numbers"
         )
         raise StoreError(f"{store.path}: {text}") from None
 

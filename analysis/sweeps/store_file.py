@@ -1,5 +1,5 @@
-"""The file of a store: what it is, whether it can be used as a database, and what SQLite says of it
-in words.
+"""The file of a store: its kind, whether it can be used as a database, and SQLite's errors in
+words.
 
 A store is input like any file: it may be cut off, of another program, of a later version, or no
 file at all.
@@ -125,7 +125,7 @@ def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
         log = Path(f"{path}-wal")
         if log.exists() and log.stat().st_size > 0:
             words = (
-                f"what was written last stands in {log.name}, which cannot be read in this folder"
+                f"the latest changes are in {log.name}, which cannot be read in this folder"
                 f" ({error})"
             )
             raise StoreError(

@@ -1,6 +1,4 @@
-"""Rows of a store, read with doubt: each is checked, and of a damaged file those are found that can
-still be read.
-"""
+"""Rows of a store, each checked; of a damaged file, those that can still be read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a worker does for one cell of a sweep: rank, U1 to U6, replicates."""
+"""The task of a worker for one cell of a sweep: rank, U1 to U6, replicates."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Uncertainties of anything that the parameters determine."""
+"""Uncertainties of quantities that the parameters determine."""

@@ -1,4 +1,4 @@
-"""Standard uncertainty of the error map through the volume, and what it makes of distances."""
+"""Standard uncertainty of the error map through the volume, and of distances corrected by it."""
 
 from __future__ import annotations
 

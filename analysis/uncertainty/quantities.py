@@ -1,5 +1,5 @@
-"""The quantities whose uncertainties are told: U1 to U6 of NPL Report CISE 15/98, section 6, and
-measuring tasks.
+"""The quantities whose uncertainties are reported: U1 to U6 of NPL Report CISE 15/98, section 6,
+and measuring tasks.
 
 A new one is an entry of `QUANTITIES`: `run`, Monte Carlo, sweeps, plans, reliability, goals and
 reports read it.

@@ -1,4 +1,5 @@
-"""A result that contradicts what is proven about it: a mistake of the program, not of its input."""
+"""Error for a result that contradicts what is proven about it: a fault of the program, not of
+its input."""
 
 from __future__ import annotations
 

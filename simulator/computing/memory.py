@@ -1,4 +1,4 @@
-"""Words for a want of memory."""
+"""Messages about insufficient memory."""
 
 from __future__ import annotations
 
@@ -14,4 +14,4 @@ def want_of_memory(error: BaseException) -> str | None:
         return None
     found = WITH_SIZE.search(str(error))
     size = f": there is no room for another {found[1]}" if found else ""
-    return f"needs more memory than there is{size}"
+    return f"needs more memory than is available{size}"

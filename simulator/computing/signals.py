@@ -1,4 +1,4 @@
-"""Signals that ask a command to end, loaded before anything else is."""
+"""Signals that end a command; the first module to be loaded."""
 
 from __future__ import annotations
 

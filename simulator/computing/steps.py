@@ -1,4 +1,4 @@
-"""Steps of a long computation, for whoever wants to show how far it has come."""
+"""Steps of a long computation, for display of its progress."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Whitening of lengths between balls that are read together, of which some share readings and some
-certificates.
+"""Whitening of lengths between balls that are read together and share readings or certificates.
 
 Lengths of one position and probe are v = B n - E u e to first order, measured less certified: n is
 the noise of the readings, B the directions of the lengths at their two ends, e the error of each

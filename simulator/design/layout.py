@@ -1,4 +1,5 @@
-"""From an experiment to its design: names become indices, and every artefact gets a frame."""
+"""Conversion of an experiment into its design: names become indices, and every artefact gets a
+frame."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""What an experiment is made of, laid out: probes, artefacts, balls, positions and tasks,
-each with its own arrays in SI units.
-"""
+"""Parts of a design: probes, artefacts, balls, positions and tasks, each with its own arrays in
+SI units."""
 
 from __future__ import annotations
 

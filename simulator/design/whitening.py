@@ -1,4 +1,4 @@
-"""Whitening of observations of which some share an error, such as that of a certificate."""
+"""Whitening of observations that share errors, such as that of a certificate."""
 
 from __future__ import annotations
 

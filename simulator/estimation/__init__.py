@@ -1,3 +1,1 @@
-"""From a design and its readings to estimates: blocks, elimination, Gauss-Newton, starting
-values.
-"""
+"""Estimation from a design and its readings: blocks, elimination, Gauss-Newton, starting values."""

@@ -1,4 +1,4 @@
-"""Estimators that use distances alone, to be compared with the full one (NPL Report CISE 15/98,
+"""Estimators that use distances alone, for comparison with the full one (NPL Report CISE 15/98,
 section 3.4).
 
 All of them know the machine by its parameters a only. With x*_ik the corrected point of ball i in

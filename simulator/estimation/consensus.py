@@ -1,4 +1,4 @@
-"""The rigid motion that most of a set of points agree on, however wrong the others are."""
+"""The rigid motion that most points of a set agree on, however wrong the others are."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""How corrected points depend on the shared parameters: the rows behind U4, U6 and measuring
-tasks.
-"""
+"""Derivatives of corrected points by the shared parameters: the rows behind U4, U6 and measuring
+tasks."""
 
 from __future__ import annotations
 

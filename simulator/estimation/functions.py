@@ -1,5 +1,5 @@
-"""Functions of a design's parameters whose uncertainties are asked for: of parameters, of places,
-and of distances.
+"""Functions of a design's parameters whose uncertainties are evaluated: parameters, places and
+distances.
 
 They are told without numbers of a particular state, so that a plan, a fit, replicates and a search
 for mistakes can each make what they need of the same description.

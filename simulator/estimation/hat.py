@@ -1,4 +1,5 @@
-"""Rows of the hat matrix's root: what the estimate takes up of each observation, in batches.
+"""Rows of the hat matrix's root, in batches: the share of each observation that the estimate
+absorbs.
 
 With the square root G of the covariance and the whitened Jacobian J, the columns of Q = J G are
 orthonormal, and H = Q Q' is the hat matrix. As G has one block for each ball, a row of Q has a part

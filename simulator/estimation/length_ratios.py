@@ -1,5 +1,4 @@
-"""Standards all of whose lengths are read too long or too short by one factor: their length is not
-what is stated.
+"""Detection of standards whose lengths are all read too long or too short by one factor.
 
 A machine's scale errors would explain that as well, so that no fit shows it; but no scale is off by
 so much.

@@ -1,6 +1,4 @@
-"""An experiment linearised at a state: the one place where layout, factor, spectrum and covariance
-come together.
-"""
+"""Linearisation of an experiment at a state: layout, factor, spectrum and covariance together."""
 
 from __future__ import annotations
 

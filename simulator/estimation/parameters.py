@@ -1,4 +1,4 @@
-"""Names, units and places of the parameters that all balls share: poses and machine errors."""
+"""Names, units and indices of the parameters that all balls share: poses and machine errors."""
 
 from __future__ import annotations
 

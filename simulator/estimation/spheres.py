@@ -1,4 +1,4 @@
-"""Spheres through points: where a Bryan gauge's pivot is, and how long its bar."""
+"""Spheres through points, for the pivot of a Bryan gauge and the length of its bar."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Experiment files: loading them, what they may say, and the messages about what is wrong with
-them.
-"""
+"""Experiment files: their keys, loading, and messages about errors in them."""
 
 from ..inputs.messages import ExperimentError, Message
 from .load import load

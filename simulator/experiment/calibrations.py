@@ -1,4 +1,4 @@
-"""From the settings of a calibration to ball indices, values and uncertainties."""
+"""Conversion of the settings of a calibration into ball indices, values and uncertainties."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def _radius(
 ) -> RadiusCalibration | None:
     gauge = references.artefacts[artefact]
     if not isinstance(gauge, BryanGaugeSettings):
-        text = f'only a Bryan gauge has a radius, and "{artefact}" is none; use kind: distances'
+        text = f'only a Bryan gauge has a radius, and "{artefact}" is not one; use kind: distances'
         references.problems.add((*steps, "kind"), text)
         return None
     value = gauge.radius if settings.value is None else settings.value
-    text = f"{far_from_drawing(value, gauge.radius)}; correct the one or the other"
+    text = f"{far_from_drawing(value, gauge.radius)}; correct one of the two"
     if not references.require(
         abs(value - gauge.radius) <= FAR_FROM_DRAWING * gauge.radius, (*steps, "value"), text
     ):
@@ -174,7 +174,7 @@ def _pairs(
         text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
         is_right &= references.require(names[0] != names[1], (*steps, i), text)
         pair = frozenset(names)
-        text = f"stands already in entry [{seen.get(pair)}]; remove one of the two"
+        text = f"is already in entry [{seen.get(pair)}]; remove one of the two"
         is_right &= references.require(pair not in seen, (*steps, i), text)
         seen.setdefault(pair, i)
     return (
@@ -243,7 +243,7 @@ def _certified_distances(
             and distance > 0
             and not abs(distance - expected) <= FAR_FROM_DRAWING * expected
         ):
-            text = f"{far_from_drawing(distance, expected)}; correct the one or the other"
+            text = f"{far_from_drawing(distance, expected)}; correct one of the two"
             problems.add_at(mark, place, text)
     if missing and len(problems.messages) == before:
         problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
@@ -266,7 +266,7 @@ def far_spread(values: Floats, drawn: Floats) -> str:
     if abs(found - expected) <= FAR_FROM_DRAWING * expected + HARDLY_FLAT:
         return ""
     times = f"{found / expected:.3g} times as far apart as in the artefact's drawing"
-    return f"the balls of these co-ordinates are {times}; correct the one or the other"
+    return f"the balls of these co-ordinates are {times}; correct one of the two"
 
 
 def _coordinates(

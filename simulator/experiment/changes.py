@@ -1,4 +1,4 @@
-"""Experiments written or changed in Python, where a file would hold text."""
+"""Experiments that are written or changed in Python instead of in a file."""
 
 from __future__ import annotations
 

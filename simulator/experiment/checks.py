@@ -1,6 +1,5 @@
-"""Checks that need several sections: names used twice, balls outside the volume, balls nobody
-reads.
-"""
+"""Checks that need several sections: names used twice, balls outside the volume, balls never
+read."""
 
 from __future__ import annotations
 

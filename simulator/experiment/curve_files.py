@@ -78,13 +78,13 @@ def read_numbered_curves(
         raise ExperimentError(messages)
     if len(rows) < 2:
         raise ExperimentError(
-            [Message(file, lines[0][0], 1, "", "a curve needs two points at least; add rows")]
+            [Message(file, lines[0][0], 1, "", "a curve needs at least two points; add rows")]
         )
     place = names.index(POSITION)
     rows.sort(key=lambda row: row[1][place])
     for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
         if after[place] == before[place]:
-            text = "this position stands in the file twice; leave one of the rows out"
+            text = "this position is in the file twice; leave one of the rows out"
             raise ExperimentError([Message(file, number, 1, "", text)])
     positions = tuple(row[place] for _, row in rows)
     curves = {
@@ -107,7 +107,7 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
                 if known
                 else hint(name or cell, [POSITION, *errors])
             )
-            problem = "has no unit" if known else "is no error of an axis"
+            problem = "has no unit" if known else "is not an error of an axis"
             messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
             continue
         units: Mapping[str, Fraction] = (

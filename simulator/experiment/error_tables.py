@@ -1,6 +1,5 @@
-"""Tables of one parametric error: positions and values, and in comments where and how it was
-measured.
-"""
+"""Tables of one parametric error: positions and values, with comments on where and how it was
+measured."""
 
 from __future__ import annotations
 
@@ -65,7 +64,7 @@ def parse_line(text: str) -> dict[str, float]:
         name, equals, value = (one.strip() for one in part.partition("="))
         if not equals or name not in AXES:
             raise LineError(
-                f'"{shorten(part)}" is no position of an axis; write for example y = 600 mm, z ='
+                f'"{shorten(part)}" is not a position of an axis; write for example y = 600 mm, z ='
                 " 200 mm"
             )
         if name in found:
@@ -112,9 +111,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
                 messages.append(mark.message("", text))
         elif (key := key.rstrip()) in stated:
             messages.append(
-                mark.message(
-                    "", f'"{key}:" stands already in line {stated[key][0].line}; remove one'
-                )
+                mark.message("", f'"{key}:" is already in line {stated[key][0].line}; remove one')
             )
         else:
             begin = match.end(1) - len(value.lstrip()) + 1
@@ -143,7 +140,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         )
         messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
     elif name[1] not in {"X", "Y", "Z"} - {name[2]}:
-        text = f"{name} is no straightness error; remove this line"
+        text = f"{name} is not a straightness error; remove this line"
         messages += [
             stated[key][0].message("", text)
             for key in ("straightness", "straightedge")

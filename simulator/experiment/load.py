@@ -1,4 +1,4 @@
-"""Loads an experiment file: from YAML to experiments, or to everything that is wrong with it."""
+"""Loading of an experiment file: from YAML to experiments, or to all errors in it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""From the settings of the machine and of its evaluation to volume, repeatability, points and
-tasks.
-"""
+"""Conversion of the settings of machine and evaluation into volume, repeatability, points and
+tasks."""
 
 from __future__ import annotations
 

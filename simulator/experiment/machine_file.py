@@ -1,4 +1,4 @@
-"""Loads a machine file and the tables it names, or tells everything that is wrong with them."""
+"""Loading of a machine file and the tables that it names, with all errors in them."""
 
 from __future__ import annotations
 
@@ -244,15 +244,15 @@ def _doubt_what_is_taken_off(machine: MachineDescription, problems: Problems) ->
                 problems.doubt(
                     steps,
                     f"the straight line through its end points, from {show(start)} to {show(end)},"
-                    " is taken off, as it is no straightness; let the polynomial begin and end at"
-                    " zero, and state a slope as squareness",
+                    " is subtracted, because it is not straightness; let the polynomial begin"
+                    " and end at zero, and state a slope as squareness",
                 )
         elif not error.is_straightness and abs(there) > NOTHING * sum(
             map(abs, error.shape.coefficients)
         ):
             text = (
-                f"{show(there)} is taken off, as errors are zero at the reference point; correct"
-                " the constant"
+                f"{show(there)} is subtracted, because errors are zero at the reference point;"
+                " correct the constant"
             )
             problems.doubt(steps, text)
 

@@ -46,9 +46,7 @@ PROBE = (
     " default 0"
 )
 STRAIGHTEDGE = "table, where it was measured along a straightedge on a table that the axis moves"
-STRAIGHTNESS = (
-    "line that a straightness error is told from: end points, least squares or minimum zone"
-)
+STRAIGHTNESS = "reference line of straightness errors: end points, least squares or minimum zone"
 
 
 class LineSettings(Settings):
@@ -193,8 +191,8 @@ class DescribedMachineSettings(Settings):
     experiments.
     """
 
-    title: Line = Field(description="what the machine is, in a line")
-    description: Text | None = Field(None, description="what else is worth knowing")
+    title: Line = Field(description="one-line description of the machine")
+    description: Text | None = Field(None, description="further remarks")
     arrangement: ArrangementName | ArrangementSettings = Field(description=ARRANGEMENT)
     volume: Forms[VolumeSettings, Annotated[Edges, Field(min_length=3)], VolumeSettings] = Field(
         description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]"

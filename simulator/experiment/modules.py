@@ -1,4 +1,4 @@
-"""Where an experiment runs a module: error models in Python are code that loading the file runs."""
+"""Modules that an experiment runs: an error model in Python is code that loading the file runs."""
 
 from __future__ import annotations
 

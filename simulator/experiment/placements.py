@@ -1,4 +1,4 @@
-"""From the settings of a position to its pose and its readings."""
+"""Conversion of the settings of a position into its pose and its readings."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _placement(
         return None
     if not {"plane", "level", "corner", "centre"} & set(plane_keys):
         needed = "corner or centre" if dimension == 2 else "plane, level and corner or centre"
-        problems.add(steps, f"says nothing of where the artefact is; add {needed}, or pose")
+        problems.add(steps, f"does not say where the artefact is; add {needed}, or pose")
         return None
     is_right = True
     if dimension == 2:
@@ -146,7 +146,7 @@ def check_turns(turns: int, steps: Steps, references: References) -> bool:
     else:
         meant = f"write {turns // 90 % 4} for {turns} deg"
     return references.require(
-        0 <= turns <= 3, steps, f"{turns} is no number of turns by 90 deg from 0 to 3; {meant}"
+        0 <= turns <= 3, steps, f"{turns} is not a number of turns by 90 deg from 0 to 3; {meant}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Experiments of what is chosen from a pool."""
+"""Experiments that consist of a choice from a pool."""
 
 from __future__ import annotations
 

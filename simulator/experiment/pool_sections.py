@@ -1,6 +1,4 @@
-"""What an experiment file says of the pool: candidates to choose from, how long they take, limits
-on the choice.
-"""
+"""The keys of a pool: candidates, the time that they take, and limits on the choice."""
 
 from __future__ import annotations
 
@@ -44,12 +42,12 @@ class TimesSettings(OwnTimesSettings):
 
     set_up: Seconds = Field(None, description="to set an artefact up and align it; default 20 min")
     reading: Seconds = Field(None, description="of a reading of a ball; default 15 s")
-    probe_change: Seconds = Field(None, description="to go on with another probe; default 2 min")
+    probe_change: Seconds = Field(None, description="to change to another probe; default 2 min")
     plane_change: Seconds = Field(
         None,
         description=(
-            "more for a position in another plane, or of another artefact, than the one before;"
-            " default 30 min"
+            "additional, where a position is in another plane, or of another artefact, than the"
+            " previous one; default 30 min"
         ),
     )
 
@@ -190,7 +188,7 @@ class GroupSettings(Settings):
         description="of each reading there, one length or per axis; default: machine.repeatability",
     )
     times: OwnTimesSettings | None = Field(
-        None, description="times that are others than in pool.times"
+        None, description="times that differ from those in pool.times"
     )
 
     @model_validator(mode="after")
@@ -205,7 +203,7 @@ class ListedSettings(PositionSettings):
 
     name: Name = Field(description="name of the position, if it is chosen")
     times: OwnTimesSettings | None = Field(
-        None, description="times that are others than in pool.times"
+        None, description="times that differ from those in pool.times"
     )
 
 
@@ -225,7 +223,7 @@ CandidateSettings = Annotated[
 
 
 class _Priced(Settings):
-    name: Name = Field(description="name of the item, to be told by")
+    name: Name = Field(description="name of the item, used in tables and messages")
     price: Duration = Field(
         0.0, description="what it takes of the budget, such as 3 h; default nothing"
     )
@@ -252,9 +250,7 @@ PricedSettings = Annotated[
 class SelectorSettings(Settings):
     """Which candidates are meant: those to which everything stated applies."""
 
-    name: Text | None = Field(
-        None, description='name, in which * stands for anything, such as "z *"'
-    )
+    name: Text | None = Field(None, description='name, in which * matches anything, such as "z *"')
     group: Name | None = Field(None, description="name of their entry in pool.candidates")
     plane: Axis | None = Field(None, description="axis that the artefact's plane is normal to")
     artefact: Name | None = Field(None, description="name of the artefact")
@@ -264,7 +260,7 @@ class SelectorSettings(Settings):
     def _something(self) -> Self:
         if not self.model_fields_set:
             raise ValueError(
-                "says nothing; give at least one of name, group, plane, artefact, probe"
+                "selects nothing; give at least one of name, group, plane, artefact, probe"
             )
         return self
 
@@ -297,7 +293,7 @@ class LimitsSettings(Settings):
         (), description="candidates that must be chosen, by name; all: every position of the file"
     )
     never_together: tuple[Together, ...] = Field(
-        (), description="lists of names, of each of which at most one is chosen"
+        (), description="lists of names; at most one of each list is chosen"
     )
     at_most: tuple[AtMostSettings, ...] = Field(
         (), description="{of: {plane: x}, count: 2} and the like"
@@ -325,9 +321,9 @@ class PoolSettings(Settings):
         (), description="groups of candidates, and single ones described as a position is"
     )
     calibration: tuple[PricedSettings, ...] = Field(
-        (), description="items of calibration that can be had at a price"
+        (), description="items of calibration that are available at a price"
     )
     limits: LimitsSettings = Field(
         default_factory=lambda: LimitsSettings.model_validate({}),
-        description="what a choice has to comply with",
+        description="limits that a choice must observe",
     )

@@ -1,6 +1,5 @@
-"""From the settings of a pool to candidates, those that stand there twice left out, and limits on
-choosing them.
-"""
+"""Conversion of the settings of a pool into candidates, without duplicates, and limits on the
+choice."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What an experiment file says of positions and calibration, in the list drawn as in a pool to
-choose from.
-"""
+"""The keys of positions and calibration, in an experiment and in its pool."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the settings of priors to what they say about poses and machine errors."""
+"""Conversion of the settings of priors into priors of poses and machine errors."""
 
 from __future__ import annotations
 

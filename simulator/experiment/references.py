@@ -1,4 +1,4 @@
-"""What positions and calibrations refer to: artefacts, probes and balls by name."""
+"""References of positions and calibrations to artefacts, probes and balls by name."""
 
 from __future__ import annotations
 
@@ -315,7 +315,7 @@ def resolve_offset_uncertainties(sections: Sections, references: References) -> 
                 "its offset is held as stated, as the first probe is the reference where none has"
                 " reference: true"
             )
-            problems.doubt(steps, f"{text}; what is said of its uncertainty counts for nothing")
+            problems.doubt(steps, f"{text}; its stated uncertainty is ignored")
         uncertainty, is_right = lengths_per_axis(
             stated, (*steps, "standard_uncertainty"), references
         )

@@ -73,13 +73,12 @@ class ProbeSettings(Settings):
         description="of the stated offset, one length or per axis; the offset is then estimated",
     )
     unknown: bool = Field(
-        False, description="whether the offset is estimated without being known beforehand"
+        False, description="whether the offset is estimated without prior knowledge of it"
     )
     reference: bool = Field(
         False,
         description=(
-            "whether this probe's offset is held, which says what others are relative to; default:"
-            " first"
+            "whether this probe's offset is held as the reference of the others; default: first"
         ),
     )
 
@@ -113,9 +112,7 @@ class TaskSettings(Settings):
     )
     target_uncertainty: LengthFunction | None = Field(
         None,
-        description=(
-            "what is to be reached, as target_uncertainty of the file, which is the default"
-        ),
+        description=("target uncertainty of the task; default: target_uncertainty of the file"),
     )
 
 
@@ -148,8 +145,8 @@ class EvaluationSettings(Settings):
 class ExperimentSettings(Settings):
     """A ball-plate experiment on a co-ordinate measuring machine."""
 
-    title: Line = Field(description="what the experiment is, in a line")
-    description: Text | None = Field(None, description="what else is worth knowing")
+    title: Line = Field(description="one-line description of the experiment")
+    description: Text | None = Field(None, description="further remarks")
     machine: MachineSettings = Field(description="measuring volume and repeatability")
     error_model: ErrorModelSettings = Field(  # type: ignore[valid-type,unused-ignore]
         description="the errors of the machine that are estimated"
@@ -176,10 +173,10 @@ class ExperimentSettings(Settings):
         description="what is known of the artefacts: distances, coordinates, radius; may be empty",
     )
     pool: PoolSettings | None = Field(
-        None, description="what ballplate plan chooses positions and calibration from"
+        None, description="candidates from which ballplate plan chooses positions and calibration"
     )
     priors: NonEmpty[PriorSettings] | None = Field(
-        None, description="what is known beforehand of machine errors and poses"
+        None, description="prior knowledge of machine errors and poses"
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"
@@ -187,7 +184,7 @@ class ExperimentSettings(Settings):
     target_uncertainty: LengthFunction | None = Field(
         None,
         description=(
-            "what standard uncertainties, or coverage_factor times these, are to be within, such as"
+            "largest standard uncertainty, or coverage_factor times that, that is accepted, such as"
             " 0.5 um + L/1000000 with L in metres, 0.9 um + 2.5 um/m, or (0.9 + L/400) um with L"
             " in mm"
         ),
@@ -195,8 +192,8 @@ class ExperimentSettings(Settings):
     coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
         1.0,
         description=(
-            "k of the expanded uncertainty U = k u that is compared with target_uncertainty;"
-            " default 1: the standard uncertainty u is"
+            "k of the expanded uncertainty U = k u that is compared with"
+            " target_uncertainty; default 1, the standard uncertainty u"
         ),
     )
     sigma: Literal["estimated", "given"] = Field(

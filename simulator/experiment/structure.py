@@ -1,6 +1,4 @@
-"""Validates the sections of an experiment file one by one, so that no error hides those of
-others.
-"""
+"""Validation of the sections of an experiment file one by one, so that no error hides another."""
 
 from __future__ import annotations
 

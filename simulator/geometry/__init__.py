@@ -1,3 +1,1 @@
-"""Where balls are: on their artefact, and where a position of the artefact puts them in the
-machine.
-"""
+"""Places of balls: on their artefact, and in the machine for each position of the artefact."""

@@ -1,4 +1,5 @@
-"""Artefacts: what an experiment file says about one, and where its balls are in its own frame.
+"""Artefacts: their keys in an experiment file, and the places of their balls in their own
+frames.
 
 A further kind of artefact is one settings class with a ``layout`` and one line in ``ARTEFACTS``.
 """
@@ -135,8 +136,8 @@ class ArtefactSettings(Settings):
     axes: AxesSettings | None = Field(
         None,
         description=(
-            "axes in which a two-dimensional fit tells the co-ordinates of the balls; default: from"
-            " the first ball through the farthest one that nominally lies on its x axis"
+            "axes in which a two-dimensional fit reports the co-ordinates of the balls; default:"
+            " from the first ball through the farthest one that nominally lies on its x axis"
         ),
     )
 

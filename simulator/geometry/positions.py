@@ -1,6 +1,5 @@
-"""Positions of an artefact in the machine: from what an experiment file says to a rotation and an
-origin.
-"""
+"""Positions of an artefact in the machine: conversion of their keys into a rotation and an
+origin."""
 
 from __future__ import annotations
 

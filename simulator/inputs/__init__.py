@@ -1,1 +1,2 @@
-"""Files as text, numbers with units, and what is wrong with them; nothing of ball plates."""
+"""Files as text, numbers with units, and messages about errors in them; independent of ball
+plates."""

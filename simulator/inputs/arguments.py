@@ -1,4 +1,4 @@
-"""Arguments of functions, refused in words where they cannot be used."""
+"""Checks of functions' arguments, with messages about those that cannot be used."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Messages about an experiment file: where, what is wrong and what would be right, all of them at
-once.
-"""
+"""Messages about an experiment file: the place, the error and the remedy, all of them at once."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""Collects what is wrong with an experiment file while it is read, so that everything is said at
-once.
-"""
+"""Collection of the errors in an experiment file while it is read, so that all are reported at
+once."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What all sections of an experiment file share: the base class of settings, the words of
-refusals.
-"""
+"""Base class of the settings of all sections, and common wording of messages."""
 
 from __future__ import annotations
 

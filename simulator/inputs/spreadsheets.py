@@ -1,6 +1,5 @@
-"""Text in CSV files that spreadsheets show as text: names such as =A1 or @home would be computed as
-formulas.
-"""
+"""Escaping of text in CSV files: spreadsheets would compute names such as =A1 or @home as
+formulas."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ def wrong_number(cell: str, name: str) -> str:
     if re.fullmatch(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?", cell):
         return f'"{cell}" has a decimal comma; write {cell.replace(",", ".")}'
     return (
-        f'"{shorten(cell)}" is no number; separate the columns by commas'
+        f'"{shorten(cell)}" is not a number; separate the columns by commas'
         if re.search("[;\t]", cell)
         else ""
     )

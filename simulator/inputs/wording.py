@@ -1,4 +1,4 @@
-"""Turns pydantic's errors into messages for the person who wrote the file."""
+"""Translation of pydantic's errors into messages for the person who wrote the file."""
 
 from __future__ import annotations
 

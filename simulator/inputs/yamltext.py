@@ -1,4 +1,4 @@
-"""Changes of a YAML text at some places, with every other byte of it kept."""
+"""Changes of a YAML text at certain places that keep every other byte."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def _changed(text: _Text, change: TextChange) -> str:
     for span in way:
         if span.kind == "alias":
             raise _refusal(
-                span, change.steps, "stands elsewhere, where this alias leads; change it by hand"
+                span, change.steps, "is elsewhere, at the anchor of this alias; change it by hand"
             )
         if span.anchor in text.aliases:
             raise _refusal(
@@ -328,7 +328,7 @@ def _keep_what_is_told(text: _Text, span: _Span, start: int, end: int, change: T
                 [
                     place.message(
                         format_path(change.steps),
-                        f"{what} here would be lost with what is to be changed; change it by hand",
+                        f"{what} here would be lost by the change; change it by hand",
                     )
                 ]
             )

@@ -56,7 +56,7 @@ REMEDIES = (
     ),
     (
         "<block end>",
-        "this does not belong to what stands above; check the indentation and the quotes",
+        "this does not belong to the lines above; check the indentation and the quotes",
     ),
     ("version", "only YAML 1.2 is read; remove the %YAML line"),
     ("incompatible", "only YAML 1.2 is read; remove the %YAML line"),
@@ -141,7 +141,7 @@ def read_text(path: Path | GivenText) -> str:
             raise refused(file, "this is a device; name a file")
         # A pipe of the shell's has a writer; any other may wait for one for ever.
         if stat.S_ISFIFO(kind) and not file.startswith(("/dev/", "/proc/")):
-            raise refused(file, "this is a pipe, to which nobody may write; name a file")
+            raise refused(file, "this is a pipe; name a file")
         with path.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
     except FileNotFoundError:
@@ -401,7 +401,7 @@ class _Builder:
         elif key in entries:
             self.refuse(
                 mark,
-                f'the key "{shorten(key)}" stands already in line {key_marks[key].line}; remove one'
+                f'the key "{shorten(key)}" is already in line {key_marks[key].line}; remove one'
                 " of the two",
             )
         else:
@@ -415,7 +415,8 @@ class _Builder:
             return
         if any(opened.anchor == anchor for opened in self.stack):
             self.stop(
-                mark, f"the alias *{anchor} stands inside what it refers to; write the value out"
+                mark,
+                f"the alias *{anchor} is inside the value that it refers to; write the value out",
             )
         known = listing(f"&{name}" for name in self.anchors)
         self.refuse(

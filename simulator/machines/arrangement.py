@@ -1,4 +1,4 @@
-"""Which axis carries what: the arrangement of a machine's axes as a kinematic chain."""
+"""Arrangement of a machine's axes as a kinematic chain: which axis carries what."""
 
 from __future__ import annotations
 

@@ -218,7 +218,7 @@ class Spline:
 
     def __post_init__(self) -> None:
         if self.order < 2:
-            raise ValueError("a spline's order is 2 (broken lines) at least")
+            raise ValueError("a spline's order is at least 2 (broken lines)")
         if any(not 0.0 < knot < 1.0 for knot in self.knots) or list(self.knots) != sorted(
             self.knots
         ):
@@ -228,8 +228,8 @@ class Spline:
             )
         if max(Counter(self.knots).values(), default=0) >= self.order:
             raise ValueError(
-                f"a knot stands too often at one place; give it {self.order - 1} times at most, one"
-                " less than the order"
+                f"a knot is repeated too often at one place; give it {self.order - 1} times at"
+                " most, one less than the order"
             )
         if self.ends != "free" and self.order < 3:
             raise ValueError(

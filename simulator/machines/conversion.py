@@ -1,4 +1,5 @@
-"""From one error model to another: what contains what, to first order in the errors.
+"""Conversion between error models, and containment of one in another, to first order in the
+errors.
 
 NPL Report CISE 15/98, section 2.3: every kinematic model is a special case of some empirical model,
 and an empirical model has values along the axes from which a kinematic one can be made.

@@ -1,4 +1,4 @@
-"""A user's own error model: found by name, called, and checked for what every error model promises.
+"""A user's own error model: found by name, called, and checked against the protocol.
 
 Whatever goes wrong in the user's code is told as a message about the experiment file, with the
 place in that code.
@@ -110,7 +110,7 @@ def _imported(name: str, folder: Path | None) -> Any:
         absent = error.__cause__.name if isinstance(error.__cause__, ModuleNotFoundError) else None
         if absent is not None and absent.partition(".")[0] in FORMER_PACKAGES:
             text = (
-                f"{name} imports {absent}, which is no package of its own any more; write:"
+                f"{name} imports {absent}, which is no longer a package of its own; write:"
                 f" {NEW_LINE}"
             )
             raise CustomModelError(text) from None
@@ -185,7 +185,7 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
                 f"{name}: {what} returns the shape {found.shape}; {shape} is needed"
             )
         if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
-            raise CustomModelError(f"{name}: {what} returns values that are no finite numbers")
+            raise CustomModelError(f"{name}: {what} returns values that are not finite numbers")
         return np.asarray(found, float)
 
     without = values("error(x, 0, p)", lambda: model.error(x, np.zeros(n), p), (7, d))

@@ -1,4 +1,4 @@
-"""Two error models at once, whose errors add."""
+"""Sum of two error models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every error model offers, whatever its parametrisation."""
+"""Protocol of all error models, whatever their parametrisation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a file may say about the machine, and how it becomes an error model.
+"""The keys of error models in a file, and their conversion into error models.
 
 An error model is registered by its settings class and builder in `ERROR_MODELS`.
 """
@@ -45,7 +45,7 @@ class ArrangementSettings(Settings):
     def _each_axis_once(self) -> Self:
         if sorted(self.probe_side + self.workpiece_side) != list(AXES):
             raise ValueError(
-                "an axis is missing or stands twice; name each of x, y and z exactly once on the"
+                "an axis is missing or named twice; name each of x, y and z exactly once on the"
                 " two sides together"
             )
         return self
@@ -247,7 +247,7 @@ class RadialSettings(Settings):
             empirical_model(Radial(self.centres, self.constant), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
         except FrameError:
             raise ValueError(
-                "these functions are too much alike to be told apart; give fewer centres or a"
+                "these functions are too similar to be distinguished; give fewer centres or a"
                 " smaller constant"
             ) from None
         return self
@@ -371,7 +371,7 @@ class MachineFileSettings(Settings):
         ge=0,
         le=50,
         description=(
-            "Interior knots of the cubic splines that stand for errors given as tables, evenly"
+            "Interior knots of the cubic splines that represent errors given as tables, evenly"
             " spaced."
         ),
     )

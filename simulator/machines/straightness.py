@@ -1,6 +1,4 @@
-"""The straight line that a straightness error is told from: least squares, end points or minimum
-zone.
-"""
+"""The reference line of a straightness error: least squares, end points or minimum zone."""
 
 from __future__ import annotations
 

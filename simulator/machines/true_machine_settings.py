@@ -1,4 +1,4 @@
-"""What a file may say about the true machine, which simulated readings come from."""
+"""The keys of the true machine, from which simulated readings come."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ZeroSettings(Settings):
     kind: Literal["zero"] = Field(default="zero", description="no errors")
 
 
-OTHER_MODEL = "Error model of the true machine, where it is another than the estimated one."
+OTHER_MODEL = "Error model of the true machine, if it differs from the estimated one."
 
 
 class CoefficientSettings(Settings):

@@ -1,6 +1,5 @@
-"""The machine that synthetic readings come from: an error model, not always the estimated one, and
-its parameters.
-"""
+"""The machine from which synthetic readings come: an error model, which may differ from the
+estimated one, and its parameters."""
 
 from __future__ import annotations
 

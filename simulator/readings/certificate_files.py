@@ -263,7 +263,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
             continue
         drawn = known[k].drawn
         if drawn is not None and not abs(values[k] - drawn) <= FAR_FROM_DRAWING * drawn:
-            told = f"{far_from_drawing(values[k], drawn)}; correct the one or the other"
+            told = f"{far_from_drawing(values[k], drawn)}; correct one of the two"
             problems.append(row.mark.message("", told))
     missing = [
         f"{one.item} {one.first}, {one.second}" for k, one in enumerate(known) if k not in lines

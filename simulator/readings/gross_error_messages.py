@@ -1,4 +1,4 @@
-"""Says which lines of a file of readings cannot be right, and what they probably are."""
+"""Messages about the lines of a file of readings that cannot be right, and their probable cause."""
 
 from __future__ import annotations
 
@@ -119,13 +119,13 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
     if wrong.undecided:
         elsewhere = design.positions.names[readings.position[wrong.partner]]
         text = (
-            f"ball {ball} in position {position} stands {far} from where it stands in position"
+            f"ball {ball} in position {position} is {far} from where it is in position"
             f" {elsewhere}, line {marks[wrong.partner].line}; correct or remove one of the two"
             " lines"
         )
     elif wrong.other_ball >= 0:
         other = design.ball_label(wrong.other_ball)
-        text = f"ball {ball} in position {position} stands where ball {other} should be; "
+        text = f"ball {ball} in position {position} is where ball {other} should be; "
         if wrong.partner >= 0:
             text += (
                 f"swap the names of the balls in lines {marks[i].line} and"

@@ -1,4 +1,4 @@
-"""Readings that cannot be of the ball they are said to be of, and what they probably are.
+"""Detection of readings that cannot be of the stated ball, and of their probable cause.
 
 Two comparisons are made before anything is fitted, both of places after the best rigid motion of
 each position:

@@ -1,4 +1,4 @@
-"""Where knots stand: at every r-th point, and at the boundaries of features."""
+"""Places of knots: at every r-th point, and at the boundaries of features."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
             place, factor = Mark(file, number, start), header.factors[column.name]
             row.append(read_number(cell, column.name, factor, place, messages, column.kind))
             if column.name == UNCERTAINTY and row[-1] <= 0:
-                text = f'"{cell}" is no standard uncertainty; give one above zero'
+                text = f'"{cell}" is not a standard uncertainty; give one above zero'
                 messages.append(place.message("", text))
         values.append(row)
         if header.has_normals:
@@ -203,7 +203,8 @@ def _direction(cells: Sequence[str]) -> list[float]:
     length = math.hypot(*parts)
     if not 0 < length < math.inf:
         raise QuantityError(
-            f'"{cells[0]}" and "{cells[1]}" are no direction; give its parts, such as 0.6 and 0.8'
+            f'"{cells[0]}" and "{cells[1]}" are not a direction; give its components, such as'
+            " 0.6 and 0.8"
         )
     return [part / length for part in parts]
 

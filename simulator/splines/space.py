@@ -41,7 +41,7 @@ class SplineSpace:
     def __post_init__(self) -> None:
         found = []
         if self.order < 2:
-            found.append(SplineProblem("a spline's order is 2 (broken lines) at least"))
+            found.append(SplineProblem("a spline's order is at least 2 (broken lines)"))
         if not self.lower < self.upper:
             found.append(
                 SplineProblem(
@@ -60,8 +60,8 @@ class SplineSpace:
             if times >= self.order:
                 found.append(
                     SplineProblem(
-                        f"the knot at {{0}} stands {times} times; give it {self.order - 1} times at"
-                        " most",
+                        f"the knot at {{0}} is given {times} times; give it {self.order - 1}"
+                        " times at most",
                         (knot,),
                     )
                 )

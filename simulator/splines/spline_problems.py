@@ -1,4 +1,4 @@
-"""Why a spline cannot be fitted, with the places in the units of whoever asked."""
+"""Reasons why a spline cannot be fitted, with the places in the caller's units."""
 
 from __future__ import annotations
 

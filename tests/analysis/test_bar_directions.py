@@ -15,31 +15,32 @@ from ballplate.simulator.experiment.model import Experiment
 
 FOLDER = Path("designs/hurt_foss")
 NO_LENGTH = (
-    "no length is known (bar: length): the overall scale of the machine stays open until one is"
-    " calibrated"
+    "no length is known (bar: length): the overall scale of the machine is undetermined until"
+    " one is calibrated"
 )
 SHIPPED = {
     ("bar-bell", "length known"): (),
     ("bar-bell", "length unknown"): (NO_LENGTH,),
     ("bar-bell", "flat"): (
         (
-            "every bar lies parallel to the xy plane: nothing tells the scale of Z nor its"
+            "every bar lies parallel to the xy plane: nothing determines the scale of Z nor its"
             " squareness to X and Y; add for example a bar along z, one in the xz plane at 45 deg"
             " and one in the yz plane at 45 deg"
         ),
     ),
     ("bar-bell", "one axis"): (
         (
-            "every bar lies along x: nothing tells the scales of Y and Z nor the squareness of Y to"
-            " X, Z to X and Z to Y; add for example a bar along y, one along z, one in the xy plane"
-            " at 45 deg, one in the xz plane at 45 deg and one in the yz plane at 45 deg"
+            "every bar lies along x: nothing determines the scales of Y and Z nor the squareness"
+            " of Y to X, Z to X and Z to Y; add for example a bar along y, one along z, one in"
+            " the xy plane at 45 deg, one in the xz plane at 45 deg and one in the yz plane at"
+            " 45 deg"
         ),
     ),
     ("bar-bell", "axes only"): (
         (
-            "the bars' directions are too few or too much alike: nothing tells the squareness of Y"
-            " to X, Z to X and Z to Y; add for example a bar in the xy plane at 45 deg, one in the"
-            " xz plane at 45 deg and one in the yz plane at 45 deg"
+            "the bars' directions are too few or too similar: nothing determines the squareness"
+            " of Y to X, Z to X and Z to Y; add for example a bar in the xy plane at 45 deg, one"
+            " in the xz plane at 45 deg and one in the yz plane at 45 deg"
         ),
     ),
     ("bryan-gauge", "radius known"): (),
@@ -47,17 +48,17 @@ SHIPPED = {
     ("bryan-gauge", "two pivots"): (),
     ("bryan-gauge", "one height"): (
         (
-            "every place of the ball lies in a plane parallel to the xy plane: nothing tells the"
-            " scale of Z nor its squareness to X and Y nor a combination of the scale of X and the"
-            " scale of Y; read the ball for example all round at elevations of 60 and 45 deg as"
-            " well"
+            "every place of the ball lies in a plane parallel to the xy plane: nothing"
+            " determines the scale of Z nor its squareness to X and Y nor a combination of the"
+            " scale of X and the scale of Y; read the ball for example all round at elevations"
+            " of 60 and 45 deg as well"
         ),
     ),
     ("bryan-gauge", "one plane"): (
         (
-            "every place of the ball lies in a plane parallel to the xz plane: nothing tells the"
-            " scale of Y nor its squareness to X and Z; read the ball for example all round at"
-            " elevations of 60 and 30 deg as well"
+            "every place of the ball lies in a plane parallel to the xz plane: nothing"
+            " determines the scale of Y nor its squareness to X and Z; read the ball for example"
+            " all round at elevations of 60 and 30 deg as well"
         ),
     ),
 }
@@ -110,7 +111,7 @@ def test_bars_on_a_cone(tmp_path: Path) -> None:
     told = reason(tmp_path, [(20.0 * k, 30.0) for k in range(12)])
     assert (
         told
-        == "every bar is at 60 deg to z: nothing tells a combination of the scale of X, the scale"
+        == "every bar is at 60 deg to z: nothing determines a combination of the scale of X, the scale"
         " of Y and the scale of Z; add for example a bar along x"
     )
 
@@ -120,7 +121,7 @@ def test_bars_in_two_planes(tmp_path: Path) -> None:
         tmp_path, [(90.0 * side, up) for side in (0, 1) for up in (0, 30, 60, 90, 120, 150)]
     )
     assert told in {
-        f"every bar lies parallel to the {one} plane or the {other} plane: nothing tells the"
+        f"every bar lies parallel to the {one} plane or the {other} plane: nothing determines the"
         " squareness of Y to X; add for example a bar in the xy plane at 45 deg"
         for one, other in (("xz", "yz"), ("yz", "xz"))
     }
@@ -135,7 +136,7 @@ def test_a_gauge_in_two_planes(tmp_path: Path) -> None:
     (told,) = check(load(tmp_path / "gauge.yaml")[0]).verdict.reasons
     assert told.startswith("every direction of the bar lies parallel to the ")
     assert (
-        ": nothing tells the squareness of Y to X; read the ball for example all round at an"
+        ": nothing determines the squareness of Y to X; read the ball for example all round at an"
         " elevation of" in told
     )
 
@@ -143,8 +144,8 @@ def test_a_gauge_in_two_planes(tmp_path: Path) -> None:
 def test_bars_in_an_oblique_plane(tmp_path: Path) -> None:
     told = reason(tmp_path, [(45.0, up) for up in (0, 30, 60, 90, 120, 150)])
     assert told.startswith(
-        "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing tells 3"
-        " combinations"
+        "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing"
+        " determines 3 combinations"
     )
 
 
@@ -172,8 +173,8 @@ def test_planes_and_axes_are_told_without_a_length_or_without_scales(tmp_path: P
     ).verdict
     assert upright.deficiency == 4 and upright.reasons[0] == NO_LENGTH
     assert upright.reasons[1].startswith(
-        "every bar lies parallel to the xz plane: nothing tells the scale of Y nor its squareness"
-        " to X and Z; add for"
+        "every bar lies parallel to the xz plane: nothing determines the scale of Y nor its"
+        " squareness to X and Z; add for"
     )
     squareness = {
         "error_model": {"kind": "metric", "scale": "none"},
@@ -181,7 +182,7 @@ def test_planes_and_axes_are_told_without_a_length_or_without_scales(tmp_path: P
     }
     assert (
         reason(tmp_path, [(30.0 * k, 0.0) for k in range(6)], **squareness)
-        == "every bar lies parallel to the xy plane: nothing tells the squareness of Z to X and Z"
+        == "every bar lies parallel to the xy plane: nothing determines the squareness of Z to X and Z"
         " to Y; add for example a bar in the xz plane at 45 deg and one in the yz plane at"
         " 45 deg"
     )

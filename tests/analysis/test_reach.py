@@ -92,7 +92,7 @@ def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(
     now = average(tmp_path, text=UNCALIBRATED)
     found = answer(tmp_path, Goal("quantity", limit=limit), "repeats", UNCALIBRATED)
     assert found.value == math.ceil((now / limit) ** 2)
-    assert found.beside.startswith(f"{found.value - 1:g} does not do: average U6 ")
+    assert found.beside.startswith(f"{found.value - 1:g} is not enough: average U6 ")
 
 
 def test_the_certificate_is_where_an_independent_root_finder_has_it(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_where_no_certificate_does_the_limit_is_that_of_an_exact_one(tmp_path: P
     found = answer(tmp_path, Goal("quantity", limit=0.99 * limit), "certificate")
     assert found.status == "none" and f"average U6 {1e6 * limit:.4g}" in found.outcome
     assert found.remarks == (
-        "an exact one would not be better: with ten times that it is the same",
+        "an exact one would not be better: ten times that gives the same result",
     )
     found = answer(tmp_path, Goal("quantity", limit=1.0), "certificate")
     assert found.status == "any"
@@ -134,7 +134,7 @@ def test_the_size_is_the_smallest_that_does(tmp_path: Path) -> None:
         value = average(tmp_path, ("[750 mm, 750 mm]", f"[{size} mm, {size} mm]"))
         assert (value <= 1.2 * present) is does
     assert found.remarks[0].startswith(
-        "from 752 mm x 752 mm on the file is wrong: positions[1]: reading ball"
+        "from 752 mm x 752 mm on, the file is invalid: positions[1]: reading ball"
     )
 
 
@@ -163,7 +163,7 @@ def test_balls_are_the_fewest_of_all_grids_nearly_in_proportion(
     columns, rows = map(int, found.words.split(" x "))
     fewest = min(n * m for (n, m), value in values.items() if value <= limit)
     assert values[columns, rows] <= limit and columns * rows == fewest and found.value == columns
-    failed = tuple(map(int, found.beside.partition(" does not do")[0].split(" x ")))
+    failed = tuple(map(int, found.beside.partition(" is not enough")[0].split(" x ")))
     assert values[failed] > limit and failed[0] * failed[1] <= fewest
 
 
@@ -208,7 +208,7 @@ def test_balls_that_are_named_set_limits_to_their_number(tmp_path: Path) -> None
     found = answer(tmp_path, "U6 average 0.08 um", "balls", text)
     assert found.is_met and found.value > 4  # type: ignore[operator]
     assert 'unknown ball "r' in found.remarks[0] and found.remarks[0].startswith(
-        "the file is wrong with 2 x 2, 3 x 2"
+        "the file is invalid with 2 x 2, 3 x 2"
     )
 
 
@@ -234,9 +234,9 @@ def test_shares_and_tasks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("U7 average 1 um", '"U7" is no quantity with a limit; known: U1'),
-        ("U2 average 1 um", '"U2" is no quantity with a limit; give U2 lengths or U2 angles'),
-        ("U6 median 1 um", '"U6 median 1 um" is no goal; write lengths, tasks'),
+        ("U7 average 1 um", '"U7" is not a quantity with a limit; known: U1'),
+        ("U2 average 1 um", '"U2" is not a quantity with a limit; give U2 lengths or U2 angles'),
+        ("U6 median 1 um", '"U6 median 1 um" is not a goal; write lengths, tasks'),
         ("U6 average 1", '"1" has no unit'),
         ("U2 angles maximum 1 um", '"1 um" is a length; an angle is expected'),
     ],

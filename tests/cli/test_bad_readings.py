@@ -49,7 +49,7 @@ def with_cell(lines: Lines, line: int, column: int, change: Callable[[str], str]
 
 def test_swapped_balls(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refusals(exchanged(good, 17, 18), tmp_path, capsys) == [
-        "17:1: ball r4c2 in position z low stands where ball r4c1 should be; "
+        "17:1: ball r4c2 in position z low is where ball r4c1 should be; "
         "swap the names of the balls in lines 17 and 18"
     ]
 
@@ -64,9 +64,7 @@ def test_all_mistakes_are_named_at_once(
     found = refusals(lines, tmp_path, capsys)
     assert [line.split(":")[0] for line in found] == ["5", "20", "60", "90", "130"]
     assert "swap the names of the balls in lines 5 and 9" in found[0]
-    assert (
-        "ball r1c1 in position z low stands where ball r4c4 should be; correct its name" in found[1]
-    )
+    assert "ball r1c1 in position z low is where ball r4c4 should be; correct its name" in found[1]
     assert "swap the names of the balls in lines 60 and 71" in found[2]
     assert "fits the probe left, not right; correct the name of the probe" in found[3]
     assert "is 10 mm from where it should be" in found[4] and "y +10 mm" in found[4]

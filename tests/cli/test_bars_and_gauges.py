@@ -30,7 +30,7 @@ def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", BARS, GAUGE]) == 0
     out = capsys.readouterr().out
     assert (
-        "reason: every bar lies parallel to the xy plane: nothing tells the scale of Z nor its"
+        "reason: every bar lies parallel to the xy plane: nothing determines the scale of Z nor its"
         " squareness" in out
     )
     assert (
@@ -250,7 +250,7 @@ def test_length_equations_refuse_plates_alone_and_planes(
     )
     assert "has no ball bar or Bryan gauge whose lengths are read" in capsys.readouterr().err
     assert main(["fit", *BAR_READINGS, "--estimator", "reversal"]) == 3
-    assert "the reversal is about two dimensions, not three" in capsys.readouterr().err
+    assert "the reversal needs two dimensions, not three" in capsys.readouterr().err
     plane = ["designs/hocken_borchardt/dummy.yaml", "designs/hocken_borchardt/dummy-readings.csv"]
     assert main(["fit", *plane, "--variant", "with scale", "--estimator", "length-equations"]) == 3
     assert "has two dimensions" in capsys.readouterr().err
@@ -268,9 +268,7 @@ def test_length_equations_tell_what_they_pass_over(
     assert main(arguments) == 0
     err = capsys.readouterr().err
     assert (
-        "takes no notice of priors" in err
-        and "whatever the file's error model" in err
-        and "plates" not in err
+        "ignores priors" in err and "whatever the file's error model" in err and "plates" not in err
     )
 
 
@@ -460,15 +458,15 @@ priors:
             " radius"
         ),
         (
-            '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is none; use'
+            '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is not one; use'
             " kind: distances"
         ),
         (
             "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing;"
-            " correct the one or the other"
+            " correct one of the two"
         ),
         (
-            '25:5: calibration[4]: the radius of "over" stands in calibration[3] already; remove'
+            '25:5: calibration[4]: the radius of "over" is already in calibration[3]; remove'
             " one of the two"
         ),
         '26:5: calibration[5].standard_uncertainty: missing; add "standard_uncertainty"',

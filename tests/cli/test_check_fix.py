@@ -122,8 +122,8 @@ def test_each_file_is_mended_by_itself(folder: Path, capsys: pytest.CaptureFixtu
     column = COMMENTED.split("\n")[7].index("#") + 1
     refused = [line for line in err.splitlines() if line.startswith("commented.yaml")]
     assert refused == [
-        f"commented.yaml:8:{column}: positions[0].pose: a comment here would be lost with what is to"
-        " be changed; change it by hand"
+        f"commented.yaml:8:{column}: positions[0].pose: a comment here would be lost by the"
+        " change; change it by hand"
     ]
     # What is not mended is told as by --suggest.
     assert "rank deficiency 2" in out and "repair 1, in the file: positions[straight]: " in out

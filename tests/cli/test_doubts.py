@@ -99,7 +99,7 @@ volume: [1 m, 1 m, 1 m]
         ("EXZ: {polynomial: [1 um, 3 um], straightness: least squares}", ""),
         (
             "EXX: {polynomial: [5 um, 3 um]}",
-            "5 um is taken off, as errors are zero at the reference point",
+            "5 um is subtracted, because errors are zero at the reference point",
         ),
         ("EXX: {polynomial: [0 um, 3 um]}", ""),
         ("EAX: {polynomial: [2 urad, 3 urad]}", "2 urad is taken off"),

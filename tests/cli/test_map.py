@@ -257,7 +257,7 @@ def test_magnification_is_round() -> None:
         (("--line", "1 m, 1 m to 1 m, 1 m, 1 m"), "has 2 co-ordinates; give three"),
         (
             ("--line", "y = 600 mm"),
-            "two axes stand still on a line; write for example y = 600 mm, z = 600 mm",
+            "a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm",
         ),
         (
             ("--line", "y = 600 mm, z = 600 mm", "--points", "1"),

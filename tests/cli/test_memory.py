@@ -114,4 +114,4 @@ def test_a_process_with_little_memory(tmp_path: Path) -> None:
     assert found.returncode == 3, found.stderr
     assert found.stdout == ""
     (line,) = found.stderr.splitlines()
-    assert line.startswith(f"{tmp_path}/large.yaml: run needs more memory than there is")
+    assert line.startswith(f"{tmp_path}/large.yaml: run needs more memory than is available")

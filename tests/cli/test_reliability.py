@@ -216,8 +216,8 @@ def waves(rows: Rows) -> None:
         (
             probe,
             [
-                "offset z of probe (left|right) stated [12].* too .*; it cannot be told from offset"
-                " z of probe "
+                "offset z of probe (left|right) stated [12].* too .*; it cannot be distinguished"
+                " from offset z of probe "
             ],
             [2e-6],
         ),
@@ -295,7 +295,7 @@ def test_a_wave_in_a_scale_is_laid_to_the_model(
         (one,) = suspected(waves, sigma, clean, tmp_path, capsys)
         assert (
             one["kind"] == "model"
-            and "what explains most is an error in x that depends on x" in one["words"]
+            and "the best explanation is an error in x that depends on x" in one["words"]
         )
         assert one["value"] > 1.5 and one["lines"] == []
 

@@ -274,10 +274,7 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert out == "" and [
         line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()
     ] == [
-        (
-            '3:21: error_model.kind: the reversal is about a machine of kind "metric" in two'
-            " dimensions"
-        ),
+        ('3:21: error_model.kind: the reversal needs a machine of kind "metric" in two dimensions'),
         "5:1: artefacts: the reversal takes one artefact",
         "8:1: positions: the reversal takes two positions, a quarter turn apart",
     ]
@@ -318,7 +315,7 @@ def test_several_probes_and_priors(tmp_path: Path, capsys: pytest.CaptureFixture
     assert data(capsys, "fit", str(path), str(readings), *REVERSAL)["scale"] == "x"
     _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, "--scale", "none", status=3)
     assert (
-        "priors: priors are about the file's error model; write scale: none there instead of"
+        "priors: priors refer to the file's error model; write scale: none there instead of"
         " --scale" in err
     )
 

@@ -301,17 +301,17 @@ def test_wrong_usage(
         (("--order", "2", "--boundary", "9 mm"), ["broken lines share no slope"]),
         (
             ("--x", "nominal_z", "--start", TANGENT),
-            ["nominal co-ordinates tell a place on the profile"],
+            ["nominal co-ordinates define a place on the profile"],
         ),
         (("--points", "12-32,44"), ['no point "44"']),
         (
             ("--points", "12"),
-            ["all points are at 0 mm, where there is no curve; give points at several"],
+            ["all points are at 0 mm, which defines no curve; give points at several abscissae"],
         ),
         (("--points", "12-40"), ['"12-40" goes beyond the points, 1 to 32']),
         (
             ("--sigma", "given"),
-            ["no uncertainty is given that could be believed; add a column such as u_um, or give"],
+            ["no uncertainties are stated; add a column such as u_um, or give"],
         ),
         (("--start", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
         (("--end", "20 mm, -20 mm"), ["the place (20 mm, -20 mm) is not on the profile"]),
@@ -350,7 +350,7 @@ def test_points_at_the_same_place_are_named(
     )
     assert run(tmp_path / "data.csv") == 3
     assert (
-        "two neighbouring points stand at (9 mm, 1 mm); leave one of them out"
+        "two neighbouring points are at (9 mm, 1 mm); leave one of them out"
         in capsys.readouterr().err
     )
 

@@ -85,5 +85,5 @@ def test_a_current_folder_that_has_been_deleted_is_told(
     ]
     monkeypatch.setattr(schema, "run", lambda _: Path.cwd())
     assert main(["schema"]) == 3
-    told = "ballplate schema: the current folder is not there any more; change to another\n"
+    told = "ballplate schema: the current folder no longer exists; change to another\n"
     assert capsys.readouterr() == ("", told)

@@ -123,7 +123,7 @@ def replaced(old: str, new: str) -> str:
             "error_model: {kind: kinematic}",
             "error_model: {kind: empirical, terms: {centres: [8, 8, 8]}}",
             (
-                "3:39: error_model.terms: these functions are too much alike to be told apart; give"
+                "3:39: error_model.terms: these functions are too similar to be distinguished; give"
                 " fewer centres or a smaller constant"
             ),
         ),
@@ -311,7 +311,7 @@ def _loop(path: Path) -> None:
     ("make", "text"),
     [
         (_device, "this is a device; name a file"),
-        (os.mkfifo, "this is a pipe, to which nobody may write; name a file"),
+        (os.mkfifo, "this is a pipe; name a file"),
         (
             _loop,
             "cannot be read (Too many levels of symbolic links); check its name and permissions",

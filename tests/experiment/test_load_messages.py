@@ -42,8 +42,8 @@ SECTIONS = [
         '1:1: titel: unknown key; did you mean "title"?',
     ]),
     ("title: good", "title: 2024", [
-        "1:8: title: expected a text, found the number 2024; put it in quotes (what the experiment "
-        "is, in a line)"]),
+        "1:8: title: expected a text, found the number 2024; put it in quotes (one-line"
+        " description of the experiment)"]),
     ("title: good", "title:", ["1:7: title: empty; give a value, or leave it out"]),
     ("title: good", 'title: ""', ["1:8: title: empty; give a text"]),
     ("title: good", "title: a\ndescription:", ["2:13: description: empty; give a value, or leave it out"]),
@@ -59,7 +59,7 @@ SECTIONS = [
         '2:21: target_uncertainty: "L/5" is not a length that grows with L; write for example "0.5 um + '
         'L/1000000", with L in metres, "0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L in mm"']),
     ("title: good", "title: a\ntitle: b", [
-        '2:1: the key "title" stands already in line 1; remove one of the two']),
+        '2:1: the key "title" is already in line 1; remove one of the two']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinetic}", [
         '5:21: error_model.kind: unknown kind "kinetic"; did you mean "kinematic"?']),
     ("error_model: {kind: kinematic}", "error_model: {}", [
@@ -221,7 +221,7 @@ POSITIONS = [
     (LOW, LOW.replace("corner:", "centre: {x: 1 m, y: 1 m}, corner:"), [
         '11:57: positions[0].centre: does not go with "corner"; remove one of the two']),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}", "repeats: 2"), [
-        "11:5: positions[0]: says nothing of where the artefact is; "
+        "11:5: positions[0]: does not say where the artefact is; "
         "add plane, level and corner or centre, or pose"]),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner:", "pose: {origin: [0 m, 0 m, 0 m]}, corner:"), [
         '11:67: positions[0].corner: does not go with "pose"; remove one of the two']),
@@ -271,7 +271,7 @@ CALIBRATION = [
         '14:55: calibration[0].pairs[0][1]: unknown ball "r1c9"; did you mean "r1c3"?',
         '14:62: calibration[0].pairs[1]: a ball has no distance from itself; name two balls, not '
         '"r1c1" twice',
-        "14:90: calibration[0].pairs[3]: stands already in entry [2]; remove one of the two",
+        "14:90: calibration[0].pairs[3]: is already in entry [2]; remove one of the two",
     ]),
     (SIDES, f"{SIDES}, form: projection, dimensions: 4", [
         "14:121: calibration[0].dimensions: expected one of: 2, 3; found the number 4"]),
@@ -382,8 +382,8 @@ def test_tables_are_reported_at_their_own_lines(tmp_path: Path) -> None:
     text = GOOD.replace(SIDES, f"{SIDES}, values: d.csv").replace("title: good", "title: 1")
     assert refusals(tmp_path, text) == [
         (
-            "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (what the"
-            " experiment is, in a line)"
+            "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (one-line"
+            " description of the experiment)"
         ),
         'd.csv:2:11: "five" is not a number; write for example "500.0003"',
     ]
@@ -398,7 +398,7 @@ def test_tables_are_reported_at_their_own_lines(tmp_path: Path) -> None:
         ),
         (
             "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's"
-            " drawing; correct the one or the other"
+            " drawing; correct one of the two"
         ),
         (
             'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice;'

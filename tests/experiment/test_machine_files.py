@@ -228,7 +228,7 @@ probing: 0 um
         (
             "probing: 1 um",
             "probing: 1 um\nprobing: 2 um",
-            'm.yaml:15:1: the key "probing" stands already in line 14',
+            'm.yaml:15:1: the key "probing" is already in line 14',
         ),
         ("probing: 1 um", "probing:", "m.yaml:14:9: probing: empty; give a value, or leave it out"),
     ],
@@ -263,7 +263,7 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         (
             "y = 400 mm",
             "at the front",
-            ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y'],
+            ['eyx.csv:2:9: "at the front" is not a position of an axis; write for example y'],
         ),
         (
             "y = 400 mm",
@@ -300,7 +300,7 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
             [],
         ),
         ("# measured: last year", "# file: 2021", []),
-        ("# straightness", "# line", ['eyx.csv:3:3: "line:" stands already in line 2; remove one']),
+        ("# straightness", "# line", ['eyx.csv:3:3: "line:" is already in line 2; remove one']),
         (
             "minimum zone",
             "minimal zone",

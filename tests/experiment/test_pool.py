@@ -394,7 +394,7 @@ def test_two_certificates_of_one_gauge_exclude_each_other(tmp_path: Path) -> Non
         "pool:\n", "  - {kind: radius, artefact: gauge, standard_uncertainty: 1 um}\npool:\n"
     )
     assert [line.split(": ", 1)[1] for line in messages(tmp_path, text, planning=True)] == [
-        f'pool.calibration[{k}]: the radius of "gauge" stands in calibration[1] already; remove one'
+        f'pool.calibration[{k}]: the radius of "gauge" is already in calibration[1]; remove one'
         " of the two"
         for k in (1, 2)
     ]
@@ -458,7 +458,7 @@ MISTAKES = [
         "28:22: pool.limits.never_together[0]: at most 1 of these are allowed, but low, bar are to be kept; correct "
         "pool.limits"]),
     ("{plane: x}", "{}", [
-        "29:20: pool.limits.at_most[0].of: says nothing; give at least one of name, group, plane, artefact, probe"]),
+        "29:20: pool.limits.at_most[0].of: selects nothing; give at least one of name, group, plane, artefact, probe"]),
     ("{plane: x}", "{group: sum}", [
         '29:28: pool.limits.at_most[0].of.group: unknown group "sum"; known: bar, dear, gauge, some']),
     ("{plane: x}", "{name: z *}", [

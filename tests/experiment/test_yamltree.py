@@ -92,7 +92,7 @@ def test_aliases_stand_where_they_are_used() -> None:
     [
         (
             "a: 1\nb: 2\na: 3\n",
-            ['f:3:1: the key "a" stands already in line 1; remove one of the two'],
+            ['f:3:1: the key "a" is already in line 1; remove one of the two'],
         ),
         (
             "a: {b: 1}\n<<: {c: 1}\n",
@@ -114,7 +114,7 @@ def test_aliases_stand_where_they_are_used() -> None:
         ("a: &b 1\nc: *d\n", ["f:2:4: nothing is anchored as &d; known: &b"]),
         (
             "a: &b [*b]\n",
-            ["f:1:8: the alias *b stands inside what it refers to; write the value out"],
+            ["f:1:8: the alias *b is inside the value that it refers to; write the value out"],
         ),
         (
             "a: 1\n---\nb: 1\n",

@@ -348,7 +348,8 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
                 )
     assert found.bound <= found.value == pytest.approx(best, rel=1e-9)
     with pytest.raises(
-        ExperimentError, match='U5 takes in the distances of ".*", of which no position can be read'
+        ExperimentError,
+        match='U5 includes the distances of ".*", but no position of these can be read',
     ):
         campaign(experiment, Request("U5", Budget(positions=1)))
 

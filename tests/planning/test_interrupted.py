@@ -333,7 +333,7 @@ def test_without_any_further_position_balls_may_be_unread(
     capsys.readouterr()
     assert command("plan", pool, "--done", readings, "--hours", "0.01", "--workers", "1") == 3
     assert (
-        '"plate" was begun, and no position of its other balls can be read'
+        '"plate" was begun, but no position of its other balls can be read'
         in capsys.readouterr().err
     )
 

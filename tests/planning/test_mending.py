@@ -175,7 +175,7 @@ variants:
 """,
             "own",
             "11:17: variants.own.positions[0].quarter_turns",
-            "stands elsewhere, where this alias leads",
+            "is elsewhere, at the anchor of this alias",
         ),
         (
             """\

@@ -372,7 +372,7 @@ def test_nothing_to_repair() -> None:
 def test_what_cannot_be_repaired_says_what_was_tried() -> None:
     experiment = design("hurt_foss/bryan-gauge", "one plane")
     (line,) = repair_lines(repairs(experiment), check(experiment).verdict)
-    assert line.startswith("repair: no changes were found after which nothing is open; ")
+    assert line.startswith("repair: no changes were found that determine everything; ")
 
 
 def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost, ...] = ()) -> Pool:

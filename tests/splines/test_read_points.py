@@ -66,7 +66,7 @@ def test_normals_of_the_drawing(write: Path) -> None:
     np.testing.assert_allclose(points.normals, [[0.6, 0.8], [-1.0, 0.0]])
     np.testing.assert_allclose(points.chosen([1]).normals, [[-1.0, 0.0]])
     assert told(write, "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,0,0\n2,1,2,a,1\n") == [
-        'data.csv:2:7: "0" and "0" are no direction; give its parts, such as 0.6 and 0.8',
+        'data.csv:2:7: "0" and "0" are not a direction; give its components, such as 0.6 and 0.8',
         'data.csv:3:7: "a" is not a number; write for example "500.0003"',
     ]
     assert told(write, "x_mm,z_mm,error_um,normal_x\n1,1,2,0\n") == [
@@ -84,7 +84,7 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
             "data.csv:5:1: 2 columns instead of 4; write one line per row, its columns separated by"
             " commas"
         ),
-        'data.csv:6:7: "0" is no standard uncertainty; give one above zero',
+        'data.csv:6:7: "0" is not a standard uncertainty; give one above zero',
         (
             'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of'
             " 1e-18 m to 1e+06 m"
@@ -150,7 +150,7 @@ def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
         ),
         'data.csv:4:4: "5,3" has a decimal comma; write 5.3',
         "data.csv:5:1: 1 columns instead of 2; separate them by commas",
-        'data.csv:6:4: "7;8" is no number; separate the columns by commas',
+        'data.csv:6:4: "7;8" is not a number; separate the columns by commas',
     ]
 
 

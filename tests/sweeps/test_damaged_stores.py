@@ -295,7 +295,7 @@ def test_an_unreadable_definition_costs_no_figure(
     right = rows(store)
     by_sql("UPDATE sweep SET definition = 'lost'")(store)
     assert main(commands(store, "csv")[0]) == 3
-    assert "what sweep 1 is of cannot be read" in capsys.readouterr().err
+    assert "the definition of sweep 1 cannot be read" in capsys.readouterr().err
     table = read_table(store.parent / "table.csv")
     assert_subset(table, right, exact=True)
     assert len(table) == 4 and "size_m" not in table
@@ -475,7 +475,7 @@ def test_names_of_files_in_a_store_lead_nowhere(
     connection.close()
     assert main(commands(store, "html")[0]) == 0
     page = (store.parent / "report.html").read_text(encoding="utf-8")
-    assert "the store is not to be trusted" in page or "cannot be unpacked" in page
+    assert "the store cannot be trusted" in page or "cannot be unpacked" in page
     assert {path for path in store.parent.parent.rglob("*")} - before <= {
         store.parent / "report.html"
     }

@@ -134,4 +134,4 @@ def test_an_address_that_is_none(
 ) -> None:
     assert main(["sweep", str(small_sweep(tmp_path, 2)), "--scheduler", address]) == 3
     err = capsys.readouterr().err
-    assert err.splitlines()[-1].startswith(f"{address}: is no address of a scheduler; ")
+    assert err.splitlines()[-1].startswith(f"{address}: is not the address of a scheduler; ")

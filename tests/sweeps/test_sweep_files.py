@@ -185,7 +185,7 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
             "axes:\n  a: {path: artefacts.plat.size, values: [1]}\n",
             ["s.yaml:4:6: axes.a: artefacts.plat.size: there is no"],
         ),
-        ("axes:\n  a: {path: seed}\n", ["s.yaml:4:6: axes.a: nothing says what it varies"]),
+        ("axes:\n  a: {path: seed}\n", ["s.yaml:4:6: axes.a: does not say what it varies"]),
         (
             "axes:\n  a: {values: [1]}\n",
             ["s.yaml:4:6: axes.a: what the values replace is not clear; give path, or paths"],

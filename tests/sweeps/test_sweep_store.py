@@ -204,7 +204,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
 
     monkeypatch.setattr("ballplate.sweeps.local.compute", changing)
     assert sweep(path) == 3
-    assert "have been changed while it ran" in capsys.readouterr().err
+    assert "were changed while it ran" in capsys.readouterr().err
     # What was computed before the change is there, and nothing else.
     assert rows(tmp_path / "small.sqlite")["cell"].tolist() == [0]
     monkeypatch.undo()
@@ -474,13 +474,13 @@ def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
         (
             "predict",
             (1 << 58,),
-            "it needs more memory than there is: there is no room for another 2.00 EiB; ",
+            "it needs more memory than is available: there is no room for another 2.00 EiB; ",
         ),
-        ("experiment_of", (), "it needs more memory than there is; "),
+        ("experiment_of", (), "it needs more memory than is available; "),
         (
             "trials",
             (1 << 58,),
-            "it needs more memory than there is: there is no room for another 2.00 EiB; ",
+            "it needs more memory than is available: there is no room for another 2.00 EiB; ",
         ),
     ],
 )

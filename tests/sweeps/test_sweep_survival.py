@@ -176,7 +176,7 @@ def test_interrupted_and_resumed(
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
-    assert "the same command goes on from there" in err and "Traceback" not in err
+    assert "the same command continues from there" in err and "Traceback" not in err
     assert 2 < stored(store) < 80
 
 

@@ -1,3 +1,1 @@
-"""Changes after which a design determines all that it asks for: what can be changed, and what of it
-is cheapest.
-"""
+"""Search for the cheapest changes after which a design determines everything."""

@@ -1,4 +1,4 @@
-"""Distances and radii that may be calibrated, or better than they are."""
+"""Distances and radii that may be calibrated, or calibrated better."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sets of additions that together say something of every null direction."""
+"""Sets of additions that together determine every null direction."""
 
 from __future__ import annotations
 

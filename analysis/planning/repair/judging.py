@@ -1,6 +1,4 @@
-"""What a changed experiment would determine: everything but the words of a verdict, as many are
-compared.
-"""
+"""Fast assessment of changed experiments: the verdict without its words."""
 
 from __future__ import annotations
 

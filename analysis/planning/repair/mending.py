@@ -78,7 +78,7 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
         )
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
-        text = "the file with the repair has not the rank that was found; nothing is changed"
+        text = "the repaired file does not have the rank that was found; nothing is changed"
         raise ExperimentError([experiment.message((), text)])
     return new
 
@@ -159,7 +159,7 @@ def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[Te
         if own[: len(whole)] == tuple(map(str, whole)):
             mark = mark_of(root, ("variants", variant, path), of_key=True)
             place_text = format_path(whole)
-            text = f"the repair changes {place_text}, of which this is a part; write it by hand"
+            text = f"the repair changes {place_text}, which includes this; write it by hand"
             raise ExperimentError([mark.message(format_path(("variants", variant)), text)])
     said: Any = changed_data(to_python(root), change)
     for step in whole:

@@ -1,4 +1,4 @@
-"""Positions that are read anyway, put otherwise or read more."""
+"""Changes of positions that are read anyway: moved, turned or read more."""
 
 from __future__ import annotations
 

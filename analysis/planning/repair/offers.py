@@ -1,4 +1,4 @@
-"""What can be changed of any experiment, and what its pool offers."""
+"""Possible changes of an experiment, and those that its pool offers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where artefacts can be put, and how far their balls are apart."""
+"""Possible places of artefacts, and the distances between their balls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Another plate, or less that is asked for."""
+"""Reductions: another plate, or fewer coefficients."""
 
 from __future__ import annotations
 

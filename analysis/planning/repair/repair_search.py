@@ -1,4 +1,4 @@
-"""The cheapest changes after which a design determines all that it asks for.
+"""Search for the cheapest repairs of a deficient design.
 
 Every set of changes that is told has been applied to the experiment, and the rank of the resulting
 design computed in full; none of its members can be left out.

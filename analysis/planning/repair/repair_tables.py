@@ -29,7 +29,7 @@ def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
         lines += [f"repair {k}, in the file: {edit}" for edit in one.edits]
     if not repairs.complete:
         tried = _tried(repairs)
-        lines.append(f"repair: no changes were found after which nothing is open; {tried}")
+        lines.append(f"repair: no changes were found that determine everything; {tried}")
     for one in repairs.partial:
         lines.append(
             f"repair of {_directions(one, judged)} alone: {changes_in_words(one)}: leaves"
@@ -57,7 +57,7 @@ def _worth(repair: Repair, judged: Verdict) -> str:
             " corrected points"
         )
     elif repair.is_faint:
-        words += ", but hardly: see the smallest singular value"
+        words += ", but only just: see the smallest singular value"
     else:
         words += ", and nothing is weakly determined"
     if repair.removes:
@@ -98,7 +98,7 @@ def _names(direction: Direction) -> list[str]:
 
 def _tried(repairs: Repairs) -> str:
     if not repairs.tried:
-        return "there is nothing that could be changed in general"
+        return "nothing can be changed"
     counts = ", ".join(f"{count} {KINDS[kind]}" for kind, count in repairs.tried.items())
     return (
         f"tried: {counts}, and {repairs.sets} sets of several"
@@ -114,10 +114,7 @@ def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
     if certificate is None:
         return []
     if certificate.change is None:
-        return [
-            "scale: no single calibrated distance that was tried carries it in place of the probe"
-            " offsets"
-        ]
+        return ["scale: no single calibrated distance that was tried can replace the probe offsets"]
     u, average = f"{1e6 * certificate.offset_uncertainty:g}", number(1e6 * certificate.average)
     words = (
         f"scale: {certificate.change.words}: average U6 {average} um with {u} um on the probe"

@@ -1,6 +1,5 @@
-"""What further observations say of null directions, without a factorisation of the changed
-design.
-"""
+"""Effect of further observations on null directions, without a factorisation of the changed
+design."""
 
 from __future__ import annotations
 

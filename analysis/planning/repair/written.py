@@ -1,4 +1,4 @@
-"""Changes of an experiment as what its file is to say."""
+"""Changes of an experiment as edits of its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is needed for a goal, and how it is told."""
+"""Answers of the search for what a goal needs, as text and data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Answer:
     """What an unknown must be for the goal to be met, the others as they are.
 
-    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that
+    `status`: a value was `found` beside which the next, `beside`, is not enough; `any` value that
     was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
     unknown cannot be `varied`. `words` and `value`, in metres or a number, are the value needed, or
     without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
@@ -110,10 +110,10 @@ def _lines(reach: Reach) -> list[str]:
     ]
     if reach.present.undetermined:
         lines.append(
-            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check tells"
+            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check shows"
             " what is undetermined"
         )
-    rows = [["changed alone", "as drawn", "needed", "what comes of it"]]
+    rows = [["changed alone", "as drawn", "needed", "result"]]
     for one in reach.answers:
         rows.append([one.title, one.present, _needed(one), _outcome(one)])
     lines += ["", *aligned(rows, [False] * 4)]

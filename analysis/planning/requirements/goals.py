@@ -1,4 +1,4 @@
-"""What a design is to reach, and whether it does."""
+"""Goals of a design, and whether they are met."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
         return Goal(text, 1.0 if share is None else share)  # type: ignore[arg-type]
     found = PATTERN.fullmatch(text)
     if found is None:
-        raise GoalError(f'"{text}" is no goal; write {FORMS}')
+        raise GoalError(f'"{text}" is not a goal; write {FORMS}')
     symbol, statistic, limit = found.groups()
     if symbol not in SYMBOLS:
         advice = (
@@ -99,7 +99,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
             if symbol in MIXED
             else f"known: {listing(SYMBOLS, 20)}"
         )
-        raise GoalError(f'"{symbol}" is no quantity with a limit; {advice}')
+        raise GoalError(f'"{symbol}" is not a quantity with a limit; {advice}')
     if share is not None:
         raise GoalError("a share goes with the goal lengths; leave it out")
     try:
@@ -180,7 +180,7 @@ def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:
         return Judgement(False, math.inf, words, undetermined)
     worst = int(comparable(ratios).argmax())
     words += (
-        f"; most of its target needs {prediction.tasks[worst].name},"
+        f"; the largest share of its target has {prediction.tasks[worst].name},"
         f" {number(100 * ratios[worst])} %"
     )
     return Judgement(within == len(ratios), ratios[worst], words, 0)

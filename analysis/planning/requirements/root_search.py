@@ -37,7 +37,7 @@ CONVERGED = 1e-3
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of a value: how the goal is met and the rank deficiency, or why the file is wrong
+    """What came of a value: how the goal is met and the rank deficiency, or why the file is invalid
     with it.
     """
 
@@ -195,8 +195,8 @@ class _Trials:
 def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
     if unknown.is_monotone and present.undetermined:
         reason = (
-            f"rank deficiency {deficiency} leaves {present.undetermined} undetermined whatever"
-            " it is"
+            f"rank deficiency {deficiency} leaves {present.undetermined} undetermined, whatever"
+            " the value"
         )
         return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
@@ -223,7 +223,7 @@ def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer
         middle = (met + failed) // 2
         met, failed = (middle, failed) if trials.at(middle).is_met else (met, middle)
     beside = trials.at(failed)
-    words = f"{beside.words} does not do: " + (
+    words = f"{beside.words} is not enough: " + (
         beside.judgement.words if beside.judgement else beside.refusal
     )
     return replace(_told(trials, "found", met, remarks), beside=words)
@@ -273,7 +273,7 @@ def _convergence(trials: _Trials, extreme: int) -> list[str]:
     if found is None or before is None:
         return []
     if abs(before.distance - found.distance) <= CONVERGED * found.distance:
-        return ["an exact one would not be better: with ten times that it is the same"]
+        return ["an exact one would not be better: ten times that gives the same result"]
     return ["a smaller one would still change the figure"]
 
 
@@ -291,11 +291,11 @@ def _scanned(trials: _Trials) -> Answer:
     remarks = []
     if one.name == "size" and probes[-1] < one.last:
         beyond = trials.at(probes[-1] + 1)
-        remarks.append(f"from {beyond.words} on the file is wrong: {beyond.refusal}")
+        remarks.append(f"from {beyond.words} on, the file is invalid: {beyond.refusal}")
     refused = [trials.at(step) for step in probes if step not in usable]
     if refused:
         remarks.append(
-            f"the file is wrong with {listing([one.words for one in refused], 3)}:"
+            f"the file is invalid with {listing([one.words for one in refused], 3)}:"
             f" {refused[0].refusal}"
         )
     if one.name == "size" and not any(trials.at(step).is_met for step in usable):
@@ -307,7 +307,7 @@ def _scanned(trials: _Trials) -> Answer:
     good = _first_met(trials, probes, -1)
     if good < 0:
         if one.name == "balls":
-            remarks.append(f"more than {one.words(one.last)} were not looked at")
+            remarks.append(f"more than {one.words(one.last)} were not tried")
         best = trials.nearest(usable)
         if trials.judgement(best).undetermined:
             told = (
@@ -320,7 +320,9 @@ def _scanned(trials: _Trials) -> Answer:
         again = next(
             (trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None
         )
-        remarks += [] if again is None else [f"not every larger one does: {again.words} does not"]
+        remarks += (
+            [] if again is None else [f"not every larger one is enough: {again.words} is not"]
+        )
     if good == 0:
         return _told(trials, "any", probes[0], remarks)
     return _found(trials, probes[good], probes[good - 1], remarks)

@@ -1,6 +1,4 @@
-"""What may be solved for: each unknown as a family of experiment files, one for each of its
-values.
-"""
+"""Unknowns of the search: each is a family of experiment files, one for each value."""
 
 from __future__ import annotations
 
@@ -99,7 +97,7 @@ def unknown(
         if not chosen:
             of = "" if artefact is None else f' of "{artefact}"'
             raise NotVariableError(
-                f"the file states no calibration{of}; without certificate there is none to improve"
+                f"the file states no calibration{of}; there is no certificate to improve"
             )
         paths = [f"calibration[{k}].standard_uncertainty" for k in chosen]
         return _scaled(name, "certificate's standard uncertainty", root, paths)
