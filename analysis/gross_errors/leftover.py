@@ -90,7 +90,7 @@ def too_many_entries(design: Design) -> str:
     if rows * columns <= MOST_ENTRIES:
         return ""
     text = (
-        f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; at"
+        f"{rows} observations, each co-ordinate counted, are too many to test for gross errors; at"
         " most "
     )
     return (

@@ -72,7 +72,7 @@ class MoreScatter:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Residuals that no single mistake explains; `words` tell the smooth error that does best,
+    """Residuals that no single gross error explains; `words` tell the smooth error that does best,
     empty without one.
 
     They are `times` as large as the stated uncertainties make them, which is `too_large` if these
@@ -88,10 +88,10 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the residuals show: mistakes, readings that scatter more, or that no single mistake
+    """What the residuals show: mistakes, readings that scatter more, or that no single gross error
     explains them.
 
-    Readings may scatter more beside mistakes, or beside what no single mistake explains.
+    Readings may scatter more beside mistakes, or beside what no single gross error explains.
     """
 
     suspects: tuple[Suspect, ...] = ()

@@ -63,14 +63,14 @@ def scatter_words(scatter: MoreScatter) -> str:
 
 
 def unexplained_words(unexplained: Unexplained) -> str:
-    """That no single mistake explains the residuals, and what may."""
+    """That no single gross error explains the residuals, and what may."""
     best = (
         f"the best explanation is {unexplained.words} {_significance(unexplained)}"
         if unexplained.words
         else f"{_significance(unexplained)[1:-1]}"
     )
     return (
-        "the error model, a drift or the noise: no single mistake explains the residuals,"
+        "the error model, a drift or the noise: no single gross error explains the residuals,"
         f" which are {number(unexplained.times, 3)} times as large as stated; {best}; try a"
         f" richer error model{', or larger uncertainties' if unexplained.too_large else ''}"
     )

@@ -136,7 +136,7 @@ def few_degrees_of_freedom(degrees_of_freedom: int, what: str, instead: str) -> 
 
 def _scale(axis: str, value: float, against: str = "") -> str:
     if np.isnan(value):
-        return "cannot be told"
+        return "cannot be determined"
     return (
         f"let {axis} read {_amount(1e6 * abs(value))} um per m"
         f" {'more' if value > 0 else 'less'}{against}"
@@ -145,7 +145,7 @@ def _scale(axis: str, value: float, against: str = "") -> str:
 
 def _turn(guideway: str, other: str, lean: float) -> str:
     if np.isnan(lean):
-        return "cannot be told"
+        return "cannot be determined"
     angle = f"{_amount(abs(lean) / ARCSECOND)} arcsec ({_amount(1e6 * abs(lean))} um per m)"
     return f"turn the {guideway} guideway by {angle} towards {'-' if lean > 0 else '+'}{other}"
 

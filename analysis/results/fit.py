@@ -328,8 +328,8 @@ class Fit(FitResult):
         if self.too_large:
             times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
             cure = (
-                "no single mistake explains that: try a richer error model or larger uncertainties,"
-                " and consider drifts"
+                "no single gross error explains that: try a richer error model or larger"
+                " uncertainties, and consider drifts"
             )
             if self.diagnosis.suspects or self.diagnosis.scatter:
                 cure = "see what is suspected"

@@ -432,8 +432,8 @@ def check_radii(calibrations: Mapping[int, Calibration], problems: Problems) -> 
             continue
         if calibration.artefact in first:
             text = (
-                f'the radius of "{calibration.artefact}" stands in'
-                f" calibration[{first[calibration.artefact]}] already"
+                f'the radius of "{calibration.artefact}" is already in'
+                f" calibration[{first[calibration.artefact]}]"
             )
             problems.add(("calibration", i), f"{text}; remove one of the two")
         first.setdefault(calibration.artefact, i)

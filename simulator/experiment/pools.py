@@ -232,8 +232,9 @@ def resolve_pool(
         if isinstance(item, RadiusCalibration):
             if item.artefact in fixed:
                 text = (
-                    f'the radius of "{item.artefact}" stands in calibration[{fixed[item.artefact]}]'
-                    " already; "
+                    f'the radius of "{item.artefact}" is already in'
+                    f" calibration[{fixed[item.artefact]}]"
+                    "; "
                 )
                 problems.add(steps, f"{text}remove one of the two")
             radii.setdefault(item.artefact, []).append(len(found))

@@ -223,7 +223,9 @@ def test_the_bars_that_are_proposed_cure(
     )
     assert len(proposed) == before.deficiency - left
     after = check(with_bars(tmp_path, given + [BARS[one] for one in proposed], **sections)).verdict
-    assert after.deficiency == left and not any("nothing tells" in one for one in after.reasons)
+    assert after.deficiency == left and not any(
+        "nothing determines" in one for one in after.reasons
+    )
     # None of them is too many.
     for k in range(len(proposed)):
         fewer = [BARS[one] for one in proposed[:k] + proposed[k + 1 :]]

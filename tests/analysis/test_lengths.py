@@ -236,7 +236,7 @@ def test_a_deficient_design_is_told_and_named(
     out = capsys.readouterr().out
     assert (
         "rank deficiency 3; " in out
-        and "changes none of these lengths; those of another --grid it may change" in out
+        and "change none of these lengths, but may change those of another --grid" in out
     )
     assert main(["lengths", file, "--grid", "4"]) == 1
     out = capsys.readouterr().out

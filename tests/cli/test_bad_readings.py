@@ -168,7 +168,7 @@ def test_two_readings_that_disagree(tmp_path: Path, capsys: pytest.CaptureFixtur
         with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design)
     )
     assert (
-        line.startswith("4:1: ball 3 in position first stands ")
+        line.startswith("4:1: ball 3 in position first is ")
         and "in position turned, line 9; correct or" in line
     )
 

@@ -56,7 +56,8 @@ def test_quarter_turns_in_degrees_are_refused(tmp_path: Path, turns: int, meant:
     assert "quarter_turns: 1" in text
     path.write_text(text.replace("quarter_turns: 1", f"quarter_turns: {turns}"))
     with pytest.raises(
-        ExperimentError, match=rf"\.quarter_turns: {turns} is no number of turns .*; write {meant}"
+        ExperimentError,
+        match=rf"\.quarter_turns: {turns} is not a number of turns .*; write {meant}",
     ):
         load(path)
 

@@ -55,7 +55,9 @@ def test_one_that_was_swallowed_ends_a_sweep(
     monkeypatch.setattr(execute, "add_rows", interrupted_once)
     assert main(["sweep", str(path), "--workers", "1"]) == 130
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("interrupted; what is done is in") and err.count("\n") == 1
+    assert (
+        out == "" and err.startswith("interrupted; finished cells are in") and err.count("\n") == 1
+    )
     assert stored(store) == 2
     assert main(["sweep", str(path), "--workers", "1"]) == 1
     assert "6 cells, 4 done, 2 failed (2 of them before)" in capsys.readouterr().out

@@ -49,7 +49,7 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 um is taken off" in err
     lines = out.split("\n")
     assert lines[1].startswith(
-        "FB1: x carries z carries the probe, y carries the workpiece; errors are where the tip is"
+        "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
     )
     assert [
         "EYY",

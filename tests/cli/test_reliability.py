@@ -22,7 +22,7 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
     table = tmp_path / "all.csv"
     assert main(["reliability", QUICKSTART, "--csv", str(table)]) == 0
     out = capsys.readouterr().out
-    assert "754 observations; redundancy 580.0 in all" in out
+    assert "754 observations; redundancy 580.0 in total" in out
     assert "estimated from the other residuals: 4.152 standard deviations" in out
     assert (
         "cannot be detected, harmless: offset x of probe down, offset y of probe down, offset z of"

@@ -204,7 +204,7 @@ def interrupted(
         assert there == set(told.split(", ")) - {""}, err
         assert there or "no file was written" in last or "are lost" in last, err
     elif (folder / "new.sqlite").exists() and stored(folder / "new.sqlite"):
-        assert "what is done is in new.sqlite" in last
+        assert "finished cells are in new.sqlite" in last
     return True
 
 

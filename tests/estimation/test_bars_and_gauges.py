@@ -204,7 +204,7 @@ def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
     found = [fit(one, read_readings(observed, lay_out(one)), "given") for one in (unknown, badly)]
     assert [one.verdict.deficiency for one in found] == [1, 0]
     left = {one.name: one for one in found[0].adjustments}
-    assert np.isnan(left["scale x"].value) and left["scale x"].words == "cannot be told"
+    assert np.isnan(left["scale x"].value) and left["scale x"].words == "cannot be determined"
     right = {e.name: e for e in found[1].estimates}
     assert right["scale x"].standard_uncertainty == pytest.approx(20e-6 / 0.3, rel=1e-2)
     for name, angle in (("C0Y", "angle xy"), ("B0Z", "angle xz"), ("A0Z", "angle yz")):

@@ -205,7 +205,7 @@ variants:
 """,
             "own",
             "9:9: variants.own",
-            "the repair changes positions[0].corner, of which this is a part",
+            "the repair changes positions[0].corner, which includes this",
         ),
     ],
 )

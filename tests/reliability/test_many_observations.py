@@ -39,7 +39,7 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (
         str(caught.value)
         == f"{QUICKSTART}:39:1: positions: {rows} observations, each co-ordinate counted, are too"
-        f" many to test for mistakes; at most {rows - 1} are possible with {columns} parameters"
+        f" many to test for gross errors; at most {rows - 1} are possible with {columns} parameters"
         " of machine, poses and tied balls: read fewer balls, or in fewer positions"
     )
     monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)

@@ -192,7 +192,7 @@ def test_interrupted_while_workers_start(
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert err.startswith("interrupted; what is done is in") and err.count("\n") == 1, err
+    assert err.startswith("interrupted; finished cells are in") and err.count("\n") == 1, err
 
 
 def test_one_writer_at_a_time(
