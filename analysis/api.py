@@ -1,8 +1,8 @@
 """ballplate from Python: what the commands do, with results in place of text.
 
 Wherever an experiment is taken, so is the path of a file with one; wherever a table, the path of a
-CSV file or a data frame. Values in results are in metres, radians and ratios. `report` is told of
-each step that has come further: what is counted, how many are done, and of how many. Every function
+CSV file or a data frame. Values in results are in metres, radians and ratios. `report` receives
+each step of the progress: what is counted, how many are done, and of how many. Every function
 raises `ballplate.ExperimentError` for a file or an experiment that is wrong, ValueError for an
 argument that is, and TypeError for one of another kind.
 """
@@ -143,7 +143,8 @@ def check(
     share: float | None = None,
     suggest: bool = False,
 ) -> Prediction:
-    """Whether a design determines everything it asks for and, if not, what it leaves open.
+    """Whether a design determines all its parameters and, if not, which changes it leaves
+    undetermined.
 
     `goals` are what it is to reach, too, as in `reach`, with the `share` of lengths that are to be
     within; with `suggest` changes are looked for that would determine the rest. Both are in the
@@ -178,7 +179,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     The text of a file that leaves nothing undetermined is returned as it is. Nothing is written.
 
     :raises ExperimentError: the file is wrong; no changes were found, or they cannot be written
-        without changing what stands about them.
+        without changing the rest of the file.
 
     >>> before = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").splitlines()
     >>> set(repair("designs/npl/6.1.1.yaml", variant="B").splitlines()).difference(before)
@@ -210,8 +211,8 @@ def run(
     workers: int = 1,
     report: Report = unreported,
 ) -> Prediction:
-    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials`
-    are asked for.
+    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them if `trials`
+    are given.
 
     At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty
     as accurate as `until`.
@@ -500,7 +501,7 @@ def reach(
 ) -> Reach:
     """The repeatability, certificate, repeats, balls or size of the plate with which a goal is met.
 
-    `goal` is as `ballplate reach --goal` has it, with the `share` of lengths that are to be within,
+    `goal` is as for `ballplate reach --goal`, with the `share` of lengths that are to be within,
     `unknowns` one of repeatability, certificate, repeats, balls and size, or several; without any
     it is all of them. `target` replaces the experiment's target, as a text with a unit. The
     `artefact` by its name and the entry of the `calibration` are what varies where there are
@@ -683,7 +684,7 @@ def sweep(
     folders: Sequence[PathLike] = (),
     report: Report = unreported,
 ) -> SweepResult:
-    """A family of experiments, computed into a store, from which it goes on where it ended.
+    """A family of experiments, computed into a store, which continues where it stopped.
 
     The store is the sweep file's name with .sqlite, unless another is named. A sweep other than the
     one that it holds is refused, or entered `beside` that. `folders` are those, besides those of

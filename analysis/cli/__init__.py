@@ -187,7 +187,7 @@ def _told(error: OSError, options: argparse.Namespace) -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Tells wrong usage in one line, whatever stands in the arguments, and what was probably meant.
+    """Reports wrong usage in one line, whatever the arguments contain, with the probable intention.
 
     The parsers of commands are of this class as well.
     """

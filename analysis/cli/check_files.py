@@ -1,5 +1,6 @@
 """Rank of every design in several files; a file that cannot be used does not prevent the check
-of the others."""
+of the others.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Progress of a long step on standard error: a bar on a terminal, occasional plain lines
-elsewhere."""
+elsewhere.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Error curve through measured points: a spline with prescribed values and slopes, and its
-uncertainty."""
+uncertainty.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Suspected causes of a fit's residuals: observations, events, the scatter of some readings, or
-the model."""
+the model.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Logarithms of the tail probabilities of sums of squares, which may be too small for a
-floating-point number."""
+floating-point number.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Results of replicates: bias, spread and coverage beside the linearised uncertainties, with
-standard errors."""
+standard errors.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Common parts of all replicates: the readings without noise, the estimate from them and its
-factorisation."""
+factorisation.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Computation of replicates, on one processor or several, until there are enough, summed in
-order."""
+order.
+"""
 
 from __future__ import annotations
 

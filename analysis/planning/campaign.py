@@ -1,5 +1,6 @@
 """Plan of a campaign: the choice from a pool, its distance from the bound, and the gain of each
-candidate."""
+candidate.
+"""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class Functions(Protocol):
 class Criterion:
     """A criterion by its `name`: the mean of `functions`, or their largest if `largest`.
 
-    `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded`
+    `about_balls` states whether it concerns all z, or only those of shared parameters. `excluded`
     counts functions that the pool leaves open, whatever is chosen. `functions` are None of criteria
     that are about eigenvalues; these are of the model's parameters, `scaled` (n, z), in metres.
     `target` is the criterion at which the target uncertainty is met on average, None where
@@ -249,7 +249,7 @@ class Linear:
 class PairBlock:
     """Pairs of two runs of places, those of `first` (rows) and of `second` (columns).
 
-    `chosen` (rows, columns) tells which pairs count, `length` (rows, columns) is their distance,
+    `chosen` (rows, columns) states which pairs count, `length` (rows, columns) is their distance,
     and `weights` have, for components i and j >= i, the products of these components of all
     directions, those of i < j twice.
     """

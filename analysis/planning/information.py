@@ -89,7 +89,7 @@ class Information:
     `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z)
     what each adds. `deficiency` counts shared directions (c, deficiency), `open_` in micrometres,
     that even all candidates together leave undetermined. `frames` (candidates that calibrate
-    co-ordinates) hold what each fixes of its plate's frame. `pose_ranks` tells how many parameters
+    co-ordinates) hold what each fixes of its plate's frame. `pose_ranks` states how many parameters
     of its own pose each candidate determines, were all else known, and `has_rows` whether it
     observes anything.
     """

@@ -132,8 +132,8 @@ class Offer:
 def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Offer:
     """What may be chosen from a pool after some set-ups have been read.
 
-    `standing` tells whether the artefact still is where it was read last, so that this position can
-    be completed.
+    `standing` states whether the artefact still is where it was read last, so that this position
+    can be completed.
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}

@@ -114,7 +114,7 @@ class Result:
 
 
 class FitResult(Result):
-    """What an estimator makes of readings, and what is to be said of both."""
+    """The result of an estimator, with remarks on the readings."""
 
     if TYPE_CHECKING:
 
@@ -133,7 +133,7 @@ class FitResult(Result):
 
     @property
     def complaint(self) -> str:
-        """Why the estimate is of no use or leaves open what it should not; empty where all is
+        """Why the estimate is unusable or leaves parameters undetermined; empty where all is
         well.
         """
         return ""

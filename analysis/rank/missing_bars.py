@@ -3,7 +3,8 @@ unknown lengths.
 
 A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S
 u: a sum of the six products of its direction cosines. From a Bryan gauge comes the same less what a
-shift of its pivot would do. What is open of the six is told as what bars have in common.
+shift of its pivot would do. What is undetermined of the six is described by what the bars have in
+common.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 """Bars and places of a Bryan gauge that would determine what is undetermined: the smallest set
-of natural ones."""
+of natural ones.
+"""
 
 from __future__ import annotations
 

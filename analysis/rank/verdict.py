@@ -1,8 +1,8 @@
 """Rank report of a design: null directions in the names of errors, balls and positions.
 
-A null direction is a change of parameters that no observation notices. It is told as what trades
-against what: error functions with their size and shape, the deformation of the artefact, the motion
-of positions.
+A null direction is a change of parameters that no observation notices. It is described by the
+parameters that trade against one another: error functions with their size and shape, the
+deformation of the artefact, the motion of positions.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def null_directions(at: Linearisation) -> tuple[Direction, ...]:
 
 
 def independent_mixture(at: Linearisation) -> Array:
-    """Mixtures (k, k) of the null directions in which they are told: each involves as little as
+    """Mixtures (k, k) of the null directions in which they are reported: each involves as little as
     possible.
     """
     return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])

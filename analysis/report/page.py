@@ -69,8 +69,8 @@ class DrawnMap:
 def page(
     store: Store, results: ReportedSweep, run_modules: bool = False, report: Report = unreported
 ) -> str:
-    """The page. Experiments with code of their own are drawn only with `run_modules`; `report` is
-    told what is drawn.
+    """The page. Experiments with code of their own are drawn only with `run_modules`; `report`
+    receives what is drawn.
 
     :raises ImportError: jinja2 or matplotlib is not installed.
     """

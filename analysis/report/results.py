@@ -59,7 +59,7 @@ class ReportAxis:
 
 @dataclass(frozen=True, eq=False)
 class ReportedSweep:
-    """A sweep and what has come of it.
+    """A sweep and its results.
 
     `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows
     of those that are done or have failed, `chosen` (rows, axes) their indices, and `texts` what was
@@ -118,7 +118,7 @@ class ReportedSweep:
 
 
 def read_results(store: Store, sweep: int | None) -> ReportedSweep:
-    """Results of a sweep of a store, the newest unless told.
+    """Results of a sweep of a store, the newest by default.
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """

@@ -1,5 +1,6 @@
 """Data of a report's plots: an uncertainty along a swept axis, for each setting of the other
-axes."""
+axes.
+"""
 
 from __future__ import annotations
 

@@ -238,7 +238,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Section:
-    """All that is compared of one section; `skipped` tells what was left out to save time."""
+    """All that is compared of one section; `skipped` states what was left out to save time."""
 
     name: str
     title: str
@@ -287,7 +287,7 @@ def reproduce(
     """Compute the experiments of a document's sections, all of them if none are named.
 
     `trials` is the number of synthetic data sets that estimators are compared over; None leaves
-    that comparison out. `report` is told what is being done, how many data sets of how many.
+    that comparison out. `report` receives what is being done, how many data sets of how many.
 
     :raises ExperimentError: a shipped design is missing or has errors.
     """

@@ -1,5 +1,6 @@
 """Statements of a document as data: figures, ranks, remarks, errata, and the assumptions of a
-comparison."""
+comparison.
+"""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def adjustments(
     """From scale errors of X, Y and Z and C0Y, B0Z and A0Z (6,), or the latter alone (3,).
 
     `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where
-    scales are open and their differences are not, those of Y and Z against X are told as well.
+    scales are open and their differences are not, those of Y and Z against X are reported as well.
     `degrees_of_freedom` are those of the scatter that `spread` comes from, infinite where
     uncertainties are as stated.
     """

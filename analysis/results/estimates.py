@@ -1,5 +1,6 @@
 """Estimates of a fit as functions of its parameters: names, values, uncertainties and
-covariances."""
+covariances.
+"""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ def _is_there(client: Any) -> bool:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep to ourselves what dask logs, tracebacks among it: errors are told in words."""
+    """Keep to ourselves what dask logs, tracebacks among it: errors are reported in words."""
     with suppress(ImportError):
         import distributed  # noqa: F401
     # Each of dask's loggers has a level of its own, once dask is loaded.

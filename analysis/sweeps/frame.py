@@ -18,7 +18,7 @@ MOST_WHOLE = 2.0**53
 
 
 def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
-    """The cells of a sweep, the newest of the store unless told, in their order; those not done are
+    """The cells of a sweep, the newest of the store by default, in their order; those not done are
     not in it.
 
     Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name,

@@ -1,5 +1,6 @@
 """Execution of a sweep's tasks in processes of this machine; a process that is killed costs only
-time."""
+time.
+"""
 
 from __future__ import annotations
 

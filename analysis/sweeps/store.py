@@ -80,7 +80,7 @@ class Store:
     """An open store; `texts` are those known by number.
 
     `has_digests` is False of the first format, `damage` says what showed as it was opened, and
-    `place` tells the file from another in its place.
+    `place` states the file from another in its place.
     """
 
     path: Path

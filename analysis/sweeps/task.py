@@ -53,7 +53,7 @@ class CellTask:
 
 @dataclass(frozen=True)
 class CellResult:
-    """What came of a task. `figures` by name, in SI units with the unit in the name; `details` are
+    """Result of a task. `figures` by name, in SI units with the unit in the name; `details` are
     texts.
 
     `key` is the number of the method and the fingerprint of the cell, or a hash of its choices

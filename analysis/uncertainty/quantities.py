@@ -34,9 +34,9 @@ class QuantityKind:
     description of its own; `unit` is that of the whole. `are_lengths` tells that it is about
     distances only, which a plan can make small, and `about_balls` that these are between balls.
     `effect` says in a few words what reliability looks at changes of, and is empty where it does
-    not. `has_target` tells whether it is compared with the target uncertainty of the file,
+    not. `has_target` states whether it is compared with the target uncertainty of the file,
     `in_replicates` whether Monte Carlo follows it, and `is_recorded` whether a sweep records it
-    unless told. `needs` is what a design without it lacks.
+    by default. `needs` is what a design without it lacks.
     """
 
     description: str

@@ -1,8 +1,8 @@
 """Origin of a design's scale: certificates, priors, probe offsets, or an error model that cannot
 stretch.
 
-Readings alone never tell it. Machine, plates, poses and offsets that are all larger by the same
-ratio give the same readings, so that some knowledge of a length must say how large they are.
+Readings alone never determine it. Machine, plates, poses and offsets that are all larger by the
+same ratio give the same readings, so that some knowledge of a length must say how large they are.
 """
 
 from __future__ import annotations

@@ -79,5 +79,5 @@ def task_uncertainties(
 
 
 def is_determined(task: TaskUncertainty) -> bool:
-    """Whether the observations tell the task's length."""
+    """Whether the observations determine the task's length."""
     return not math.isnan(task.standard_uncertainty)

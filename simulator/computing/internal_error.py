@@ -1,5 +1,6 @@
 """Error for a result that contradicts what is proven about it: a fault of the program, not of
-its input."""
+its input.
+"""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class ProgressStep:
 
 
 Report = Callable[[ProgressStep], object]
-"""Is told of each step that has come further."""
+"""Receives each step of the progress."""
 
 
 def unreported(step: ProgressStep) -> None:

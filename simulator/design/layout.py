@@ -1,5 +1,6 @@
 """Conversion of an experiment into its design: names become indices, and every artefact gets a
-frame."""
+frame.
+"""
 
 from __future__ import annotations
 

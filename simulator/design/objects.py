@@ -1,5 +1,6 @@
 """Parts of a design: probes, artefacts, balls, positions and tasks, each with its own arrays in
-SI units."""
+SI units.
+"""
 
 from __future__ import annotations
 

@@ -116,12 +116,12 @@ class Lengths:
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known beforehand of shared parameters; arrays (m,), metres, radians or ratios.
+    """Prior knowledge of shared parameters; arrays (m,), metres, radians or ratios.
 
     Each row is about a pose parameter (`position` and `component`, by place among origin and
     rotation), about a probe offset (`probe` and `component`), or about a linear function of the
     model's parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
-    told as co-ordinates, pose angles as deviations from the nominal pose.
+    stated as co-ordinates, pose angles as deviations from the nominal pose.
     """
 
     names: tuple[str, ...]
@@ -137,6 +137,6 @@ class Priors:
 
 
 def no_priors() -> Priors:
-    """Nothing known beforehand."""
+    """No prior knowledge."""
     none, empty = np.zeros(0, np.int64), np.zeros(0)
     return Priors((), none, none, none, np.zeros((0, 0)), empty, empty)

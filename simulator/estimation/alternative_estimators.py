@@ -72,7 +72,7 @@ class _Points:
     """Points read, one for each ball, position and probe: scale readings (r, d) and their variances
     (r, d).
 
-    `place` (r,) numbers the positions and probes, `position` (places,) tells the position of each.
+    `place` (r,) numbers the positions and probes, `position` (places,) states the position of each.
     """
 
     ball: Integers

@@ -1,5 +1,6 @@
 """Derivatives of corrected points by the shared parameters: the rows behind U4, U6 and measuring
-tasks."""
+tasks.
+"""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Factor:
     S^2 at the point of linearisation.
 
     Where the weights of rows differ so much that columns have to be taken in an order that depends
-    on them, `orders` tells the columns of all roots, and `alike` is the factor of the same rows
+    on them, `orders` states the columns of all roots, and `alike` is the factor of the same rows
     with about equal weights, which has the same rank and the same null space. Otherwise columns
     stand in the order of the parameters.
     """

@@ -19,7 +19,7 @@ length-equations E, c, and r where it is not known, from equations (110) togethe
     in E alone; Gauss-Newton does it.
 
 For ball bars, which have no centre, both are the same, and linear. An orthogonal factorisation
-stands for the patent's normal equations.
+replaces the patent's normal equations.
 """
 
 from __future__ import annotations

@@ -132,7 +132,7 @@ def linearise(
     x: Array | None = None,
     drawn: Spectrum | None = None,
 ) -> Linearisation:
-    """Linearise a design at a `state`, as it is drawn unless told, with scale readings `x`
+    """Linearise a design at a `state`, as drawn by default, with scale readings `x`
     (readings, d) or error-free ones. With a spectrum `drawn` rank and null space are those, see
     `spectrum`.
     """

@@ -311,7 +311,7 @@ def _pose_values(design: Design, state: State) -> Array:
 
 
 def prior_rows(design: Design, layout: SharedLayout, state: State) -> tuple[Array, Array]:
-    """Rows of what is known beforehand: residual (m,) and derivative by the shared parameters (m,
+    """Rows of priors: residual (m,) and derivative by the shared parameters (m,
     s).
     """
     given, d = design.priors, design.dimension

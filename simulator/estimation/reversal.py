@@ -91,8 +91,8 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     """Fit readings (n, 2) of the same balls in two positions, the second about 90 degrees clockwise
     from the first.
 
-    `scale` tells which axis takes the scale difference when co-ordinates are corrected. With "none"
-    neither does; it is fitted all the same, as the report does. Without `offsets` both positions
+    `scale` states which axis takes the scale difference when co-ordinates are corrected. With
+    "none" neither does; it is fitted all the same, as the report does. Without `offsets` both positions
     have to be read from the same ball.
 
     :raises UndeterminedError: the balls lie on one line.

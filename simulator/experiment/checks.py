@@ -1,5 +1,6 @@
 """Checks that need several sections: names used twice, balls outside the volume, balls never
-read."""
+read.
+"""
 
 from __future__ import annotations
 

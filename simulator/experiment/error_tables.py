@@ -1,5 +1,6 @@
 """Tables of one parametric error: positions and values, with comments on where and how it was
-measured."""
+measured.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Conversion of the settings of machine and evaluation into volume, repeatability, points and
-tasks."""
+tasks.
+"""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ Calibration = DistanceCalibration | CoordinateCalibration | RadiusCalibration
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known beforehand of a parameter, in metres, radians or a ratio.
+    """Prior knowledge of a parameter, in metres, radians or a ratio.
 
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation.
     ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
@@ -262,7 +262,7 @@ class Pool:
     """Candidates in order, positions of the experiment itself first, and the limits on choosing
     them.
 
-    `must` are the indices of what has to be chosen. `dropped` tells how many candidates were
+    `must` are the indices of what has to be chosen. `dropped` states how many candidates were
     generated but cannot be read, or stand there twice, by the reason.
     """
 
@@ -367,7 +367,7 @@ class Experiment:
         return self.mark if written(self.tree, *steps) is None else mark_of(self.tree, steps)
 
     def message(self, steps: Steps, text: str) -> Message:
-        """A message about what stands at a path."""
+        """A message about the value at a path."""
         return self.place(steps).message(format_path(steps), text)
 
     def with_(

@@ -1,5 +1,6 @@
 """Conversion of the settings of a pool into candidates, without duplicates, and limits on the
-choice."""
+choice.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +52,7 @@ SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60
 
 @dataclass
 class Candidates:
-    """Positions to choose from as far as they are right; `complete` tells whether all that is
+    """Positions to choose from as far as they are right; `complete` states whether all that is
     written is.
     """
 

@@ -28,7 +28,7 @@ def resolve_priors(
     positions: dict[int, Position],
     references: References,
 ) -> tuple[Prior, ...]:
-    """Return what is known beforehand; what is wrong goes to the problems."""
+    """Return the priors; what is wrong goes to the problems."""
     settings, entries = sections.get("error_model"), sections.entries("priors")
     if not entries or settings is None or machine is None:
         return ()

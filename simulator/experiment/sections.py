@@ -47,7 +47,7 @@ class MachineSettings(Settings):
 
 
 class PriorSettings(Settings):
-    """What is known beforehand of a parameter."""
+    """Prior knowledge of a parameter."""
 
     parameter: Text = Field(
         description=(

@@ -91,7 +91,7 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
 
 
 def node_at(root: Node, path: str) -> Node | None:
-    """Return what stands at a path, None where nothing does.
+    """Return the value at a path, None if there is none.
 
     :raises ValueError: the path is malformed, or an entry of a list does not exist.
     """
@@ -128,7 +128,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
 def removed(root: Node, path: str) -> Node:
     """Return the tree without the entry of a mapping or a list at a path.
 
-    :raises ValueError: the path is malformed, or nothing stands there.
+    :raises ValueError: the path is malformed, or there is no value.
     """
     return _less(root, list(place_of(root, path)), ())
 

@@ -98,8 +98,8 @@ BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 
 
 class AxesSettings(Settings):
-    """The axes that a plate's co-ordinates are told in: the ball at the origin, and one on the x or
-    the y axis.
+    """The axes in which a plate's co-ordinates are reported: the ball at the origin, and one on the
+    x or the y axis.
     """
 
     origin: Name = Field(description="the ball at the origin")

@@ -1,5 +1,6 @@
 """Positions of an artefact in the machine: conversion of their keys into a rotation and an
-origin."""
+origin.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Collection of the errors in an experiment file while it is read, so that all are reported at
-once."""
+once.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Escaping of text in CSV files: spreadsheets would compute names such as =A1 or @home as
-formulas."""
+formulas.
+"""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def read_tree(path: Path, minor: list[Message] | None = None) -> Node:
 
 @dataclass(frozen=True)
 class GivenText:
-    """A text that stands in no file, under the name that messages have for it."""
+    """A text that is in no file, under the name that messages have for it."""
 
     name: str
     text: str
@@ -219,7 +219,7 @@ def child(node: Node | None, step: Step) -> Node | None:
 
 
 def written(root: Node, *steps: Step) -> Node | None:
-    """Return what stands at a path, or None."""
+    """Return the value at a path, or None."""
     node: Node | None = root
     for step in steps:
         node = child(node, step)

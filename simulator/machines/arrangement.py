@@ -12,7 +12,7 @@ class Arrangement:
     """Axes on the probe's side and on the workpiece's side, each listed from the ground outwards.
 
     An axis on the probe's side carries all axes listed after it and the probe; one on the
-    workpiece's side carries those listed after it and the workpiece. Every axis stands on exactly
+    workpiece's side carries those listed after it and the workpiece. Every axis is on exactly
     one side.
     """
 

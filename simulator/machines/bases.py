@@ -197,7 +197,7 @@ class Spline:
 
     A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative
     less; order - 2 times leaves value and slope, as between tangent features. Beyond [0, 1] the
-    polynomial of the last piece goes on.
+    polynomial of the last piece continues.
 
     `ends` holds for every function. With free ends, the functions are t and the B-splines N_2 to
     N_last-1. A slope of zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives

@@ -215,7 +215,7 @@ def coupling(machine: MachineDescription, error: ParametricError) -> Array:
 def stated_function(
     machine: MachineDescription, error: ParametricError
 ) -> PowerSeries | Curve | None:
-    """The error as the file has it, a function of the fraction of the axis."""
+    """The error as stated in the file, a function of the fraction of the axis."""
     if isinstance(error.shape, Points):
         return error.shape.curve(
             machine.interpolation, machine.lower[error.axis], machine.upper[error.axis]

@@ -94,7 +94,7 @@ class EmpiricalModel:
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
-        """Where each function's coefficients stand in a."""
+        """Indices of each function's coefficients in a."""
         ends = np.cumsum([0, *map(len, self.columns)])
         return tuple(
             slice(int(start), int(end)) for start, end in zip(ends, ends[1:], strict=False)

@@ -101,7 +101,7 @@ class KinematicModel:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where each function's coefficients stand in a."""
+        """Indices of each function's coefficients in a."""
         found, start = {}, 0
         for function in self.functions:
             found[function.name] = slice(start, start + function.basis.size)

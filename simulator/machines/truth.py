@@ -1,5 +1,6 @@
 """The machine from which synthetic readings come: an error model, which may differ from the
-estimated one, and its parameters."""
+estimated one, and its parameters.
+"""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class WrongReading:
 class WrongPosition:
     """A position whose readings fit the artefact turned onto itself, or in no pose at all.
 
-    `turned` tells the turn in words and is empty in the latter case, where only `agreeing` of
+    `turned` states the turn in words and is empty in the latter case, where only `agreeing` of
     `count` readings fit.
     """
 

@@ -266,7 +266,7 @@ def test_a_certificate_that_may_be_any_ends_where_no_file_may_state_it(
 
 
 def test_no_weak_direction_and_yet_a_target_that_is_missed(tmp_path: Path) -> None:
-    """Many moderate directions add up: nothing is weak, and `check` tells the share all the
+    """Many moderate directions add up: nothing is weak, and `check` states the share all the
     same.
     """
     found = predict(experiment_of(tmp_path, SMALL))

@@ -226,7 +226,7 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
         ),
         (
             "axes:\n  a: {path: title, subsets: {sizes: [1]}}\n",
-            ["s.yaml:4:13: axes.a.path: leads to no list of entries"],
+            ["s.yaml:4:13: axes.a.path: is not a list of entries"],
         ),
         (
             "axes:\n  a: {path: seed, values: [1]}\n  b: {path: seed, values: [1]}\n",

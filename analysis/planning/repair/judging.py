@@ -100,7 +100,7 @@ def removed(before: Array, after: Array) -> tuple[int, ...]:
     """Which null directions, told by what they do to the machine (parameters, k), are no part of
     those afterwards.
 
-    Directions that do nothing to the machine, or the same as others, are never told as removed.
+    Directions that do nothing to the machine, or the same as others, are never reported as removed.
     """
     if not after.shape[1]:
         return tuple(range(before.shape[1]))

@@ -1,7 +1,7 @@
 """Search for the cheapest repairs of a deficient design.
 
-Every set of changes that is told has been applied to the experiment, and the rank of the resulting
-design computed in full; none of its members can be left out.
+Every set of changes that is reported has been applied to the experiment, and the rank of the
+resulting design computed in full; none of its members can be left out.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ class _Search:
         return after.is_cured and not self.is_faint(after)
 
     def helps(self, changes: tuple[Change, ...]) -> bool:
-        """Whether changes are worth being told: full rank, or fewer weak directions."""
+        """Whether changes are worth reporting: full rank, or fewer weak directions."""
         after = self.judge(changes)
         return after.deficiency < self.before.deficiency or after.weak < self.before.weak
 
@@ -360,7 +360,7 @@ class _Search:
         return tuple(self.told((one,), gone) for one, gone in list(found.items())[:MOST_PARTIAL])
 
     def open_errors(self) -> Array:
-        """What the null directions do to the machine, in the form in which they are told."""
+        """What the null directions do to the machine, in the form in which they are reported."""
         return self.before.open_errors @ independent_mixture(self.base.at)
 
     def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:

@@ -1,5 +1,6 @@
 """Effect of further observations on null directions, without a factorisation of the changed
-design."""
+design.
+"""
 
 from __future__ import annotations
 

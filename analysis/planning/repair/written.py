@@ -195,7 +195,7 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
 
 
 def length_function(value: LengthFunction) -> str:
-    """An uncertainty as a file has it.
+    """An uncertainty as written in a file.
 
     >>> length_function(LengthFunction(5e-7, 1e-6))
     '0.5 um + L/1000000'
@@ -205,7 +205,8 @@ def length_function(value: LengthFunction) -> str:
 
 
 def written_length(value: float) -> str:
-    """A length as a file has it: the shortest that reads well, with all digits where it needs them.
+    """A length as written in a file: the shortest that reads well, with all digits where it needs
+    them.
 
     >>> written_length(0.125), written_length(0.1 / 3)
     ('125 mm', '0.03333333333333333 m')

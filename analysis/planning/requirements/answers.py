@@ -49,7 +49,7 @@ class Answer:
 
 @dataclass(frozen=True, repr=False)
 class Reach(Result):
-    """A goal, what the design as it is makes of it, and what each unknown must be."""
+    """A goal, whether the design as drawn meets it, and the necessary value of each unknown."""
 
     label: str
     title: str
@@ -101,7 +101,7 @@ def _panel(answer: Answer) -> TriedValues:
 
 
 def _lines(reach: Reach) -> list[str]:
-    """The goal, what the design makes of it, and a row for each unknown."""
+    """The goal, whether the design meets it, and a row for each unknown."""
     now = "met" if reach.present.is_met else "not met"
     lines = [
         f"{reach.label}: {reach.title}",

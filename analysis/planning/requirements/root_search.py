@@ -37,7 +37,7 @@ CONVERGED = 1e-3
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of a value: how the goal is met and the rank deficiency, or why the file is invalid
+    """Result of a value: how the goal is met and the rank deficiency, or why the file is invalid
     with it.
     """
 
@@ -64,7 +64,7 @@ def reach(
     """Solve for each of some unknowns, the others staying as they are.
 
     `artefact` and `calibration`, an index, choose what varies where there are several; `target`
-    replaces the target uncertainty of the file, and `report` is told the number of unknowns done.
+    replaces the target uncertainty of the file, and `report` receives the number of unknowns done.
 
     :raises GoalError: the experiment does not have what the goal is about.
     :raises NotVariableError: a single unknown is asked for that the experiment does not have.
@@ -183,8 +183,8 @@ class _Trials:
         return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
 
     def is_right(self, step: int) -> bool:
-        """Whether the file is right with a value, which is quicker to find out than what comes of
-        it.
+        """Whether the file is right with a value, which is quicker to find out than the
+        result.
         """
         if step not in self.known:
             experiment, _ = build(self.one.tree(step), self.searched.source, self.searched.name)
