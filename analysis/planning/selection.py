@@ -177,7 +177,7 @@ def _interrupted(campaign: Campaign) -> list[str]:
         )
     for one in campaign.ignored:
         lines.append(
-            f"{one.name} is left out: nothing else that is worth its time reads the other balls of"
+            f"{one.name} is left out: nothing else worth its time reads the other balls of"
             f" {one.item.artefact}; delete its readings from the file"
         )
     return lines

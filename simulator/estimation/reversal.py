@@ -92,8 +92,8 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     from the first.
 
     `scale` states which axis takes the scale difference when co-ordinates are corrected. With
-    "none" neither does; it is fitted all the same, as the report does. Without `offsets` both positions
-    have to be read from the same ball.
+    "none" neither does; it is fitted all the same, as the report does. Without `offsets` both
+    positions have to be read from the same ball.
 
     :raises UndeterminedError: the balls lie on one line.
     """

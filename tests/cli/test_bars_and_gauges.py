@@ -34,8 +34,8 @@ def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
         " squareness" in out
     )
     assert (
-        "reason: no length is known (gauge: radius): the overall scale of the machine stays open"
-        in out
+        "reason: no length is known (gauge: radius): the overall scale of the machine is"
+        " undetermined" in out
     )
     assert "gauge: radius (0.3 um): change together without changing any observation" in out
     (flat,) = [
@@ -91,7 +91,7 @@ def test_what_to_do_is_told_with_its_direction(capsys: pytest.CaptureFixture[str
 def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fit", *KNOWN, "--estimator", "sphere-then-metric", "--json"]) == 0
     out, err = capsys.readouterr()
-    assert "warning: the pivot is the centre of a sphere, as if the machine were right" in err
+    assert "warning: the pivot is the centre of a sphere, as if the machine had no errors" in err
     two = json.loads(out)["adjustments"]
     joint = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")["adjustments"]
     assert abs(two["angle yz"]["value"]) < 0.4 * abs(joint["angle yz"]["value"])
@@ -233,7 +233,7 @@ def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -
         main(["compare", GAUGE, "--variant", "radius unknown", "--estimator", "length-equations"])
         == 3
     )
-    assert "the design leaves errors open" in capsys.readouterr().err
+    assert "the design leaves errors undetermined" in capsys.readouterr().err
     assert main(["compare", "designs/quickstart.yaml", "--estimator", "length-equations"]) == 3
     assert "has no ball bar or Bryan gauge" in capsys.readouterr().err
     assert main(["compare", BARS, "--variant", "length known", "--trials", "1"]) == 0

@@ -103,7 +103,7 @@ volume: [1 m, 1 m, 1 m]
             "5 um is subtracted, because errors are zero at the reference point",
         ),
         ("EXX: {polynomial: [0 um, 3 um]}", ""),
-        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 urad is taken off"),
+        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 urad is subtracted"),
         ("EXZ: {bandwidth: 1 um}", ""),
     ],
 )

@@ -46,7 +46,7 @@ def scales(tmp_path: Path) -> Path:
 def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("map", scales, "--grid", "2,2,2") == 0
     out, err = capsys.readouterr()
-    assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 um is taken off" in err
+    assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 um is subtracted" in err
     lines = out.split("\n")
     assert lines[1].startswith(
         "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"

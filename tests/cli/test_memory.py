@@ -40,7 +40,7 @@ def _fork() -> None:
 )
 @pytest.mark.parametrize(
     ("failure", "told"),
-    [(_array, "is: there is no room for another 2.00 EiB; "), (_plain, "is; "), (_fork, "is; ")],
+    [(_array, ": there is no room for another 2.00 EiB; "), (_plain, "; "), (_fork, "; ")],
 )
 def test_no_memory_in_any_command(
     monkeypatch: pytest.MonkeyPatch,
@@ -61,7 +61,10 @@ def test_no_memory_in_any_command(
     assert main([command, QUICKSTART, *arguments]) == 3
     out, err = capsys.readouterr()
     assert out == ""
-    assert err == f"{QUICKSTART}: {command} needs more memory than there {told}{SMALLER[command]}\n"
+    assert (
+        err
+        == f"{QUICKSTART}: {command} needs more memory than is available{told}{SMALLER[command]}\n"
+    )
 
 
 def _killed() -> None:
