@@ -214,7 +214,7 @@ def test_what_others_share_is_refused(
 ) -> None:
     text = SHARED + positions
     repair = first_repair(text, variant)
-    if "corner, of" in words:
+    if "corner, which" in words:
         # As where the position is moved, too.
         (edit,) = repair.edits
         moved = {**edit.value, "corner": {"x": "210 mm", "y": "260 mm"}}
