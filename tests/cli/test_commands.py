@@ -436,6 +436,7 @@ def test_closed_pipe_is_no_error() -> None:
             "-c",
             code,
             "check",
+            "--quiet",
             *sorted(map(str, Path("designs/npl").glob("*.yaml"))),
         ],
         stdout=subprocess.PIPE,

@@ -98,7 +98,6 @@ def test_no_text_breaks_the_parsers(text: str) -> None:
         parse_length,
         parse_angle,
         parse_ratio,
-        typed_length,
         parse_positive_length,
         parse_length_function,
     ):
