@@ -17,7 +17,7 @@ from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.quantities import length_text
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.tables import column_names, read_table
+from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import AXES, read_readings
@@ -63,11 +63,11 @@ def done_candidates(path: Path | GivenText, experiment: Experiment) -> tuple[Set
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
     places = {c.name: k for k, c in enumerate(candidates) if isinstance(c.item, Position)}
-    texts = ["position", "ball", "probe"] if "probe" in column_names(path) else ["position", "ball"]
+    texts, defaults = ["position", "ball", "probe"], {"probe": ""}
     messages: dict[str, Message] = {}
     found: dict[str, int] = {}
     name = ""
-    for row in read_table(path, texts, AXES[: experiment.dimension], ["u"]):
+    for row in read_table(path, texts, AXES[: experiment.dimension], ["u"], defaults=defaults):
         name = row.texts[0]
         base = places.get(name, places.get(base_name(name)))
         if base is not None:

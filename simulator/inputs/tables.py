@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
+from types import MappingProxyType
 
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from .quantities import (
@@ -60,11 +61,14 @@ def read_table(
     lengths: Sequence[str],
     optional: Sequence[str] = (),
     problems: list[Message] | None = None,
+    defaults: Mapping[str, str] = MappingProxyType({}),
+    absent: float = 0.0,
 ) -> tuple[FileRow, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
-    unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are 0. Empty
+    unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are
+    ``absent``; ``defaults`` tell what required columns of text say where they are missing. Empty
     lines and lines that begin with # are skipped. Messages about rows are added to ``problems`` if
     it is given, so that the caller can say more at once; a length that is wrong is then NaN.
 
@@ -80,10 +84,13 @@ def read_table(
             [Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")]
         )
     places, factors = _columns(
-        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, example
+        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example
     )
+    count = len(places)
+    places += [name for name in defaults if name not in places]
+    constants = [defaults[name] for name in places[count:]]
     rows = []
-    plain = _PlainRows.of(places, factors, texts, (*lengths, *optional))
+    plain = _PlainRows.of(places, factors, texts, (*lengths, *optional), constants, absent)
     for number, line in islice(lines, 1, MOST_ROWS + 1):
         mark = Mark(file, number, 1)
         if len(messages) >= MOST_MESSAGES:
@@ -94,15 +101,18 @@ def read_table(
             rows.append(row)
             continue
         cells = split_cells(line)
-        if cells is None or len(cells) != len(places):
-            messages.append(mark.message("", wrong_count(line, cells, len(places))))
+        if cells is None or len(cells) != count:
+            messages.append(mark.message("", wrong_count(line, cells, count)))
             continue
-        by_name = {name: cells[i] for i, name in enumerate(places)}
+        by_name = dict(zip(places, [*cells, *((1, text) for text in constants)], strict=True))
         row_lengths = []
         for name in (*lengths, *optional):
-            column, cell = by_name.get(name, (1, "0"))
-            factor, place = factors.get(name, Fraction(1)), Mark(file, number, column)
-            row_lengths.append(read_number(cell, name, factor, place, messages))
+            if name not in by_name:
+                row_lengths.append(absent)
+                continue
+            column, cell = by_name[name]
+            place = Mark(file, number, column)
+            row_lengths.append(read_number(cell, name, factors[name], place, messages))
         for name in texts:
             if not by_name[name][1]:
                 messages.append(
@@ -133,11 +143,14 @@ class _PlainRows:
     """Reads lines that hold nothing unusual, in a fraction of the time that others take.
 
     ``count`` is the number of columns, ``texts`` and ``lengths`` where each of the row's is, -1
-    where it is not; the latter come with the power of ten that makes metres of the column's unit,
-    empty where none does. ``known`` has texts of rows before, of which there are as a rule few.
+    where it is not and is ``absent``; the latter come with the power of ten that makes metres of
+    the column's unit, empty where none does. ``constants`` are texts behind the columns, the same
+    in all rows, and ``known`` has texts of rows before, of which there are as a rule few.
     """
 
     count: int
+    constants: list[str]
+    absent: float
     texts: tuple[int, ...]
     lengths: tuple[tuple[int, str], ...]
     known: dict[tuple[str, ...], tuple[str, ...]]
@@ -149,13 +162,17 @@ class _PlainRows:
         factors: dict[str, Fraction],
         texts: Sequence[str],
         lengths: Sequence[str],
+        constants: list[str],
+        absent: float,
     ) -> _PlainRows:
         by_name = {name: i for i, name in enumerate(places)}
         powers = [
             (by_name.get(name, -1), power_of_ten(factors.get(name, Fraction(1))))
             for name in lengths
         ]
-        return cls(len(places), tuple(by_name[name] for name in texts), tuple(powers), {})
+        of_texts = tuple(by_name[name] for name in texts)
+        count = len(places) - len(constants)
+        return cls(count, constants, absent, of_texts, tuple(powers), {})
 
     def row(self, mark: Mark, line: str) -> FileRow | None:
         """The row of a line; None where it has to be looked at more closely."""
@@ -164,9 +181,10 @@ class _PlainRows:
         cells = [cell.strip() for cell in line.split(",")]
         if len(cells) != self.count:
             return None
+        cells += self.constants
         lengths = []
         for i, power in self.lengths:
-            value = 0.0 if i < 0 else plain_number(cells[i], power)
+            value = self.absent if i < 0 else plain_number(cells[i], power)
             if value is None:
                 return None
             lengths.append(value)
@@ -215,17 +233,6 @@ def read_number(
         return math.nan
 
 
-def column_names(path: Path | GivenText) -> tuple[str, ...]:
-    """Names of a table's columns without their units; none where the file has no line.
-
-    :raises ExperimentError: the file cannot be read.
-    """
-    lines = table_lines(path)
-    header = lines[0][1] if lines else ""
-    cells = split_cells(header) or [] if header.count(",") < MOST_COLUMNS else []
-    return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
-
-
 def wrong_number(cell: str, name: str) -> str:
     """Say what is wrong with a cell that is nearly a number, or nothing."""
     if not cell:
@@ -265,6 +272,7 @@ def _columns(
     texts: Sequence[str],
     lengths: Sequence[str],
     optional: Sequence[str],
+    defaults: Mapping[str, str],
     example: str,
 ) -> tuple[list[str], dict[str, Fraction]]:
     """Return the names of the columns without their units, and the factor of each unit."""
@@ -297,7 +305,7 @@ def _columns(
                 place.message("", f'a second column "{shorten(cell)}"; remove one of them')
             )
         names.append(name)
-    missing = [name for name in (*texts, *lengths) if name not in names]
+    missing = [name for name in (*texts, *lengths) if name not in (*names, *defaults)]
     if missing:
         messages.append(
             mark.message(

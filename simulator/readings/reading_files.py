@@ -19,7 +19,7 @@ from ..estimation.spheres import fit_sphere
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
-from ..inputs.tables import FileRow, column_names, read_table
+from ..inputs.tables import FileRow, read_table
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .gross_error_messages import (
@@ -99,15 +99,15 @@ def read_readings(
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
     """
-    texts = ["position", "ball", "probe"]
-    columns, d = column_names(path), design.dimension
-    if len(design.probes.names) == 1 and "probe" not in columns:
-        texts.remove("probe")
+    texts, d = ["position", "ball", "probe"], design.dimension
+    # One probe need not be named.
+    defaults = {"probe": design.probes.names[0]} if len(design.probes.names) == 1 else {}
     messages: list[Message] = []
-    rows = read_table(path, texts, AXES[:d], ["u"], problems=messages)
+    rows = read_table(path, texts, AXES[:d], ["u"], messages, defaults, absent=np.nan)
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
-    if "u" in columns:
+    has_uncertainty = not np.isnan(lengths[:, d]).all()
+    if has_uncertainty:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
         wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
         messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
@@ -118,7 +118,7 @@ def read_readings(
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     uncertainty = (
         np.repeat(stated[:, None], d, axis=1)
-        if "u" in columns
+        if has_uncertainty
         else _planned_uncertainty(design, readings)
     )
     readings = replace(readings, uncertainty=uncertainty)
@@ -158,7 +158,7 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
             unknown.setdefault(MORE_ERRORS, []).append(row)
             break
         if row.texts not in places:
-            position, ball, probe = (*row.texts, design.probes.names[0])[:3]
+            position, ball, probe = row.texts
             texts = wrong.setdefault(row.texts, [])
             own: dict[str, int] = {}
             if position not in positions:
