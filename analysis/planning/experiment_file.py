@@ -114,7 +114,8 @@ def _source(experiment: Experiment) -> tuple[str, Node, Node]:
     source = experiment.source
     if source.name == "experiment" and not source.is_file():
         return "", experiment.tree, experiment.tree
-    text = read_text(source)
+    # What is written has line feeds, whatever its source has.
+    text = read_text(source).replace("\r\n", "\n")
     root = parse_tree(text, str(source))
     assert isinstance(root, MappingNode)
     tree = root if experiment.name is None else variant_trees(root, Problems(root))[experiment.name]
