@@ -134,11 +134,7 @@ def _run(options: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return BAD_FILE
     except InternalError as error:
-        print(
-            f"internal error: {error}. Please report it with the file and the command.",
-            file=sys.stderr,
-        )
-        return INTERNAL
+        return _reported(error)
     except Exception as error:
         from .memory import no_memory
 
@@ -149,7 +145,17 @@ def _run(options: argparse.Namespace) -> int:
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)
             return BAD_FILE
-        raise
+        import traceback
+
+        traceback.print_exc()
+        return _reported(f"{type(error).__name__}: {error}")
+
+
+def _reported(error: object) -> int:
+    """Say that the program is wrong, not what it was given."""
+    told = f"internal error: {error}. Please report it with the file and the command."
+    print(told, file=sys.stderr)
+    return INTERNAL
 
 
 def _told(error: OSError, options: argparse.Namespace) -> str:

@@ -23,22 +23,38 @@ ALIASES = {"target_accuracy": "target_uncertainty"}  # earlier name first
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
 
 
-def with_present_keys(node: Node) -> Node:
-    """The same tree with the keys of today; a key that stands beside its earlier name stays, so
-    that the earlier one is refused as unknown.
+def with_present_keys(node: Node, above: tuple[str, ...] = ()) -> Node:
+    """The same experiment with the keys of today; a key that stands beside its earlier name stays,
+    so that the earlier one is refused as unknown.
+
+    `above` are the steps that lead to the node. Names that a person chose, such as a probe's, stay.
     """
-    if isinstance(node, Scalar):
-        return node
     if isinstance(node, Sequence):
-        items = tuple(map(with_present_keys, node.items))
+        # The only list of entries that have such a key.
+        if above != ("evaluation", "tasks"):
+            return node
+        items = tuple(with_present_keys(item, (*above, "")) for item in node.items)
         changed = any(new is not old for new, old in zip(items, node.items, strict=True))
         return replace(node, items=items) if changed else node
-    keys = {key: _present(key, node) for key in node.items}
-    below = {keys[key]: with_present_keys(item) for key, item in node.items.items()}
+    if isinstance(node, Scalar) or not _leads_to_aliases(above):
+        return node
+    keys = {key: _present(key, node) if _has_aliases(above) else key for key in node.items}
+    below = {
+        keys[key]: with_present_keys(item, (*above, keys[key])) for key, item in node.items.items()
+    }
     if all(below.get(key) is item for key, item in node.items.items()):
         return node
     marks = {keys[key]: mark for key, mark in node.key_marks.items()}
     return replace(node, items=below, key_marks=marks)
+
+
+def _has_aliases(above: AnySequence[str]) -> bool:
+    """Whether the keys below some steps are those that have earlier names."""
+    return not above or len(above) == 3 and tuple(above[:2]) == ("evaluation", "tasks")
+
+
+def _leads_to_aliases(above: tuple[str, ...]) -> bool:
+    return _has_aliases(above) or above in (("evaluation",), ("evaluation", "tasks"))
 
 
 def _present(key: str, node: Mapping) -> str:
@@ -122,7 +138,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     ):
         known = [key for key in ExperimentSettings.model_fields if key != "variants"]
         raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
-    return _replaced(root, steps, with_present_keys(value), mark, ())
+    return _replaced(root, steps, with_present_keys(value, tuple(steps)), mark, ())
 
 
 def removed(root: Node, path: str) -> Node:
@@ -157,7 +173,9 @@ def _steps(path: str) -> list[str]:
         raise ValueError(
             f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size'
         )
-    return [ALIASES.get(step, step) for step in steps]
+    return [
+        ALIASES.get(step, step) if _has_aliases(steps[:i]) else step for i, step in enumerate(steps)
+    ]
 
 
 def place_of(root: Node, path: str) -> tuple[str, ...]:

@@ -465,3 +465,17 @@ def test_checking_loads_nothing_slow() -> None:
         env={**os.environ, "PYTHONPATH": os.getcwd()},
     )
     assert found.stderr.strip() == "[]"
+
+
+def test_an_error_of_the_program_is_not_called_a_failed_check(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Status 1 would say that a design is not as expected."""
+
+    def broken(*_: object) -> None:
+        raise AssertionError("two is one")
+
+    monkeypatch.setattr("ballplate.cli.check_files.check_files", broken)
+    assert main(["check", "designs/quickstart.yaml"]) == 70
+    err = capsys.readouterr().err
+    assert "Traceback" in err and "internal error: AssertionError: two is one. Please report" in err

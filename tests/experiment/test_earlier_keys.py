@@ -77,3 +77,26 @@ def test_axes_of_sweeps_take_both(tmp_path: Path) -> None:
         loaded = load_sweep(sweep)
         found.append([fingerprint(experiment_of(loaded, number)) for number in range(2)])
     assert found[0] == found[1] and found[0][0] != found[0][1]
+
+
+def test_both_at_once_from_python_are_refused() -> None:
+    with pytest.raises(ExperimentError, match="same place"):
+        bp.quickstart().with_({OLD: "1 um", NEW: "2 um"})
+
+
+def test_names_that_a_person_chose_stay(tmp_path: Path) -> None:
+    """Probes, artefacts, positions, tasks and variants may be called like a key."""
+    text = with_task(QUICKSTART).replace("name: bore", f"name: {OLD}")
+    text = text.replace("down", OLD).replace("plate:", f"{OLD}:").replace("artefact: plate", "")
+    text = text.replace("{name: z low", "{name: " + OLD).replace("name: z low", f"name: {OLD}")
+    text += f"""variants:
+  {OLD}: {{"positions[{OLD}].repeats": 2, "evaluation.tasks[{OLD}].{OLD}": 0.3 um}}
+  other: {{"probes.{OLD}": [0 mm, 0 mm, -60 mm]}}
+"""
+    first, second = experiments(tmp_path, text)
+    assert first.name == OLD
+    assert OLD in first.probes and OLD in first.layouts and NEW not in first.probes
+    assert first.positions[0].name == OLD and first.positions[0].readings[0].repeats == 2
+    assert first.evaluation.tasks[0].name == OLD
+    assert first.evaluation.tasks[0].target.stated.constant == pytest.approx(3e-7)
+    assert second.probes[OLD][2] == pytest.approx(-0.06)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import gc
+import re
+import shutil
 from pathlib import Path
 
+import ballplate as bp
+import pandas
 import pytest
 from ballplate.simulator.experiment import structure
 from ballplate.simulator.experiment.load import load
@@ -51,3 +55,18 @@ def test_what_is_shared_goes_with_the_file(tmp_path: Path) -> None:
     del found
     gc.collect()
     assert len(structure._VALID) == before
+
+
+def test_an_experiment_stays_when_a_file_that_it_names_has_changed(tmp_path: Path) -> None:
+    """What another experiment of the same tree reads later is that one's alone."""
+    shutil.copytree(ROOT / "designs" / "park", tmp_path / "park")
+    machine = tmp_path / "park" / "machines" / "npl-like.yaml"
+    before = bp.load(tmp_path / "park" / "plate.yaml")
+    readings = bp.simulate(before, seed=1)
+    text = machine.read_text(encoding="utf-8")
+    changed = re.sub("EXX: .*", "EXX: {polynomial: [0 um, 500 um]}", text, count=1)
+    assert changed != text
+    machine.write_text(changed, encoding="utf-8")
+    after = before.with_(title="on the changed machine")
+    pandas.testing.assert_frame_equal(bp.simulate(before, seed=1), readings)
+    assert not bp.simulate(after, seed=1).equals(readings)
