@@ -236,3 +236,24 @@ def test_a_text_that_does_not_say_what_was_found_is_refused() -> None:
     ):
         with pytest.raises(ExperimentError, match="cannot be written as it was found"):
             mended(text, SOURCE, None, replace(repair, edits=(replace(edit, value=value),)))
+
+
+def test_a_variant_gets_a_position_more_and_another_changed() -> None:
+    """The list that it then has of its own is the one in which the other is changed."""
+    text = """title: two
+machine: {volume: [600 mm, 600 mm, 600 mm], repeatability: 0.5 um}
+error_model: {kind: metric}
+probes: {down: [0 mm, 0 mm, -50 mm], side: [50 mm, 0 mm, 0 mm]}
+artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}}
+positions:
+  - {name: a, plane: z, level: 100 mm, corner: {x: 100 mm, y: 100 mm}, probes: [down]}
+  - {name: b, plane: z, level: 400 mm, corner: {x: 100 mm, y: 100 mm}, probes: [down]}
+evaluation: {points: {random: 20, seed: 1}, probe: down}
+variants:
+  A: {"positions[b].level": 300 mm}
+  B: {machine.repeatability: 1 um}
+"""
+    found = mended(text, SOURCE, "B", first_repair(text, "B"))
+    assert "positions: [{" in found.partition("B: {")[2]
+    assert check(experiment(text, "B")).verdict.deficiency > 0
+    assert check(experiment(found, "B")).verdict.deficiency == 0

@@ -58,7 +58,9 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
     experiment = before[variant]
     changed = apply_all(repair.changes, experiment)
     new = text
-    for change in _changes(experiment, changed, repair):
+    # A variant with more entries of a list has a list of its own, in which the others are changed.
+    changes = sorted(_changes(experiment, changed, repair), key=lambda one: len(one.steps))
+    for change in changes:
         for one in _in_file(parse_tree(new, str(source)), variant, change):
             new = with_changes(new, str(source), [one])
     after = {one.name: one for one in load(source, planning=True, text=new)}
