@@ -248,6 +248,7 @@ artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}}
 positions:
   - {name: a, plane: z, level: 100 mm, corner: {x: 100 mm, y: 100 mm}, probes: [down]}
   - {name: b, plane: z, level: 400 mm, corner: {x: 100 mm, y: 100 mm}, probes: [down]}
+target_uncertainty: 1 um
 evaluation: {points: {random: 20, seed: 1}, probe: down}
 variants:
   A: {"positions[b].level": 300 mm}
