@@ -242,9 +242,11 @@ class Observations(ABC):
 
     `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
     too long by one ratio where its scale is wrong. `words` tell what is wrong with a wrong one.
+    Values are in `measured_in`, unless `unit` says otherwise of each.
     """
 
     word: ClassVar[str]
+    measured_in: ClassVar[Unit] = "m"
     scales: ClassVar[bool] = False
     words: ClassVar[Words] = Words()
     value: Array
@@ -286,7 +288,7 @@ class Observations(ABC):
 
     def unit(self, design: Design, k: int) -> Unit:
         """The unit of a value."""
-        return "m"
+        return self.measured_in
 
     def errors(self, generator: np.random.Generator, count: int) -> Array:
         """Random errors (count, m) of the values."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
+import numpy as np
+
 from ..design.lookup import References
+from ..design.observations.balls import BallObservations
 from ..design.observations.calibration import Calibration
+from ..design.observations.distances import DistancesSettings
 from ..design.observations.kinds import CALIBRATIONS
 from ..design.observations.radius import RadiusSettings
-from ..geometry.artefacts import BryanGaugeSettings
+from ..geometry.artefacts import BallLayout, BryanGaugeSettings
 from ..inputs.messages import Steps
-from ..inputs.settings import Settings
+from ..inputs.settings import Settings, listing
+from ..machines.protocol import Array
 
 
 def resolve_calibration(
@@ -25,5 +32,60 @@ def resolve_calibration(
         text = f'"{artefact}" is a Bryan gauge and has a radius only; use kind: radius'
         references.problems.add((*steps, "kind"), text)
         return None
+    is_standard = references.artefacts[artefact].role == "length_standard"
+    if is_standard and not isinstance(settings, DistancesSettings | RadiusSettings):
+        text = (
+            "a length standard carries distances only; use kind: distances, or remove its role:"
+            " length_standard"
+        )
+        references.problems.add((*steps, "kind"), text)
+        return None
     read = next(read for kind, read in CALIBRATIONS.items() if isinstance(settings, kind))
-    return read(settings, artefact, steps, references)
+    # What a kind makes of balls that do not suit it is told below.
+    with np.errstate(all="ignore"):
+        found = read(settings, artefact, steps, references)
+        text = "" if found is None or is_gauge else _unsuitable(found, references.layouts[artefact])
+    return found if references.require(not text, steps, text) else None
+
+
+def _unsuitable(item: Calibration, layout: BallLayout) -> str:
+    """What is wrong with values that cannot be observed where balls are as drawn; empty if nothing
+    is.
+    """
+    names = [", ".join(one) for one in item.names(layout)]
+    if not names:
+        return "states no value; name at least one ball, or remove the item"
+    if len(set(names)) < len(names):
+        twice = [name for name, times in Counter(names).items() if times > 1]
+        return f"states {listing(twice)} more than once; remove all but one"
+    given, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
+    values, slopes = _at(given, layout.coordinates)
+    # Each ball is moved otherwise, by what rounding may do.
+    way = np.sin(np.arange(1.0, layout.coordinates.size + 1.0)).reshape(layout.coordinates.shape)
+    beside = _at(given, layout.coordinates + 1e-12 * extent * way)[1]
+    size, change = (np.abs(one).max(axis=(1, 2)) for one in (slopes, beside - slopes))
+    # A change that is no number is no small one.
+    is_smooth = np.isfinite(values) & (change <= 0.5 * size)
+    if not is_smooth.all():
+        told = listing(np.array(names)[~is_smooth].tolist())
+        return (
+            f"{told} cannot be told where balls are as drawn, for example of balls in one line or"
+            " in one place; choose other balls"
+        )
+    # A ball that is named twice moves with both.
+    is_same = given.balls[:, :, None] == given.balls[:, None, :]
+    moved = np.abs(np.einsum("mij,mjd->mid", is_same, slopes)).max(axis=(1, 2))
+    is_fixed = ~(moved > 1e-9 * size)
+    if is_fixed.any():
+        told = listing(np.array(names)[is_fixed].tolist())
+        return f"{told} is the same wherever balls are; name each ball once, or choose others"
+    return ""
+
+
+def _at(given: BallObservations, balls: Array) -> tuple[Array, Array]:
+    """Values (m,) and slopes (m, k, d) there, NaN where the computation fails."""
+    try:
+        return given.values(balls)
+    except np.linalg.LinAlgError:
+        shape = (*given.balls.shape, balls.shape[1])
+        return np.full(len(given), np.nan), np.full(shape, np.nan)

@@ -36,6 +36,96 @@ HEIGHTS = {
 # Indices of the balls of each height: itself, then those of its plane.
 ENDS = np.array([[12, 0, 4, 20], [24, 0, 4, 20], [8, 0, 4, 20]])
 VALUE, UNCERTAINTY = np.array([1.5e-6, 0.0, -0.5e-6]), 5e-8
+CORNER = {
+    "kind": "corner",
+    "balls": ["r1c5", "r1c1", "r5c1"],
+    "standard_uncertainty": "0.05 arcsec",
+}
+# Indices of the balls of the angle, its vertex in the middle, and 0.05 arcsec in radians.
+LEGS, ANGLE_UNCERTAINTY = (4, 0, 20), 0.05 * np.pi / 180 / 3600
+ANGLES = """
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ...geometry.artefacts import Name
+from ...inputs.quantities import PositiveAngle
+from ...inputs.settings import Settings
+from .balls import BallObservations
+from .calibration import Calibration
+
+
+@dataclass(frozen=True)
+class Angles(BallObservations):
+    word: ClassVar[str] = "angle"
+    measured_in: ClassVar[str] = "rad"
+    ends: np.ndarray
+    value: np.ndarray
+    uncertainty: np.ndarray
+
+    @property
+    def balls(self):
+        return self.ends
+
+    def values(self, balls):
+        first, vertex, second = np.moveaxis(balls[..., self.ends, :], -2, 0)
+        legs = [first - vertex, second - vertex]
+        lengths = [np.linalg.norm(leg, axis=-1, keepdims=True) for leg in legs]
+        one, other = (leg / length for leg, length in zip(legs, lengths))
+        cosine = (one * other).sum(axis=-1, keepdims=True)
+        sine = np.sqrt(1.0 - cosine**2)
+        by_first = (cosine * one - other) / (sine * lengths[0])
+        by_second = (cosine * other - one) / (sine * lengths[1])
+        slopes = np.stack([by_first, -by_first - by_second, by_second], axis=-2)
+        return np.arccos(cosine[..., 0]), slopes
+
+    def name(self, design, k):
+        return f"angle at ball {design.ball_label(int(self.ends[k, 1]))}"
+
+
+@dataclass(frozen=True, eq=False)
+class CornerCalibration(Calibration):
+    artefact: str
+    ends: np.ndarray
+    values: np.ndarray
+    certified: bool
+    standard_uncertainty: float
+    kind: str = "corner"
+
+    def observed(self, first):
+        uncertainty = np.full(len(self.ends), self.standard_uncertainty)
+        return Angles(self.ends + first, self.values, uncertainty)
+
+    def names(self, layout):
+        return [(layout.names[ends[1]], "angle") for ends in self.ends]
+
+
+class CornerSettings(Settings):
+    kind: Literal["corner"]
+    artefact: Name | None = None
+    balls: tuple[Name, ...]
+    standard_uncertainty: PositiveAngle
+
+
+def read_corner(settings, artefact, steps, references):
+    layout = references.layouts[artefact]
+    found = [layout.names.index(ball) for ball in settings.balls]
+    ends = np.array(found, np.int64).reshape(-1, 3)
+    values = Angles(ends, np.zeros(0), np.zeros(0)).values(layout.coordinates)[0]
+    return CornerCalibration(artefact, ends, values, False, settings.standard_uncertainty)
+"""
+ONE_HEIGHT = HEIGHTS | {"values": ["0 mm"], "balls": ["r1c5"]}
+REFUSED = {
+    "collinear plane": ONE_HEIGHT | {"plane": ["r1c1", "r1c2", "r1c4"]},
+    "nearly collinear plane": ONE_HEIGHT | {"plane": ["r1c1", "r2c2", "r4c4"]},
+    "ball of its plane": ONE_HEIGHT | {"balls": ["r1c1"]},
+    "angle in one line": CORNER | {"balls": ["r1c1", "r1c2", "r1c4"]},
+    "ball twice": CORNER | {"balls": ["r1c1", "r1c1", "r2c2"]},
+    "the same ball": CORNER | {"balls": ["r1c5", "r1c1", "r1c5"]},
+    "no balls": CORNER | {"balls": []},
+    "same angle twice": CORNER | {"balls": [*CORNER["balls"], *CORNER["balls"]]},
+}
 SWEEP = """\
 title: heights
 base: base.yaml
@@ -49,6 +139,7 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.cli import main
+from ballplate.planning.repair.certificates import better_certificates
 from ballplate.simulator.inputs.messages import ExperimentError
 
 def said(*arguments):
@@ -72,7 +163,21 @@ try:
     refused = ""
 except ExperimentError as error:
     refused = str(error)
+def refusal(name):
+    try:
+        bp.load(folder / f"{name}.yaml")
+    except ExperimentError as error:
+        return str(error)
+    return ""
+
 biases = bp.reliability(start, sigma="given")
+corner, angle_certificate = str(folder / "corner.yaml"), str(folder / "angle.csv")
+goal = (folder / "goal.txt").read_text()
+searched = ("reach", corner, "--by", "certificate", "--goal", goal, "--json")
+said("simulate", corner, "-o", readings + "2", "--certificate", angle_certificate, "--seed", "2")
+offered = json.loads(said("check", str(folder / "offered.yaml"), "--suggest", "--json"))
+fixed = said("check", str(folder / "low.yaml"), "--fix")
+angular = bp.reliability(bp.load(corner), sigma="given")
 print(json.dumps({
     "run": bp.run(start, trials=2048).to_dict(),
     "few": bp.check(folder / "few.yaml").to_dict(),
@@ -88,6 +193,17 @@ print(json.dumps({
     "fit": said("fit", base, readings, "--certificate", certificate, "--json"),
     "schema": json.loads(said("schema")),
     "refused": refused,
+    "refusals": {name: refusal(name) for name in sys.argv[2:]},
+    "reach": json.loads(said(*searched, "--calibration", "1")),
+    "reach both": json.loads(said(*searched)),
+    "suggested": json.loads(said("check", corner, "--suggest", "--goal", goal, "--json")),
+    "offered": offered,
+    "better": [one.words for one in better_certificates(bp.load(corner))],
+    "fixed": [fixed, (folder / "low.yaml").read_text()],
+    "angle certificate": Path(angle_certificate).read_text(),
+    "angle fit": said("fit", corner, readings + "2", "--certificate", angle_certificate, "--json"),
+    "angle reliability": angular.to_dict(),
+    "angle reliability table": angular.lines(),
     "export": said("export", store, "-o", "-"),
 }))
 """
@@ -103,6 +219,17 @@ def sections(*calibration: dict[str, Any], **changes: Any) -> str:
 
 def only_low() -> list[dict[str, Any]]:
     return [one for one in yaml.safe_load(sections())["positions"] if one["name"] == "z low"]
+
+
+def standard() -> str:
+    """An experiment with an angle of a length standard that is read as well."""
+    found = yaml.safe_load(sections(SIDES))
+    (plate,) = found["artefacts"]
+    found["artefacts"]["bars"] = found["artefacts"][plate] | {"role": "length_standard"}
+    found["positions"] = [one | {"artefact": plate} for one in found["positions"]]
+    found["positions"] += [found["positions"][0] | {"artefact": "bars", "name": "bars"}]
+    items = [SIDES | {"artefact": plate}, SIDES | {"artefact": "bars"}]
+    return str(yaml.safe_dump(found | {"calibration": [*items, CORNER | {"artefact": "bars"}]}))
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +252,9 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     ):
         assert kinds.count(mark) == 1
         kinds = kinds.replace(mark, new.rstrip() + "\n" + mark)
+    (rooms / "angles.py").write_text(ANGLES, encoding="utf-8")
+    kinds = kinds.replace(line, line + "\nfrom .angles import CornerSettings, read_corner")
+    kinds = kinds.replace(registered, registered + "\n    CornerSettings: read_corner,")
     (rooms / "kinds.py").write_text(kinds, encoding="utf-8")
     work = folder / "work"
     work.mkdir()
@@ -135,11 +265,21 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "few": sections(SIDES, HEIGHTS, positions=only_low()),
         "pool": sections(SIDES, pool={"calibration": [priced]}),
         "wrong": sections(SIDES, wrong),
+        "corner": sections(SIDES, CORNER),
+        "low": sections(SIDES, CORNER, positions=only_low()),
+        "offered": sections(
+            SIDES,
+            positions=only_low(),
+            pool={"calibration": [{"name": "angle", "price": "1 h", **CORNER}, priced]},
+        ),
+        **{name: sections(SIDES, one) for name, one in REFUSED.items()},
+        "length standard": standard(),
         "sweep": SWEEP,
     }.items():
         (work / f"{name}.yaml").write_text(text, encoding="utf-8")
+    (work / "goal.txt").write_text(f"U6 average {1e6 * angle_goal():.6f} um", encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(work)],
+        [sys.executable, "-W", "error", "-c", SCRIPT, str(work), *REFUSED, "length standard"],
         env={**os.environ, "PYTHONPATH": str(folder)},
         cwd=folder,
         capture_output=True,
@@ -264,6 +404,111 @@ def test_files_hold_its_values(told: dict[str, Any]) -> None:
     lines = [line for line in told["certificate"].splitlines() if "calibration[1]" in line]
     assert [line.split(",")[1:3] for line in lines] == [[b, "height"] for b in HEIGHTS["balls"]]
     assert json.loads(told["fit"])["status"] == "converged"
+
+
+def corner_rows(of: dense.Problem, uncertainty: float) -> dense.Values:
+    """Slopes of all observations, last that of the angle, which is right: its cosine's."""
+
+    def rows(step: dense.Values) -> dense.Values:
+        balls = dense.unpack(of, step)[0]
+        one, other = (balls[k] - balls[LEGS[1]] for k in (LEGS[0], LEGS[2]))
+        cosine = (one * other).sum() / np.sqrt((one * one).sum() * (other * other).sum())
+        return np.concatenate([dense.residuals(of, step), [-cosine / uncertainty]])
+
+    return dense.jacobian(rows, of.parameters)
+
+
+def corner_u6(of: dense.Problem, uncertainty: float) -> float:
+    found = dense.standard_uncertainties(of, dense.spread(corner_rows(of, uncertainty)))
+    return float(found["U6"].mean())
+
+
+def angle_goal() -> float:
+    """An average U6 between those with an exact angle and with the one stated."""
+    of = problem()
+    return (corner_u6(of, 1e-4 * ANGLE_UNCERTAINTY) + corner_u6(of, ANGLE_UNCERTAINTY)) / 2
+
+
+def test_reach_scales_an_angle(told: dict[str, Any]) -> None:
+    of, goal = problem(), round(angle_goal(), 12)
+    answer = told["reach"]["answers"]["certificate"]
+    number, unit = answer["needed"].split()
+    assert unit == "arcsec" and answer["as_drawn"] == "0.05 arcsec"
+    needed = float(number) * np.pi / 180 / 3600
+    assert answer["needed_value"] == pytest.approx(needed, rel=1e-12)
+    assert corner_u6(of, needed) <= goal < corner_u6(of, 1.011 * needed)
+    both = told["reach both"]["answers"]["certificate"]
+    assert both["as_drawn"] == "0.2 um, 0.05 arcsec"
+    length, angle = both["needed"].split(", ")
+    assert length.endswith(" um") and angle.endswith(" arcsec")
+    assert float(length.split()[0]) / 0.2 == pytest.approx(float(angle.split()[0]) / 0.05, rel=2e-2)
+
+
+def test_repairs_leave_an_angle_alone(told: dict[str, Any]) -> None:
+    text = json.dumps([told["suggested"], told["offered"], told["fixed"]])
+    assert "calibrate the corner" not in text and '"calibration[1]' not in text
+    assert len(told["better"]) == 2 and all("distances" in one for one in told["better"])
+    edits = [
+        edit
+        for one in told["offered"]["repairs"]["partial"]
+        for edit in one["edits"]
+        if edit["path"] == "calibration"
+    ]
+    assert [edit["value"] for edit in edits] == [HEIGHTS]
+    words, fixed = told["fixed"]
+    assert "Traceback" not in words
+    assert yaml.safe_load(fixed)["calibration"] == [SIDES, CORNER]
+    assert len(yaml.safe_load(fixed)["positions"]) > 1
+
+
+def test_certificates_have_the_unit_of_the_kind(told: dict[str, Any]) -> None:
+    (line,) = [one for one in told["angle certificate"].splitlines() if "calibration[1]" in one]
+    item, ball, what, value = line.split(",")
+    assert (ball, what) == ("r1c1", "angle")
+    number, unit = value.split()
+    assert unit == "rad"
+    assert 0.0 < abs(float(number) - np.pi / 2) < 6.0 * ANGLE_UNCERTAINTY
+    assert json.loads(told["angle fit"])["status"] == "converged"
+
+
+def test_reliability_has_the_unit_of_the_kind(told: dict[str, Any]) -> None:
+    of = problem()
+    whole = corner_rows(of, ANGLE_UNCERTAINTY)
+    taken = (np.linalg.qr(whole / np.linalg.norm(whole, axis=0))[0][-1] ** 2).sum()
+    (one,) = [
+        one for one in told["angle reliability"]["observations_by_name"] if one["kind"] == "angle"
+    ]
+    assert one["unit"] == "rad" and one["redundancy"] == pytest.approx(1.0 - taken, rel=1e-6)
+    limit = norm.isf(0.0005) + norm.isf(0.2)
+    detectable = limit * ANGLE_UNCERTAINTY / np.sqrt(1.0 - taken)
+    assert one["minimal_detectable"] == pytest.approx(detectable, rel=1e-4)
+    (line,) = [
+        one for one in told["angle reliability table"] if one.startswith("angle at ball r1c1")
+    ]
+    assert "µrad" in line
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("collinear plane", "cannot be told where balls are as drawn"),
+        ("nearly collinear plane", "cannot be told where balls are as drawn"),
+        ("ball of its plane", "is the same wherever balls are"),
+        ("angle in one line", "cannot be told where balls are as drawn"),
+        ("ball twice", "cannot be told where balls are as drawn"),
+        ("the same ball", "cannot be told where balls are as drawn"),
+        ("no balls", "states no value"),
+        ("same angle twice", "states r1c1, angle more than once"),
+    ],
+)
+def test_what_cannot_be_observed_is_refused(told: dict[str, Any], name: str, words: str) -> None:
+    (line,) = told["refusals"][name].splitlines()
+    assert "calibration[1]: " in line and words in line
+
+
+def test_a_length_standard_has_only_distances(told: dict[str, Any]) -> None:
+    (line,) = told["refusals"]["length standard"].splitlines()
+    assert "calibration[2].kind: a length standard carries distances only" in line
 
 
 def test_messages_and_the_schema_know_it(told: dict[str, Any]) -> None:

@@ -27,9 +27,7 @@ from .changes import (
     pair_set,
     with_calibration,
 )
-
-# Kinds of calibration that are spelled otherwise in a file.
-KINDS = {"coordinates": "co-ordinates"}
+from .written import can_be_written
 
 # Distances between two balls of a line.
 MOST_DISTANCES = 200
@@ -68,12 +66,15 @@ def certificates(experiment: Experiment) -> Iterator[Change]:
 
 
 def better_certificates(experiment: Experiment) -> Iterator[Change]:
-    """Calibration with smaller uncertainties."""
+    """Calibration with smaller uncertainties, of the kinds that can be written."""
     for k, item in enumerate(experiment.calibration):
+        if not can_be_written(item):
+            continue
         for factor in (0.5, 0.1):
             better, layout = item.times_as_uncertain(factor), experiment.layouts[item.artefact]
             least = min(one.standard_uncertainty for one in better.certified_values(layout))
-            what, words = KINDS.get(item.kind, item.kind), format_length(least)
+            what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
+            words = format_length(least)
             if isinstance(better, DistanceCalibration):
                 what = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
                 words = length_words(better.standard_uncertainty)

@@ -9,6 +9,7 @@ import numpy as np
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.radius import RadiusCalibration
 from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
@@ -67,7 +68,14 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
             found.append(Edit(("positions",), settings, True))
         elif settings != known[place.name]:
             found.append(Edit(("positions", place.name), settings))
+    candidates = () if after.pool is None else after.pool.candidates
     for k, item in enumerate(after.calibration):
+        if not can_be_written(item):
+            # Only a candidate of the pool is added as the file states it; nothing else changes.
+            if k >= len(before.calibration):
+                stated = next(one.settings for one in candidates if one.item is item)
+                found.append(Edit(("calibration",), to_list(stated), True))
+            continue
         said = calibration_settings(after, item)
         if k >= len(before.calibration):
             found.append(Edit(("calibration",), said, True))
@@ -168,8 +176,13 @@ def _group(experiment: Experiment, position: Position, group: ReadingGroup) -> d
     return said
 
 
+def can_be_written(item: Calibration) -> bool:
+    """Whether `calibration_settings` tell all of an item but its certified values."""
+    return isinstance(item, DistanceCalibration | CoordinateCalibration | RadiusCalibration)
+
+
 def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str, Any]:
-    """What a file says of a calibration item, its certified values left out."""
+    """What a file says of a calibration item that can be written, its certified values left out."""
     layout = experiment.layouts[item.artefact]
     said: dict[str, Any] = {"kind": item.kind}
     if len(experiment.artefacts) > 1:
@@ -185,11 +198,8 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
         said["balls"] = balls or [layout.names[i] for i in item.balls.tolist()]
         by_axis = zip(item.axes, item.standard_uncertainties, strict=True)
         said["standard_uncertainty"] = {AXES[axis]: written_length(u) for axis, u in by_axis}
-    else:
-        stated = item.certified_values(layout)
-        said["standard_uncertainty"] = written_length(
-            min(one.standard_uncertainty for one in stated)
-        )
+    elif isinstance(item, RadiusCalibration):
+        said["standard_uncertainty"] = written_length(item.standard_uncertainty)
     return said
 
 

@@ -24,7 +24,8 @@ class Answer:
 
     `status`: a value was `found` beside which the next, `beside`, is not enough; `any` value that
     was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
-    unknown cannot be `varied`. `words` and `value`, in metres or a number, are the value needed, or
+    unknown cannot be `varied`. `words` and `value`, in metres, the
+    `unit` of an uncertainty that is no length, or a number, are the value needed, or
     without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
     gives. `remarks` tell of the range. `tried` are the values that were looked at, with how far
     from the goal each is and whether it meets it.
@@ -41,6 +42,7 @@ class Answer:
     beside: str = ""
     remarks: tuple[str, ...] = ()
     tried: tuple[tuple[float, float, bool], ...] = field(default=(), repr=False)
+    unit: str = "m"
 
     @property
     def is_met(self) -> bool:
@@ -90,10 +92,12 @@ class Reach(Result):
 
 
 def _panel(answer: Answer) -> TriedValues:
-    """What was tried of an unknown, lengths in micrometres and sizes of plates in millimetres."""
+    """What was tried of an unknown: uncertainties in millionths of their unit, sizes of plates in
+    millimetres.
+    """
     unit, factor = {
         "repeatability": ("µm", 1e6),
-        "certificate": ("µm", 1e6),
+        "certificate": (f"µ{answer.unit}", 1e6),
         "size": ("mm", 1e3),
     }.get(answer.name, ("", 1.0))
     values, distances, is_met = (np.array(column) for column in zip(*answer.tried, strict=True))

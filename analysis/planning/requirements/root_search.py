@@ -201,7 +201,7 @@ def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficienc
         return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
     found = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
-    return replace(found, tried=trials.tried)
+    return replace(found, tried=trials.tried, unit=unknown.unit)
 
 
 def _without_value(one: Unknown, status: Literal["undetermined", "varied"], remark: str) -> Answer:

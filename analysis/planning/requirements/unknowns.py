@@ -6,15 +6,20 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from itertools import product
+from itertools import chain, product
 from typing import Literal
 
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import node_at, override
 from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
 from ballplate.simulator.inputs.quantities import (
+    BASE_UNITS,
+    QUANTITY,
+    UNITS,
     LengthFunction,
+    QuantityError,
     parse_length_function,
+    plain_unit,
     typed_length,
 )
 from ballplate.simulator.inputs.settings import hint, listing
@@ -46,10 +51,10 @@ class Unknown:
     """One quantity of an experiment with values `first` to `last`, by their places in an order of
     small to large.
 
-    `tree` gives the file with a value, `words` the value in words and `value` in metres, or as a
-    number. `grows`: a larger value makes everything better; otherwise a smaller one does;
-    `is_monotone` whether that is sure. `present` is the value as drawn, in words, and `drawn` the
-    value next to it.
+    `tree` gives the file with a value, `words` the value in words and `value` in metres, in the
+    `unit` of an uncertainty that is no length, or as a number. `grows`: a larger value makes
+    everything better; otherwise a smaller one does; `is_monotone` whether that is sure. `present`
+    is the value as drawn, in words, and `drawn` the value next to it.
     """
 
     name: UnknownName
@@ -63,6 +68,7 @@ class Unknown:
     tree: Callable[[int], Node]
     words: Callable[[int], str]
     value: Callable[[int], float]
+    unit: str = "m"
 
 
 def unknown(
@@ -99,11 +105,47 @@ def unknown(
             raise NotVariableError(
                 f"the file states no calibration{of}; there is no certificate to improve"
             )
-        paths = [f"calibration[{k}].standard_uncertainty" for k in chosen]
-        return _scaled(name, "certificate's standard uncertainty", root, paths)
+        return _certificate(root, [f"calibration[{k}]" for k in chosen])
     if name == "repeats":
         return _repeats(experiment, root, artefact)
     return _of_plate(name, experiment, root, artefact)
+
+
+def _certificate(root: Node, items: list[str]) -> Unknown:
+    """Standard uncertainties of calibration items, by their paths; lengths come first.
+
+    :raises NotVariableError: none of them states one that can be multiplied.
+    """
+    lengths, others, left = list[str](), list[str](), list[str]()
+    for item in items:
+        path = f"{item}.standard_uncertainty"
+        try:
+            node = node_at(root, path)
+            leaves = [] if node is None else _leaves(node)
+        except QuantityError:
+            leaves = []
+        if not leaves:
+            left.append(item)
+        else:
+            are_lengths = isinstance(leaves[0], LengthFunction)
+            (lengths if are_lengths else others).append(path)
+    if not lengths + others:
+        raise NotVariableError(
+            f"{listing(left)} states no standard_uncertainty that can be multiplied; there is no"
+            " certificate to improve"
+        )
+    title = "certificate's standard uncertainty"
+    if left:
+        title += f" (without {listing(left)}, which states none that can be multiplied)"
+    return _scaled("certificate", title, root, lengths + others)
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A number above zero with a unit that is none of length, as it is written."""
+
+    number: Decimal
+    unit: str
 
 
 def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unknown:
@@ -112,7 +154,13 @@ def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unkn
     """
     nodes = [node_at(root, path) for path in paths]
     leaves = [leaf for node in nodes if node is not None for leaf in _leaves(node)]
-    lead = exact(leaves[0].constant or leaves[0].slope)
+    first, unit, scale = leaves[0], "m", 1.0
+    if isinstance(first, _Quantity):
+        kind = next(kind for kind, units in UNITS.items() if plain_unit(first.unit) in units)
+        lead, unit = first.number, BASE_UNITS[kind]
+        scale = float(UNITS[kind][plain_unit(first.unit)])
+    else:
+        lead = exact(first.constant or first.slope)
 
     def factor(step: int) -> Fraction:
         return Fraction(at_step(step)) / Fraction(lead)
@@ -141,7 +189,8 @@ def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unkn
         True,
         tree,
         words,
-        _metres,
+        lambda step: scale * _metres(step),
+        unit,
     )
 
 
@@ -149,9 +198,24 @@ def _metres(step: int) -> float:
     return float(at_step(step))
 
 
-def _leaves(node: Node) -> list[LengthFunction]:
+def _leaf(value: object) -> LengthFunction | _Quantity:
+    """An uncertainty as it is written.
+
+    :raises QuantityError: neither a length nor another number above zero with a unit.
+    """
+    try:
+        return parse_length_function(value)
+    except QuantityError:
+        match = QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
+        known = match is not None and plain_unit(match[2] or "") in chain(*UNITS.values())
+        if match is None or not known or Decimal(match[1]) <= 0:
+            raise
+        return _Quantity(Decimal(match[1]), match[2].strip())
+
+
+def _leaves(node: Node) -> list[LengthFunction | _Quantity]:
     if isinstance(node, Scalar):
-        return [parse_length_function(node.value)]
+        return [_leaf(node.value)]
     parts = node.items.values() if isinstance(node, Mapping) else node.items
     return [leaf for part in parts for leaf in _leaves(part)]
 
@@ -159,7 +223,7 @@ def _leaves(node: Node) -> list[LengthFunction]:
 def _with_leaves(node: Node, factor: Fraction) -> Node:
     """The node with all uncertainties multiplied and cut to three digits."""
     if isinstance(node, Scalar):
-        return Scalar(node.mark, _text(parse_length_function(node.value), factor))
+        return Scalar(node.mark, _text(_leaf(node.value), factor))
     if isinstance(node, Mapping):
         return Mapping(
             node.mark, {k: _with_leaves(v, factor) for k, v in node.items.items()}, node.key_marks
@@ -167,10 +231,13 @@ def _with_leaves(node: Node, factor: Fraction) -> Node:
     return Sequence(node.mark, tuple(_with_leaves(one, factor) for one in node.items))
 
 
-def _text(leaf: LengthFunction, factor: Fraction) -> str:
+def _text(leaf: LengthFunction | _Quantity, factor: Fraction) -> str:
     """An uncertainty multiplied by a factor, as it is written; cut to three digits unless the
     factor is 1.
     """
+    if isinstance(leaf, _Quantity):
+        number = leaf.number if factor == 1 else round_down(times(leaf.number, factor))
+        return f"{number.normalize():f} {leaf.unit}"
     constant = exact(leaf.constant)
     if constant and factor != 1:
         constant = round_down(times(constant, factor))

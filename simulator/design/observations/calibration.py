@@ -83,7 +83,7 @@ class Calibration(ABC):
         ):
             of_drawing = length if self.are_lengths else None
             yield CertifiedValue(
-                "", first, second, value, u, is_pair=self.are_lengths, drawn=of_drawing
+                "", first, second, value, u, given.measured_in, self.are_lengths, of_drawing
             )
 
     def true_values(self, balls: Array, first: int) -> Array:

@@ -124,18 +124,7 @@ class CoordinatesSettings(Settings):
 def read_coordinates(
     settings: CoordinatesSettings, artefact: str, steps: Steps, references: References
 ) -> CoordinateCalibration | None:
-    problems, layout, dimension = (
-        references.problems,
-        references.layouts[artefact],
-        references.dimension,
-    )
-    if references.artefacts[artefact].role == "length_standard":
-        text = (
-            "a length standard carries distances only; use kind: distances, or remove its role:"
-            " length_standard"
-        )
-        problems.add((*steps, "kind"), text)
-        return None
+    layout, dimension = references.layouts[artefact], references.dimension
     uncertainty = settings.standard_uncertainty
     by_axis: dict[str, float] = (
         dict.fromkeys(AXIS_NAMES[:dimension], uncertainty)
