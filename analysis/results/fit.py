@@ -339,10 +339,10 @@ class Fit(FitResult):
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
         if self.without_scatter:
             found.append(
-                "sigma is zero but for rounding, since the readings agree exactly with the model, as"
-                " only computed ones do: the uncertainties here are zero, too, and say nothing of"
-                " what measured readings would give; --sigma given takes the uncertainties as"
-                " stated"
+                "sigma is zero but for rounding, since the readings agree exactly with the model,"
+                " as only computed ones do: the uncertainties here are zero, too, and neither they"
+                " nor what is within a target tells of measured readings; --sigma given takes the"
+                " uncertainties as stated"
             )
         elif self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"

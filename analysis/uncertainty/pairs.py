@@ -204,7 +204,9 @@ def _summary(
     determined = np.where(open_, np.nan, values) if count else values
     top = first_largest(determined)
     where = (int(labels[tile.first[top]]), int(labels[tile.second[top]]))
-    within = 0 if limit is None else int((~open_ & (sigma * values <= limit.at(tile.lengths))).sum())
+    within = (
+        0 if limit is None else int((~open_ & (sigma * values <= limit.at(tile.lengths))).sum())
+    )
     return PairSummary(
         len(values),
         count,
