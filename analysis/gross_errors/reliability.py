@@ -436,7 +436,7 @@ def _of_probes(design: Design) -> str:
     if across is None:
         return f" of probe {names[design.evaluation.probe]}"
     used = listed([names[k] for k in np.unique(design.tasks.probes)])
-    return f" of probe {names[design.evaluation.probe]}, nor between any of {used}"
+    return f" of probe {names[design.evaluation.probe]}, nor between those of {used}"
 
 
 def _listed(names: Iterable[str]) -> str:
