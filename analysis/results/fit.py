@@ -340,11 +340,11 @@ class Fit(FitResult):
         if self.without_scatter:
             found.append(
                 "sigma is zero but for rounding, since the readings agree exactly with the model,"
-                " as only computed ones do: the uncertainties here are zero, too, and neither they"
-                " nor what is within a target tells of measured readings; --sigma given takes the"
-                " uncertainties as stated"
+                " as computed ones do, or a few rounded ones by chance: the uncertainties here are"
+                " zero, too, and neither they nor what is within a target can be relied on; --sigma"
+                " given takes the uncertainties as stated"
             )
-        elif self.sigma_is_estimated:
+        if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
         if self.untested:
