@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.readings import offset_sensitivity
 from ballplate.simulator.estimation.functions import (
     Coordinates,
     Displacements,
@@ -22,10 +24,11 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ..uncertainty.pairs import open_above, relative
 from ..uncertainty.quantities import QUANTITIES
 from .leftover import columns_of_balls
+from .patterns import Patterns
 from .response import Response
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import csc_array, csr_array
 
 # Places of which all pairs are looked at; of more points, or balls of a plate, some are chosen
 # evenly.
@@ -35,7 +38,6 @@ MOST_PLACES = 200
 AT_ONCE = 2_000_000
 
 SYMBOLS = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.effect)
-LENGTHS = tuple(symbol for symbol in SYMBOLS if QUANTITIES[symbol].are_lengths)
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,10 @@ class Changes:
     uncertainties (f,).
 
     The places move by `common` (places d, r) times the common part of a response and, for balls, by
-    `own` (places d, n d) times its own part; None for points. `first` and `second` (f,) are the
-    places of each function, or one and its axis.
+    `own` (places d, n d) times its own part; None for points. These are moved by `direct`
+    (places d, k) as well where a bias of one of the k patterns enters the correction itself, as a
+    probe's offset does; None for balls. `first` and `second` (f,) are the places of each function,
+    or one and its axis.
     """
 
     operator: csr_array
@@ -67,6 +71,7 @@ class Changes:
     uncertainty: Array
     first: Integers
     second: Integers
+    direct: csc_array | None = None
 
     def largest(self, response: Response) -> Largest:
         """The largest change of a function by each pattern."""
@@ -78,6 +83,9 @@ class Changes:
             moved = self.common @ response.common[some].T
             if self.own is not None:
                 moved += (self.own @ response.own[some].T).toarray()
+            if self.direct is not None:
+                # The estimate moves against the response.
+                moved -= self.direct[:, response.index[some]].toarray()
             values = np.abs(self.operator @ moved)
             where[some] = comparable(values, axis=0).argmax(axis=0)
             change[some] = values.max(axis=0)
@@ -85,15 +93,19 @@ class Changes:
         return Largest(change, where, uncertainty)
 
 
-def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[Integers], Changes]:
-    """Changes of co-ordinates, or of distances; of a large artefact, those that end at some or the
-    asked balls.
+def changes_of(
+    at: Linearisation, given: Coordinates | Distances, biases: Patterns
+) -> Callable[[Integers], Changes]:
+    """Changes of co-ordinates, or of distances, by some `biases`; of a large artefact, those that
+    end at some or the asked balls.
     """
     places, made = given.places, displacements(at, given.places, narrow=False)
     if isinstance(given, Coordinates):
         found = _coordinates(made, places)
+        if isinstance(places, MeasuredPoints):
+            found = replace(found, direct=_direct(at, places, biases))
         return lambda asked: found
-    if isinstance(given.places, MeasuredPoints):
+    if isinstance(places, MeasuredPoints):
         chosen = (
             np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
         )
@@ -102,9 +114,14 @@ def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[I
             if given.pairs is None
             else given.pairs
         )
-        of_points = _distances(made.select(chosen), None, pairs, chosen)
+        of_points = replace(
+            _distances(made.select(chosen), None, pairs, chosen),
+            direct=_direct(
+                at, MeasuredPoints(places.points[chosen], places.probes[chosen]), biases
+            ),
+        )
         return lambda asked: of_points
-    own = _own_parts(at, made, given.places.index)
+    own = _own_parts(at, made, places.index)
     kept: dict[bytes, Changes] = {}
 
     def among(asked: Integers) -> Changes:
@@ -123,6 +140,19 @@ def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[I
     return among
 
 
+def across_probes(design: Design) -> Distances | None:
+    """Distances between points measured with any of the probes that measuring tasks use, at some
+    evaluation points; None where these are U6, or there is no task.
+    """
+    probes = np.unique(design.tasks.probes)
+    if set(probes.tolist()) <= {design.evaluation.probe}:
+        return None
+    points = design.evaluation.points[evenly(len(design.evaluation.points))]
+    points = points[:: -(-len(points) * len(probes) // MOST_PLACES)]
+    each = np.repeat(probes, len(points))
+    return Distances(MeasuredPoints(np.tile(points, (len(probes), 1)), each))
+
+
 def evenly(count: int) -> Integers:
     """Indices of up to `MOST_PLACES` of `count` places.
 
@@ -132,6 +162,21 @@ def evenly(count: int) -> Integers:
     if count <= MOST_PLACES:
         return np.arange(count)
     return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
+
+
+def _direct(at: Linearisation, places: MeasuredPoints, biases: Patterns) -> csc_array:
+    """Changes (n d, k) of corrected points x + e(x, a, p) by p itself, where that is wrong."""
+    from scipy.sparse import coo_array
+
+    state, chosen = at.state, biases.of_kind("probe")
+    offsets = state.probes[places.probes]
+    by_offset = offset_sensitivity(at.design.model, places.points, state.a, offsets)
+    mine = places.probes[:, None] == biases.subject[chosen]
+    changes = np.where(mine[:, None, :], by_offset[:, :, biases.axis[chosen]], 0.0)
+    changes = changes.reshape(places.points.size, len(chosen))
+    row, column = np.nonzero(changes)
+    shape = len(changes), len(biases)
+    return coo_array((changes[row, column], (row, chosen[column])), shape=shape).tocsc()
 
 
 def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_array:

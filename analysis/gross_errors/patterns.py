@@ -378,7 +378,11 @@ def _probes(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     design, state = at.design, at.state
     d, offsets = design.dimension, state.probes[design.readings.probe]
     all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
-    for probe in np.unique(design.readings.probe):
+    probes = np.unique(design.readings.probe)
+    # A fit tests what its readings may show; a task may also use a probe that reads nothing else.
+    if not at.every_start:
+        probes = np.union1d(probes, design.tasks.probes)
+    for probe in probes:
         fixed = np.ones(d, bool) if not design.probes.free.any() else ~design.probes.free[probe]
         if not fixed.any():
             continue

@@ -22,7 +22,7 @@ from ballplate.simulator.machines.protocol import Integers
 
 from ..uncertainty.quantities import QUANTITIES
 from .cause_search import FAMILY
-from .effects import SYMBOLS, Changes, Largest, changes_of
+from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
 from .events import event_groups
 from .leftover import Columns, leftover, too_many_entries
 from .patterns import patterns
@@ -31,6 +31,9 @@ from .reliability import Effects, Reliability
 from .response import responses
 
 FALSE_ALARM, POWER = 0.001, 0.8
+
+# In the place of a symbol: distances between points measured with any of the tasks' probes.
+ACROSS = "across probes"
 
 
 def reliability(
@@ -75,9 +78,20 @@ def reliability_of(
     """Reliability of a design at zero machine error, where sigma is known or estimated."""
     at = linearise(design)
     given = patterns(design, at.state, None)
-    functions = {symbol: QUANTITIES[symbol].functions(design, at.layout) for symbol in SYMBOLS}
+    functions = {
+        symbol: groups
+        for symbol in SYMBOLS
+        for groups in [QUANTITIES[symbol].functions(design, at.layout)]
+        # Of what only some experiments ask for, the others are told nothing.
+        if groups or QUANTITIES[symbol].is_recorded
+    }
+    mixed = across_probes(design)
+    if mixed is not None:
+        functions[ACROSS] = (mixed,)
     changes = {
-        symbol: [changes_of(at, group) for group in groups if not isinstance(group, Parameters)]
+        symbol: [
+            changes_of(at, group, given) for group in groups if not isinstance(group, Parameters)
+        ]
         for symbol, groups in functions.items()
     }
     places = row_places(design)
@@ -112,6 +126,7 @@ def reliability_of(
     repeats = design.readings.repeats[design.plate_readings]
     every = patterns(design, at.state, None, every_start=True)
     tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
+    across = effects.pop(ACROSS).change if mixed is not None else np.zeros(len(given))
     limit = 0.5 * FAMILY / max(tests, 1)
     freedom = design.observation_count - design.parameter_count + at.deficiency
     return Reliability(
@@ -124,6 +139,7 @@ def reliability_of(
         design.dimension * int((repeats - 1).sum()),
         information,
         effects,
+        across,
         freedom,
         at.deficiency,
         sigma_is_estimated,

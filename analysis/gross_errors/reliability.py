@@ -23,7 +23,7 @@ from ..presentation.panels import RowOfPoints, draw_rows
 from ..presentation.result import Result
 from ..rank.proposed_bars import listed
 from ..uncertainty.quantities import QUANTITIES
-from .effects import LENGTHS, MOST_PLACES, SYMBOLS
+from .effects import MOST_PLACES, across_probes
 from .names import name
 from .patterns import Patterns, single_kinds
 
@@ -73,9 +73,10 @@ class Reliability(Result):
     themselves. `left` (k,) is that of each pattern: of a single observation its redundancy number,
     otherwise the share of its square that is left in the residuals. `information` (k,) is what is
     left of a pattern in the residuals, per unit of the bias squared, and 0 where that is nil.
-    `effects` are by symbol. `noncentrality` belongs to the test with `false_alarm` and `power`,
-    sigma being known or estimated from the observations, less the one suspected, and
-    `fit_noncentrality` to each of all those tests that a fit makes.
+    `effects` are by symbol, and `across` (k,) is the largest change of a distance between points
+    measured with any of the probes that measuring tasks use. `noncentrality` belongs to the test
+    with `false_alarm` and `power`, sigma being known or estimated from the observations, less the
+    one suspected, and `fit_noncentrality` to each of all those tests that a fit makes.
     """
 
     label: str
@@ -87,6 +88,7 @@ class Reliability(Result):
     among_repeats: int
     information: Array
     effects: dict[str, Effects]
+    across: Array
     degrees_of_freedom: int
     deficiency: int
     sigma_is_estimated: bool
@@ -171,8 +173,16 @@ class Reliability(Result):
             )
 
     def is_harmless(self, k: int) -> bool:
-        """Whether a bias changes no distance, between balls or between corrected points."""
-        return all(self.effects[symbol].change[k] <= NO_EFFECT * self.size(k) for symbol in LENGTHS)
+        """Whether a bias changes no distance: between balls, between corrected points with the
+        probe of the evaluation or those of measuring tasks, nor any other length that is judged.
+        """
+        changes = [self.across, *(self.effects[symbol].change for symbol in self.lengths)]
+        return all(change[k] <= NO_EFFECT * self.size(k) for change in changes)
+
+    @property
+    def lengths(self) -> list[str]:
+        """Symbols of the effects that are on lengths."""
+        return [symbol for symbol in self.effects if QUANTITIES[symbol].are_lengths]
 
     def size(self, k: int) -> float:
         """About how far, in metres, a unit of a bias moves what it is about."""
@@ -207,7 +217,7 @@ def _heading(result: Reliability) -> list[str]:
     rank = f"rank deficiency {result.deficiency}" if result.deficiency else "full rank"
     sigma = "estimated from the other residuals" if result.sigma_is_estimated else "as given"
     total = result.redundancy.sum() + result.among_repeats
-    effects = [f"{symbol} ({QUANTITIES[symbol].effect})" for symbol in SYMBOLS]
+    effects = [f"{symbol} ({QUANTITIES[symbol].effect})" for symbol in result.effects]
     lines = [
         f"{result.label}: {result.title}",
         (
@@ -292,7 +302,7 @@ def _table(
             "MDB",
             "by fit",
             "unit",
-            *(f"{s}, µm" for s in SYMBOLS),
+            *(f"{s}, µm" for s in result.effects),
         ]
     ]
     rows[0].append("U6 at")
@@ -302,7 +312,7 @@ def _table(
         if with_redundancy:
             cells.append(number(result.left[k], 3))
         cells += [_shown(result.minimal_detectable[k]), _shown(result.found_by_fit[k]), SHOWN[unit]]
-        for symbol in SYMBOLS:
+        for symbol in result.effects:
             effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
             told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
             cells.append("-" if math.isnan(effect) else told)
@@ -314,7 +324,7 @@ def _table(
         True,
         True,
         False,
-        *(True for _ in SYMBOLS),
+        *(True for _ in result.effects),
         False,
     ]
     return aligned(rows, right)
@@ -378,14 +388,18 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
         which = "it changes no determined distance" if result.deficiency else "no distance changes"
         lines.append(
             f"cannot be detected, harmless: {told}: {which}, between balls or corrected points"
+            f"{_of_probes(result.design)}"
         )
     for k in [k for k in hidden if k not in set(harmless)][: 4 * MOST]:
         unit = result.patterns.unit(k)
         parts = [
             f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} µm per {SHOWN[unit]}"
-            for symbol in LENGTHS
-            if result.effects[symbol].change[k] > 0.0
+            for symbol in result.lengths
+            if result.effects[symbol].change[k] > NO_EFFECT * result.size(k)
         ]
+        if result.across[k] > NO_EFFECT * result.size(k):
+            told = f"{number(result.across[k], 3)} µm per {SHOWN[unit]}"
+            parts.append(f"distances between points of different probes by up to {told}")
         lines.append(
             f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes"
             f" {', '.join(parts)}"
@@ -409,6 +423,20 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     if count > MOST_PLACES:
         lines.append(f"(effects on U6 are those on {MOST_PLACES} of {count} evaluation points)")
     return ["", *lines] if lines else []
+
+
+def _of_probes(design: Design) -> str:
+    """Which probes measure the corrected points whose distances were looked at, if there are
+    several.
+    """
+    names = design.probes.names
+    if len(names) == 1:
+        return ""
+    across = across_probes(design)
+    if across is None:
+        return f" of probe {names[design.evaluation.probe]}"
+    used = listed([names[k] for k in np.unique(design.tasks.probes)])
+    return f" of probe {names[design.evaluation.probe]}, nor between those of {used}"
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -479,7 +507,7 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
                 "standard_uncertainty": finite(float(result.effects[symbol].uncertainty[k])),
                 "at": _where(result, symbol, k),
             }
-            for symbol in SYMBOLS
+            for symbol in result.effects
             if result.effects[symbol].first[k] >= 0
         },
     }
@@ -503,12 +531,12 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
         ]
         + [
             f"{symbol}_{what}"
-            for symbol in SYMBOLS
+            for symbol in result.effects
             for what in ("effect_um", "standard_uncertainty_um", "at")
         ]
     )
     design, given = result.design, result.patterns
-    effects = {symbol: _effect(result, symbol) for symbol in SYMBOLS}
+    effects = {symbol: _effect(result, symbol) for symbol in result.effects}
     for k in np.flatnonzero(np.isin(given.kind, single_kinds(given.design))).tolist():
         names = ["", "", "", ""]
         if given.kind[k] in ("reading", "end"):
@@ -533,7 +561,7 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             ascii_units(SHOWN[unit]),
         ]
         cells += [_cell(result.minimal_detectable[k]), _cell(result.found_by_fit[k])]
-        for symbol in SYMBOLS:
+        for symbol in result.effects:
             cells += [
                 _cell(effects[symbol][k]),
                 _cell(result.effects[symbol].uncertainty[k]),

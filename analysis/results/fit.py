@@ -56,6 +56,9 @@ if TYPE_CHECKING:
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
 
+# An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
+LEAST_SIGMA = 1e-6
+
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3
 
@@ -183,7 +186,7 @@ class Fit(FitResult):
                     "axis": one.axis,
                     "value": one.value,
                     "unit": "m",
-                    "standard_uncertainties": one.standardised / self.sigma,
+                    "standard_uncertainties": finite(self._standardised(one)),
                 }
                 for one in self.largest
             ],
@@ -334,6 +337,13 @@ class Fit(FitResult):
             if self.diagnosis.suspects or self.diagnosis.scatter:
                 cure = "see what is suspected"
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
+        if self.without_scatter:
+            found.append(
+                "sigma is zero but for rounding, since the readings agree exactly with the model,"
+                " as computed ones do, or a few rounded ones by chance: the uncertainties here are"
+                " zero, too, and neither they nor what is within a target can be relied on; --sigma"
+                " given takes the uncertainties as stated"
+            )
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
@@ -364,6 +374,15 @@ class Fit(FitResult):
             return False
         return self.solution.factor.sum_of_squares > float(chdtri(self.degrees_of_freedom, 1e-3))
 
+    @property
+    def without_scatter(self) -> bool:
+        """Whether sigma is estimated from residuals that are zero but for rounding."""
+        return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    def _standardised(self, one: Residual) -> float:
+        """A residual in its standard uncertainties; NaN where there is nothing but rounding."""
+        return float("nan") if self.without_scatter else one.standardised / self.sigma
+
     def _residual_table(self) -> list[str]:
         """The largest residuals as lines of text."""
         rows = [["largest residuals", "", "", "", "µm", "standard uncertainties"]]
@@ -375,7 +394,7 @@ class Fit(FitResult):
                     one.probe,
                     one.axis,
                     number(1e6 * one.value),
-                    number(one.standardised / self.sigma),
+                    "-" if self.without_scatter else number(self._standardised(one)),
                 ]
             )
         return aligned(rows, [False, False, False, False, True, True])

@@ -64,14 +64,15 @@ class PairTile:
 
 
 def all_pairs(
-    moved: Displacements, labels: Integers, limit: LengthFunction | None = None
+    moved: Displacements, labels: Integers, limit: LengthFunction | None = None, sigma: float = 1.0
 ) -> PairSummary:
     """Standard uncertainty of the distances between all pairs of n places, as `pair_tiles` gives
     them.
 
-    `labels` (n,) name the places in the result.
+    `labels` (n,) name the places in the result. `sigma` times the uncertainty of each is compared
+    with the `limit`.
     """
-    return sum((_summary(tile, labels, limit) for tile in pair_tiles(moved)), PairSummary())
+    return sum((_summary(tile, labels, limit, sigma) for tile in pair_tiles(moved)), PairSummary())
 
 
 def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
@@ -193,7 +194,9 @@ def _tile(
     return PairTile(rows.start + first, columns.start + second, np.sqrt(lengths), values, open_)
 
 
-def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> PairSummary:
+def _summary(
+    tile: PairTile, labels: Integers, limit: LengthFunction | None, sigma: float
+) -> PairSummary:
     values, open_ = tile.uncertainties, tile.is_open
     count = int(open_.sum())
     if count == len(values):
@@ -201,7 +204,9 @@ def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> 
     determined = np.where(open_, np.nan, values) if count else values
     top = first_largest(determined)
     where = (int(labels[tile.first[top]]), int(labels[tile.second[top]]))
-    within = 0 if limit is None else int((~open_ & (values <= limit.at(tile.lengths))).sum())
+    within = (
+        0 if limit is None else int((~open_ & (sigma * values <= limit.at(tile.lengths))).sum())
+    )
     return PairSummary(
         len(values),
         count,

@@ -158,6 +158,7 @@ QUANTITIES: dict[str, QuantityKind] = {
         "lengths of measuring tasks",
         lambda design, layout: (task_distances(design),) if design.tasks.names else (),
         are_lengths=True,
+        effect="lengths of measuring tasks",
         in_replicates=False,
         is_recorded=False,
         needs="evaluation.tasks",

@@ -169,9 +169,10 @@ def _of_pairs(
     target: Target | None,
 ) -> Quantity | None:
     """Distances between all places of each group; None where all coincide."""
-    # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
-    limit = None if target is None else Target(target.standard, sigma).standard
-    pairs = sum((all_pairs(moved, places.labels, limit) for places, moved in groups), PairSummary())
+    limit = None if target is None else target.standard
+    pairs = sum(
+        (all_pairs(moved, places.labels, limit, sigma) for places, moved in groups), PairSummary()
+    )
     if not pairs.count:
         return None
     determined = pairs.count - pairs.undetermined

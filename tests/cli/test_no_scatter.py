@@ -1,0 +1,134 @@
+"""Fits of readings without any scatter, whose estimated sigma is zero or nothing but rounding."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.cli import main
+from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.inputs.quantities import LengthFunction, Target
+from ballplate.uncertainty.pairs import all_pairs
+from ballplate.uncertainty.summaries import uncertainties
+
+TRUTH = re.compile(r"true_machine:\n(  .*\n)+")
+TARGET = re.compile(r"target_uncertainty: .*\n")
+TASKS = (
+    "  probe: down\n  tasks: [{name: across, from: [100 mm, 100 mm, 100 mm],"
+    " to: [600 mm, 100 mm, 100 mm], probes: [down, right], target_uncertainty: 1 um}]\n"
+)
+PLANE = """
+title: plane
+machine: {volume: [1 m, 1 m], repeatability: 0.2 um}
+error_model: {kind: metric}
+true_machine: {kind: zero}
+artefacts:
+  plate: {kind: grid, balls: [3, 3], size: [600 mm, 600 mm]}
+positions:
+  - {name: first, pose: {origin: [100 mm, 100 mm]}}
+  - {name: turned, pose: {origin: [700 mm, 100 mm], rotation: 90 deg}}
+calibration:
+  - {kind: distances, pairs: [[r1c1, r1c3]], standard_uncertainty: 0.1 um}
+evaluation: {points: {random: 12, seed: 1}}
+"""
+
+
+def quickstart(truth: str, target: bool) -> str:
+    """The quickstart with a machine of a kind, with or without a target, and a task."""
+    text, count = TRUTH.subn(
+        f"true_machine: {truth}\n", Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    )
+    assert count == 1 and TARGET.search(text) and text.count("  probe: down\n") == 1
+    text = text.replace("  probe: down\n", TASKS if target else "  probe: down\n")
+    return text if target else TARGET.sub("", text)
+
+
+ZERO, RANDOM = "{kind: zero}", "{kind: random, position: 2 um, rotation: 4 urad, seed: 7}"
+
+
+@pytest.mark.parametrize("truth", [ZERO, RANDOM], ids=["zero", "rounding"])
+@pytest.mark.parametrize("target", [True, False], ids=["target", "none"])
+def test_a_fit_without_scatter_says_so(
+    truth: str, target: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, readings = tmp_path / "it.yaml", tmp_path / "it.csv"
+    path.write_text(quickstart(truth, target), encoding="utf-8")
+    assert main(["simulate", str(path), "--exact", "-o", str(readings)]) == 0
+    capsys.readouterr()
+    picture = tmp_path / "residuals.svg"
+    assert main(["fit", str(path), str(readings), "--plot", str(picture)]) == 0
+    said = capsys.readouterr()
+    told = "sigma is zero but for rounding, since the readings agree exactly with the model"
+    assert told in said.err and "--sigma given" in said.err and picture.exists()
+    start = said.out.index("largest residuals")
+    assert [line.split()[-1] for line in said.out[start:].splitlines()[1:4]] == ["-"] * 3
+    assert main(["fit", str(path), str(readings), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["sigma"] < 1e-7 and any(told in words for words in found["warnings"])
+    assert (found["sigma"] == 0.0) is (truth == ZERO)
+    assert {one["standard_uncertainties"] for one in found["largest_residuals"]} == {None}
+    # With sigma as stated nothing of this is said, and uncertainties are those of the design.
+    assert main(["fit", str(path), str(readings), "--sigma", "given", "--json"]) == 0
+    given = json.loads(capsys.readouterr().out)
+    assert not any("sigma is zero" in words for words in given["warnings"])
+    assert all(one["standard_uncertainties"] is not None for one in given["largest_residuals"])
+    planned = bp.run(bp.load(path)).to_dict()["quantities"]["U6"]
+    for name in ("maximum", "average"):
+        assert given["quantities"]["U6"][name] == pytest.approx(planned[name], rel=1e-4)
+        expected = found["sigma"] * planned[name]
+        assert found["quantities"]["U6"][name] == pytest.approx(expected, rel=1e-4, abs=1e-30)
+
+
+def test_from_python(tmp_path: Path) -> None:
+    path = tmp_path / "it.yaml"
+    path.write_text(quickstart(ZERO, True), encoding="utf-8")
+    experiment = bp.load(path)
+    fit = bp.fit(experiment, bp.simulate(experiment, exact=True))
+    assert fit.sigma == 0.0 and fit.without_scatter and "sigma 0" in repr(fit)
+    assert not fit.covariance("machine").to_numpy().any()
+    assert np.isnan(fit.correlation("machine").to_numpy()).all()
+    assert fit.correct([[0.1, 0.2, 0.3]]).standard_uncertainties.tolist() == [[0.0] * 3]
+    assert len(fit.to_frame()) and fit.plot() is not None
+    noisy = bp.fit(experiment, bp.simulate(experiment))
+    assert not noisy.without_scatter and not any("sigma is zero" in one for one in noisy.cautions)
+
+
+@pytest.mark.parametrize("estimator", ["full", "distances", "cresto", "kruth", "reversal"])
+def test_every_estimator_in_the_plane(
+    estimator: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, readings = tmp_path / "it.yaml", tmp_path / "it.csv"
+    path.write_text(PLANE, encoding="utf-8")
+    assert main(["simulate", str(path), "--exact", "-o", str(readings)]) == 0
+    for options in ([], ["--json"]):
+        assert main(["fit", str(path), str(readings), "--estimator", estimator, *options]) == 0
+        assert "nan" not in capsys.readouterr().out.lower().split()
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-320, 1e-200, 0.3, 1.0, 40.0])
+def test_the_share_within_the_target_is_counted_for_any_sigma(sigma: float) -> None:
+    """Against each distance compared by itself."""
+    design = lay_out(bp.quickstart())
+    at = linearise(design)
+    target = Target(LengthFunction(0.5e-6, 1e-6), 2.0)
+    found = uncertainties(at, sigma, target, ("U6",))["U6"]
+    points = design.evaluation.points
+    places = MeasuredPoints(points, np.full(len(points), design.evaluation.probe))
+    covariance = displacements(at, places).common
+    drawn = places.at(design, at.state)
+    first, second = np.triu_indices(len(points), 1)
+    apart = drawn[first] - drawn[second]
+    length = np.linalg.norm(apart, axis=1)
+    unit = apart / length[:, None]
+    each = np.linalg.norm(
+        np.einsum("md,mdr->mr", unit, covariance[first] - covariance[second]), axis=1
+    )
+    within = 2.0 * sigma * each <= 0.5e-6 + 1e-6 * length
+    assert found.within_target == pytest.approx(within.mean(), abs=1.5 / len(within))
+    assert all_pairs(displacements(at, places), places.labels).within == 0
