@@ -148,7 +148,7 @@ def across_probes(design: Design) -> Distances | None:
     if set(probes.tolist()) <= {design.evaluation.probe}:
         return None
     points = design.evaluation.points[evenly(len(design.evaluation.points))]
-    points = points[:: -(-len(points) * len(probes) // MOST_PLACES)]
+    points = points[:: max(-(-len(points) * len(probes) // MOST_PLACES), 1)]
     each = np.repeat(probes, len(points))
     return Distances(MeasuredPoints(np.tile(points, (len(probes), 1)), each))
 

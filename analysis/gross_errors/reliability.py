@@ -399,7 +399,7 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
         ]
         if result.across[k] > NO_EFFECT * result.size(k):
             told = f"{number(result.across[k], 3)} µm per {SHOWN[unit]}"
-            parts.append(f"distances between points of different probes by up to {told}")
+            parts.append(f"distances between points of tasks' probes by up to {told}")
         lines.append(
             f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes"
             f" {', '.join(parts)}"

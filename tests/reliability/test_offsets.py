@@ -180,7 +180,7 @@ def test_harmless_is_said_of_no_offset_that_a_task_may_feel(
     assert main(["reliability", str(path)]) == 0
     out = capsys.readouterr().out
     assert "harmless" not in out and "tasks, µm" in out
-    assert "offset y of probe down; it changes distances between points of different probes" in out
+    assert "offset y of probe down; it changes distances between points of tasks' probes" in out
     # With one probe in all tasks no length knows the offset.
     path.write_text(
         text.replace("[down, right]", "[down, down]")
