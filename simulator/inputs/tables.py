@@ -105,24 +105,12 @@ def read_table(
             messages.append(mark.message("", wrong_count(line, cells, count)))
             continue
         by_name = dict(zip(places, [*cells, *((1, text) for text in constants)], strict=True))
-        row_lengths = []
-        for name in (*lengths, *optional):
-            if name not in by_name:
-                row_lengths.append(absent)
-                continue
-            column, cell = by_name[name]
-            place = Mark(file, number, column)
-            row_lengths.append(read_number(cell, name, factors[name], place, messages))
         for name in texts:
             if not by_name[name][1]:
-                messages.append(
-                    Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name")
-                )
-        rows.append(
-            FileRow(
-                mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths)
-            )
-        )
+                place = Mark(file, number, by_name[name][0])
+                messages.append(place.message("", f"no {name}; write its name"))
+        values = _lengths_of(mark, by_name, (*lengths, *optional), factors, absent, messages)
+        rows.append(FileRow(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), values))
     if len(lines) == 1:
         messages.append(
             Message(
@@ -136,6 +124,26 @@ def read_table(
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
+
+
+def _lengths_of(
+    mark: Mark,
+    by_name: Mapping[str, tuple[int, str]],
+    names: Sequence[str],
+    factors: Mapping[str, Fraction],
+    absent: float,
+    messages: list[Message],
+) -> tuple[float, ...]:
+    """Lengths of a row by column, which messages about them are added to."""
+    found = []
+    for name in names:
+        if name not in by_name:
+            found.append(absent)
+            continue
+        column, cell = by_name[name]
+        place = Mark(mark.file, mark.line, column)
+        found.append(read_number(cell, name, factors[name], place, messages))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
