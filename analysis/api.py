@@ -31,9 +31,7 @@ from .estimators.estimator_choice import (
     ESTIMATORS,
     OF_DISTANCES,
     OF_LENGTHS,
-    PAIR_SETS,
     EstimatorName,
-    PairSet,
     takers,
 )
 from .simulator.experiment.load import load as load_file
@@ -299,7 +297,7 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     estimator: EstimatorName = "full",
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
@@ -313,7 +311,7 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     estimator: EstimatorName = "full",
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
@@ -343,7 +341,7 @@ def fit(
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=estimator)
-    ensure_one_of(PAIR_SETS, pairs=pairs)
+    ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
     ensure_type(bool, "True or False", offsets=offsets)
@@ -365,7 +363,7 @@ def compare(
     experiment: Experiment | PathLike,
     estimator: EstimatorName = "distances",
     trials: int = 100,
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
@@ -387,7 +385,7 @@ def compare(
     from .montecarlo.trials import MOST_TRIALS
 
     ensure_one_of((*OF_DISTANCES, *OF_LENGTHS), estimator=estimator)
-    ensure_one_of(PAIR_SETS, pairs=pairs)
+    ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)
