@@ -20,7 +20,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
 
-from ..uncertainty.quantities import QUANTITIES
+from ..uncertainty.quantities import functions_of
 from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, changes_of
 from .events import event_groups
@@ -75,7 +75,7 @@ def reliability_of(
     """Reliability of a design at zero machine error, where sigma is known or estimated."""
     at = linearise(design)
     given = patterns(design, at.state, None)
-    functions = {symbol: QUANTITIES[symbol].functions(design, at.layout) for symbol in SYMBOLS}
+    functions = {symbol: functions_of(symbol, design, at.layout) for symbol in SYMBOLS}
     changes = {
         symbol: [changes_of(at, group) for group in groups if not isinstance(group, Parameters)]
         for symbol, groups in functions.items()
