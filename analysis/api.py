@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.arguments import (
     ensure_one_of,
+    ensure_path,
     ensure_positive,
     ensure_report,
     ensure_type,
@@ -31,9 +32,7 @@ from .estimators.estimator_choice import (
     ESTIMATORS,
     OF_DISTANCES,
     OF_LENGTHS,
-    PAIR_SETS,
     EstimatorName,
-    PairSet,
     takers,
 )
 from .simulator.experiment.load import load as load_file
@@ -96,7 +95,7 @@ def load_all(path: PathLike) -> tuple[Experiment, ...]:
     >>> [one.name for one in load_all("designs/npl/6.1.1.yaml")]
     ['A', 'B', 'C', 'D']
     """
-    _ensure_path("path", path)
+    ensure_path("path", path)
     return load_file(path)
 
 
@@ -120,7 +119,7 @@ def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experimen
 
     if not isinstance(sections, Mapping):
         raise TypeError(f"sections={sections!r}; give a mapping of what a file would hold")
-    _ensure_path("folder", folder)
+    ensure_path("folder", folder)
     return written_in_python(sections, Path(folder))
 
 
@@ -159,6 +158,8 @@ def check(
 
     ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
     ensure_type(bool, "True or False", suggest=suggest)
+    if not isinstance(goals, Iterable):
+        raise TypeError(f'goals={goals!r}; give texts such as "U6 average 0.3 um"')
     texts = (goals,) if isinstance(goals, str) else tuple(goals)
     for text in texts:
         ensure_type(str, 'texts such as "U6 average 0.3 um"', goals=text)
@@ -188,6 +189,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     from .results import study
     from .simulator.experiment.load import with_pool
 
+    ensure_path("path", path)
     text = read_text(Path(path))
     for one in load_all(path) if variant is None else [load(path, variant)]:
         judged = study.check(one).verdict
@@ -209,8 +211,8 @@ def run(
     workers: int = 1,
     report: Report = unreported,
 ) -> Prediction:
-    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them if `trials`
-    are given.
+    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them if `trials` or
+    `until` is given; `seed` and `workers` go with these only.
 
     At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty
     as accurate as `until`.
@@ -228,6 +230,8 @@ def run(
     ensure_whole(1, workers=workers)
     ensure_positive("a ratio above 0 and at most 1, such as 0.01", 1.0, until=until)
     ensure_report(report)
+    if trials is None and until is None and (seed is not None or workers != 1):
+        raise ValueError("seed and workers go with trials or until only; leave them out")
     chosen = _experiment(experiment)
     predicted = study.predict(chosen, with_scale=True)
     if trials is None and until is None:
@@ -299,7 +303,7 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     estimator: EstimatorName = "full",
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
@@ -313,7 +317,7 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     estimator: EstimatorName = "full",
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
@@ -343,7 +347,7 @@ def fit(
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=estimator)
-    ensure_one_of(PAIR_SETS, pairs=pairs)
+    ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
     ensure_type(bool, "True or False", offsets=offsets)
@@ -365,7 +369,7 @@ def compare(
     experiment: Experiment | PathLike,
     estimator: EstimatorName = "distances",
     trials: int = 100,
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
@@ -381,21 +385,27 @@ def compare(
     >>> compare(quickstart(), trials=2, points=10).failed
     ()
     """
-    from ballplate.simulator.inputs.quantities import parse_length
+    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
 
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
     ensure_one_of((*OF_DISTANCES, *OF_LENGTHS), estimator=estimator)
-    ensure_one_of(PAIR_SETS, pairs=pairs)
+    ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)
     ensure_whole(1, MOST_POINTS, points=points)
-    texts = {"rms": published_rms, "maximum": published_maximum}
+    texts = {"published_rms": published_rms, "published_maximum": published_maximum}
     ensure_type(str, "a length with a unit, such as '0.35 um'", **texts)
     ensure_report(report)
-    published = {key: None if text is None else parse_length(text) for key, text in texts.items()}
+    published: dict[str, float | None] = {}
+    for key, text in texts.items():
+        try:
+            length = None if text is None else parse_length(text)
+        except QuantityError as error:
+            raise ValueError(f"{key}: {error}") from None
+        published[key.removeprefix("published_")] = length
     return compare_estimators(
         _experiment(experiment),
         trials,
@@ -476,13 +486,12 @@ def reliability(
     from .gross_errors.power import LEAST_CHANCE, MOST_CHANCE
 
     ensure_one_of(SIGMAS, sigma=sigma)
-    ensure_positive("a ratio", 1.0, false_alarm=false_alarm, power=power)
+    limits = f"between {LEAST_CHANCE:g} and {MOST_CHANCE:g}"
+    ensure_positive(f"a ratio {limits}", MOST_CHANCE, false_alarm=false_alarm, power=power)
     ensure_report(report)
-    if not LEAST_CHANCE <= false_alarm < power <= MOST_CHANCE:
-        limits = f"{LEAST_CHANCE:g} and {MOST_CHANCE:g}"
+    if not LEAST_CHANCE <= false_alarm < power:
         raise ValueError(
-            f"false_alarm={false_alarm}, power={power}; give ratios between {limits}, the power the"
-            " larger"
+            f"false_alarm={false_alarm}, power={power}; give ratios {limits}, the power the larger"
         )
     return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma, report)
 
@@ -583,7 +592,7 @@ def map(
     from .error_maps.volumetric_errors import MOST_POINTS
     from .error_maps.volumetric_results import machine_errors, parse_places
 
-    _ensure_path("machine", machine)
+    ensure_path("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
     ensure_whole(2, MOST_POINTS, points=points)
     counts = None
@@ -621,7 +630,7 @@ def spline(
     from .error_maps.curve_options import Asked, OptionError, ensure_asked
     from .error_maps.curve_result import error_curve
 
-    _ensure_path("file", file)
+    ensure_path("file", file)
     ensure_type(str, "the name of a column", x=x, y=y)
     ensure_type(str, 'names of points such as "12-32"', points=points)
     ensure_one_of(SIGMAS, sigma=sigma)
@@ -704,7 +713,7 @@ def sweep(
     from .sweeps.local import local_runner
     from .sweeps.running import compute_sweep, enter, result_of, writable_store
 
-    _ensure_path("path", path)
+    ensure_path("path", path)
     ensure_whole(1, workers=workers)
     ensure_type(bool, "True or False", retry_failed=retry_failed, beside=beside)
     ensure_type(bool, "True or False", fail_fast=fail_fast)
@@ -718,11 +727,6 @@ def sweep(
         runner = nullcontext(local_runner(given, bundle, workers))
         summary = compute_sweep(opened, given, entered, runner, retry_failed, fail_fast, report)
         return result_of(opened, given, entered, summary)
-
-
-def _ensure_path(name: str, given: object) -> None:
-    if not isinstance(given, str | os.PathLike):
-        raise TypeError(f"{name}={given!r}; give the path of a file or folder")
 
 
 def _several(name: str, given: Any) -> tuple[int, ...]:

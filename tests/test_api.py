@@ -121,7 +121,7 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
             lambda: bp.reliability(QUICKSTART, sigma="Given"),
             'sigma: "Given" is unknown; did you mean "given"',
         ),
-        (lambda: bp.reliability(QUICKSTART, power=1.0), "power=1.0; give ratios between"),
+        (lambda: bp.reliability(QUICKSTART, power=1.0), "power=1.0; give a ratio between"),
         (
             lambda: bp.reliability(QUICKSTART, false_alarm=0.9),
             "false_alarm=0.9, power=0.8; .* the power the larger",

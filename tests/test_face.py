@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from ballplate.cli import main
+from ballplate.results.fit import Fit
 from ballplate.simulator.computing.steps import ProgressStep
 from matplotlib.colors import to_hex
 
@@ -102,7 +103,7 @@ def test_results_are_those_of_the_commands(
     assert len(repr(found)) < 200 and repr(found).startswith(f"<{type(found).__name__} of ")
     frame = found.to_frame()
     assert len(frame) == len(found.rows()) > 0
-    html = found._repr_html_()
+    html = found.to_html()
     assert html.count("<tr") == len(frame) + 1 and html.count("<table") == html.count("</table>")
 
 
@@ -156,6 +157,10 @@ def test_a_fit_that_is_of_no_use_says_why() -> None:
     found = bp.fit(open_, bp.simulate(open_))
     assert f"rank deficiency {deficiency}" in found.complaint and found.complaint in str(found)
     assert found.complaint in found.to_html() and found.to_dict()["complaint"] == found.complaint
+
+
+def fitted() -> Fit:
+    return bp.fit(QUICKSTART, bp.simulate(QUICKSTART))
 
 
 WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
@@ -218,6 +223,32 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.plan(QUICKSTART, hours="7 h"), TypeError, "hours='7 h'; give hours above 0"),
     (lambda: bp.plan(QUICKSTART, done=3), TypeError, "done=3; give the path of a CSV file"),
     (lambda: bp.sweep(3), TypeError, "path=3; give the path of a file"),
+    (lambda: bp.run(QUICKSTART, seed=5), ValueError, "go with trials or until only"),
+    (lambda: bp.run(QUICKSTART, workers=3), ValueError, "go with trials or until only"),
+    (lambda: bp.check(QUICKSTART, goals=5), TypeError, "goals=5; give texts such as"),
+    (lambda: bp.repair(bp.load(QUICKSTART)), TypeError, "path=<Experiment .*; give the path"),
+    (lambda: bp.run(QUICKSTART).plot(5), TypeError, "path=5; give the path"),
+    (lambda: bp.run(QUICKSTART).to_csv(5), TypeError, "path=5; give the path"),
+    (lambda: bp.compare(QUICKSTART, published_rms=3), TypeError, "published_rms=3; give a length"),
+    (
+        lambda: bp.compare(QUICKSTART, published_maximum="3"),
+        ValueError,
+        'published_maximum: "3" has no unit',
+    ),
+    (
+        lambda: bp.reliability(QUICKSTART, power=0),
+        ValueError,
+        "power=0; give a ratio between 1e-12 and 0.999999",
+    ),
+    (
+        lambda: bp.reliability(QUICKSTART, false_alarm=2),
+        ValueError,
+        "false_alarm=2; give a ratio between 1e-12 and 0.999999",
+    ),
+    (lambda: bp.fit(QUICKSTART, "a.csv", estimator="distances", pairs=3), TypeError, "pairs=3"),
+    (lambda: fitted().correlation(3), TypeError, r"chosen\[0\]=3; give the name of an estimate"),
+    (lambda: fitted().correct([["a", 0.3, 9]], "down"), ValueError, "give numbers in metres, 3"),
+    (lambda: fitted().correct([[0.1, 0.3, 0.2]], 5), TypeError, "probe=5; give the name"),
 ]
 
 
@@ -364,3 +395,27 @@ def test_the_face_loads_nothing_until_it_is_used() -> None:
     code = f"import sys, ballplate; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:
+    found = bp.reliability(QUICKSTART)
+    rows, whole, shown = len(found.rows()), found.to_html(), found._repr_html_()
+    assert rows > 60
+    # One row of headings.
+    assert whole.count("<tr>") == rows + 1 and shown.count("<tr>") == 61
+    assert f"and {rows - 60} more rows" in shown and "more rows" not in whole
+
+
+def test_the_directory_is_the_face() -> None:
+    assert set(dir(bp)) == {*bp.__all__, "__version__"}
+
+
+def test_a_store_in_a_missing_folder_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store, sweep = tmp_path / "new" / "a.sqlite", "designs/sweeps/plate-size.yaml"
+    with pytest.raises(bp.StoreError, match="there is no folder .*new; make it"):
+        bp.sweep(sweep, store)
+    assert main(["sweep", sweep, "--store", str(store)]) == 3
+    assert "there is no folder" in capsys.readouterr().err
+    assert not store.parent.exists()

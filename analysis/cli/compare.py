@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from ..estimators.estimator_choice import OF_DISTANCES, OF_LENGTHS, PAIR_SETS
+from ..estimators.estimator_choice import OF_DISTANCES, OF_LENGTHS
 from .common import add_file, add_json, at_most, count, trial_count, whole
 
 HELP = "compare an alternative estimator with the full one on synthetic data"
@@ -53,10 +53,11 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
     """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
     parser.add_argument(
         "--pairs",
-        choices=PAIR_SETS,
+        metavar="SET",
         help=(
-            "pairs of balls whose distances are used; default: braced for grids (neighbours along"
-            " rows, columns and one diagonal, and all corners), otherwise all"
+            "pairs of balls whose distances are used, a set that the artefacts have, such as corner"
+            " sides, corners, neighbours or all; default: braced for grids (neighbours along rows,"
+            " columns and one diagonal, and all corners), otherwise all"
         ),
     )
     parser.add_argument(

@@ -25,7 +25,7 @@ from ballplate.simulator.estimation.length_equations import (
 )
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.artefacts import pairs
+from ballplate.simulator.geometry.ball_layouts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine

@@ -17,14 +17,12 @@ if TYPE_CHECKING:
 EstimatorName = Literal[
     "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"
 ]
-PairSet = Literal["corner sides", "corner diagonals", "corners", "neighbours", "braced", "all"]
 
 ESTIMATORS: tuple[EstimatorName, ...] = get_args(EstimatorName)
 OF_DISTANCES = ("distances", "cresto", "kruth")
 OF_LENGTHS = ("length-equations", "sphere-then-metric")
 DRAWN = ("full", "reversal")
 """Those that draw their residuals."""
-PAIR_SETS: tuple[PairSet, ...] = get_args(PairSet)
 
 # Which estimators take what; everything else all of them do.
 TAKE: dict[str, tuple[str, ...]] = {
@@ -54,7 +52,7 @@ def fit_readings(
     estimator: EstimatorName = "full",
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
-    pairs: PairSet | None = None,
+    pairs: str | None = None,
     across_probes: bool = False,
     scale: Any = None,
     offsets: bool = True,

@@ -20,7 +20,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
 
-from ..uncertainty.quantities import QUANTITIES
+from ..uncertainty.quantities import QUANTITIES, functions_of
 from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
 from .events import event_groups
@@ -81,7 +81,7 @@ def reliability_of(
     functions = {
         symbol: groups
         for symbol in SYMBOLS
-        for groups in [QUANTITIES[symbol].functions(design, at.layout)]
+        for groups in [functions_of(symbol, design, at.layout)]
         # Of what only some experiments ask for, the others are told nothing.
         if groups or QUANTITIES[symbol].is_recorded
     }

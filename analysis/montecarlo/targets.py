@@ -26,7 +26,7 @@ from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..uncertainty.pairs import pairs_of
-from ..uncertainty.quantities import QUANTITIES
+from ..uncertainty.quantities import QUANTITIES, functions_of
 
 # Distances that are followed through all replicates; a sample of the pairs where there are more.
 MOST_PAIRS = 1000
@@ -69,7 +69,7 @@ def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
     displaced = _displaced(shared, at)
     found: list[MonteCarloQuantity] = []
     for symbol, kind in QUANTITIES.items():
-        for functions in kind.functions(at.design, at.layout) if kind.in_replicates else ():
+        for functions in functions_of(symbol, at.design, at.layout) if kind.in_replicates else ():
             if isinstance(functions, Parameters):
                 is_known = (
                     shared.truth.model == at.design.model

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, compress
 from typing import Protocol
 
 import numpy as np
@@ -24,10 +24,11 @@ from ballplate.simulator.estimation.functions import (
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from ..uncertainty.quantities import QUANTITIES
+from ..uncertainty.quantities import QUANTITIES, functions_of
 from .information import Information
 from .rows import STEP
 
@@ -220,12 +221,13 @@ def _halved(weights: Array, found: Array) -> Array:
 class Linear:
     """Functions with rows (count, z), in metres, of `sizes` (count,): the lengths that they are.
 
-    `excluded` counts others, which the pool leaves open.
+    `excluded` counts others, which the pool leaves open. `targets` are their own, if they have any.
     """
 
     rows: Array
     sizes: Array
     excluded: int = 0
+    targets: tuple[Target | None, ...] = ()
 
     @property
     def count(self) -> int:
@@ -438,7 +440,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
     scaled = np.zeros((0, information.basis.size))
     functions: Several | None = None
     needed: list[tuple[str, tuple[int, ...]]] = []
-    kind = QUANTITIES.get(name.removesuffix(MAXIMUM))
+    symbol = name.removesuffix(MAXIMUM)
+    kind = QUANTITIES.get(symbol)
     if kind is None:
         model = slice(0, len(drawn.design.model.parameters))
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
@@ -448,7 +451,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
         parts: list[Pairs | Linear] = []
-        for given in kind.functions(drawn.design, drawn.layout):
+        for given in functions_of(symbol, drawn.design, drawn.layout):
             assert isinstance(given, Distances)
             if isinstance(given.places, BallPlaces):
                 plate = drawn.design.artefacts.names[
@@ -470,16 +473,27 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
     return Criterion(name, is_about_balls(name), functions, scaled, excluded, target, tuple(needed))
 
 
-def _target(experiment: Experiment, name: str, functions: Functions | None) -> float | None:
-    """The target uncertainty of the functions: its mean for an average, for a largest value only
-    where it is constant.
+def _target(experiment: Experiment, name: CriterionName, functions: Several | None) -> float | None:
+    """The target uncertainty of the functions, their own or that of the file: its mean for an
+    average, for a largest value only where it is constant; None where not all of them have one.
     """
-    target = experiment.target_uncertainty
-    if functions is None or target is None:
+    if functions is None:
+        return None
+    parts = functions.parts
+    own = [one for part in parts if isinstance(part, Linear) for one in part.targets]
+    of_file = QUANTITIES[name.removesuffix(MAXIMUM)].has_target
+    targets = own or ([experiment.target_uncertainty] if of_file else [])
+    stated = [one for one in targets if one is not None]
+    if not stated or len(stated) < len(targets):
         return None
     if name.endswith(MAXIMUM):
-        return target.standard.constant if target.standard.slope == 0 else None
-    return sum(float(target.at(some).sum()) for some in functions.lengths()) / functions.count
+        standards = {one.standard for one in stated}
+        only = next(iter(standards))
+        return only.constant if len(standards) == 1 and only.slope == 0 else None
+    if own:
+        lengths = np.concatenate(list(functions.lengths()))
+        return float(np.mean([one.at(some) for one, some in zip(stated, lengths, strict=True)]))
+    return sum(float(stated[0].at(some).sum()) for some in functions.lengths()) / functions.count
 
 
 def _of_shared(information: Information, rows: Array) -> Array:
@@ -506,7 +520,8 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
         np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement)
     )
     kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP
-    return Linear(rows[kept], length[kept], int((~kept).sum()))
+    targets = tuple(compress(given.targets, kept))
+    return Linear(rows[kept], length[kept], int((~kept).sum()), targets)
 
 
 def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Array]:

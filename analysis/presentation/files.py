@@ -5,12 +5,15 @@ from __future__ import annotations
 import errno
 from pathlib import Path
 
+from ballplate.simulator.inputs.arguments import ensure_path
+
 
 def write_file(path: str | Path, content: bytes) -> None:
     """Write a file as a whole.
 
     :raises OSError: it cannot be written; where its folder is missing the text says so.
     """
+    ensure_path("path", path)
     path = Path(path)
     try:
         path.write_bytes(content)

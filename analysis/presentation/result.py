@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.reading_files import ObservedReadings
     from matplotlib.figure import Figure
 
+# Of a table in a notebook.
+MOST_ROWS_SHOWN = 60
+
 
 class Result:
     """A result with a label and a title. Numbers in data and frames are in metres, radians and
@@ -70,7 +73,7 @@ class Result:
         return self._written(as_latex)
 
     def to_html(self) -> str:
-        """Its main table as elements of a page, as a notebook shows it."""
+        """Its main table as elements of a page; a notebook shows its first 60 rows."""
         return self._written(as_html)
 
     def to_csv(self, path: str | Path | None = None) -> str:
@@ -93,13 +96,14 @@ class Result:
         return f"<{type(self).__name__} of {self.label}: {self.headline()}>"
 
     def _repr_html_(self) -> str:
-        return self.to_html()
+        return self._written(as_html, MOST_ROWS_SHOWN)
 
-    def _written(self, form: Callable[[str, Sequence[Table]], str]) -> str:
-        """Title and main table in a form, with four digits; without any row, the result in a few
-        words.
+    def _written(self, form: Callable[[str, Sequence[Table]], str], most: int | None = None) -> str:
+        """Title and main table in a form, with four digits, `most` rows of it and how many more
+        there are; without any row, the result in a few words.
         """
-        rows, title = self.rows(), f"{self.label}: {self.title}"
+        every, title = self.rows(), f"{self.label}: {self.title}"
+        rows = every[:most]
         if not rows:
             return form("; ".join([f"{title}: {self.headline()}", *self.notes]), [])
         names = list(rows[0])
@@ -110,7 +114,10 @@ class Result:
             "", tuple(Row(row[:left], tuple(Entry(text) for text in row[left:])) for row in texts)
         )
         heads = tuple(names[:left]), tuple(names[left:])
-        return form(title, [Table("", self.headline(), *heads, (block,), notes=self.notes)])
+        left_out = len(every) - len(rows)
+        more = (f"and {left_out} more rows, which to_frame() has",) if left_out else ()
+        notes = (*more, *self.notes)
+        return form(title, [Table("", self.headline(), *heads, (block,), notes=notes)])
 
 
 class FitResult(Result):

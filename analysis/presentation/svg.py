@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.inputs.arguments import ensure_path
 
 from .files import write_file
 
@@ -217,6 +218,7 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
     figure.set_label(words)
     if path is None:
         return figure
+    ensure_path("path", path)
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in PICTURES:

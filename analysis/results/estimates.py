@@ -19,6 +19,7 @@ from ballplate.simulator.geometry.motions import (
     pose_parameter_names,
     vector_from_rotation,
 )
+from ballplate.simulator.inputs.arguments import ensure_type
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
@@ -102,7 +103,10 @@ class EstimatedFunctions:
         """
         found: dict[int, None] = {}
         names = self.labels
-        for words in asked:
+        for k, words in enumerate(asked):
+            ensure_type(
+                str, "the name of an estimate, or a kind of them", **{f"chosen[{k}]": words}
+            )
             chosen = [i for i, one in enumerate(self.functions) if one.kind in KINDS.get(words, ())]
             if words not in KINDS:
                 told = [(one.name, f"{one.kind}: {one.name}") for one in self.functions]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,8 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.arguments import ensure_type
+from ballplate.simulator.inputs.settings import hint, shorten
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
 
@@ -267,7 +268,12 @@ class Fit(FitResult):
         >>> fit.correct([[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], "down").covariance.shape
         (6, 6)
         """
-        design, given = self.design, np.asarray(points, float)
+        design = self.design
+        try:
+            given = np.asarray(points, float)
+        except (TypeError, ValueError):
+            words = f"numbers in metres, {design.dimension} for each point"
+            raise ValueError(f"points={shorten(repr(points))}; give {words}") from None
         if given.ndim != 2 or given.shape[1] != design.dimension:
             raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
         for i, axis in np.argwhere(far_outside(given, design)).tolist():
@@ -278,6 +284,7 @@ class Fit(FitResult):
             raise ValueError(f"{told}; give points in metres")
         names = design.probes.names
         given_probe = names[design.evaluation.probe] if probe is None else probe
+        ensure_type(Iterable, "the name of a probe, or one for each point", probe=given_probe)
         asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
         for name in asked:
             if name not in names:

@@ -200,6 +200,9 @@ def check_place(path: Path, create: bool) -> None:
                 f"{path}: is a link to a file that is not there; name a file"
             ) from None
         start = b""
+        if create and not path.parent.is_dir():
+            words = f"there is no folder {path.parent}; make it, or name another"
+            raise StoreError(f"{path}: {words}") from None
         if not create:
             words = "there is no such store; make it with ballplate sweep"
             raise StoreError(f"{path}: {words}") from None

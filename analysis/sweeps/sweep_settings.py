@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ballplate.simulator.experiment.sections import Line, Seed
-from ballplate.simulator.geometry.artefacts import Name
+from ballplate.simulator.geometry.ball_layouts import Name
 from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings
 from pydantic import Field
 

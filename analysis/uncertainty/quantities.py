@@ -21,6 +21,7 @@ from ballplate.simulator.estimation.functions import (
     MeasuredPoints,
     Parameters,
 )
+from ballplate.simulator.inputs.settings import shorten
 from ballplate.simulator.machines.protocol import Unit
 
 
@@ -37,6 +38,8 @@ class QuantityKind:
     not. `has_target` states whether it is compared with the target uncertainty of the file,
     `in_replicates` whether Monte Carlo follows it, and `is_recorded` whether a sweep records it
     by default. `needs` is what a design without it lacks.
+
+    :raises ValueError: it is between balls, or has a target, and is not about distances.
     """
 
     description: str
@@ -50,6 +53,44 @@ class QuantityKind:
     in_replicates: bool = True
     is_recorded: bool = True
     needs: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.are_lengths and (self.about_balls or self.has_target):
+            raise ValueError(
+                f'"{self.description}" has about_balls or has_target, which go with are_lengths;'
+                " add that, or remove them"
+            )
+
+
+def functions_of(symbol: str, design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
+    """The functions of a quantity, none in a design without it.
+
+    :raises ValueError: its entry contradicts itself.
+    """
+    kind = QUANTITIES[symbol]
+    try:
+        found = kind.functions(design, layout)
+    except ValueError as error:
+        raise ValueError(f"quantity {symbol}: {error}") from error
+    wrong = _wrong_with(kind, found)
+    if wrong:
+        raise ValueError(f"quantity {symbol}: {wrong}")
+    return found
+
+
+def _wrong_with(kind: QuantityKind, found: object) -> str:
+    """What contradicts the kind in what its function made, in words."""
+    if not isinstance(found, tuple) or not all(isinstance(one, Functions) for one in found):
+        return f"give a tuple of Parameters, Coordinates or Distances, not {shorten(repr(found))}"
+    are = {type(one) for one in found}
+    if kind.are_lengths and are - {Distances}:
+        return "are_lengths goes with Distances only; remove it"
+    if kind.effect and Parameters in are:
+        return "effect goes with Distances and Coordinates only; remove it"
+    # What has names is shown one by one, so that a second group would be left out.
+    if len(found) > 1 and not all(isinstance(one, Distances) and not one.names for one in found):
+        return "only Distances without names can be in several groups; put all into one"
+    return ""
 
 
 def evaluation_points(design: Design) -> MeasuredPoints:
@@ -169,6 +210,8 @@ QUANTITIES: dict[str, QuantityKind] = {
 # What all quantities, and the parts of those that have several units, are the uncertainties of.
 DESCRIPTIONS: dict[str, str] = {}
 for _symbol, _kind in QUANTITIES.items():
+    if _symbol.partition(" ")[0] not in QUANTITIES:
+        raise ValueError(f'"{_symbol}" is no symbol of a quantity; write it without spaces')
     DESCRIPTIONS[_symbol] = _kind.description
     DESCRIPTIONS |= {f"{_symbol} {word}": description for word, description in _kind.parts.values()}
 

@@ -25,7 +25,7 @@ from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.machines.protocol import Array
 
 from .pairs import PairSummary, PairTile, all_pairs, pairs_of
-from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points
+from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points, functions_of
 from .tasks import TaskUncertainty, task_uncertainties
 
 
@@ -86,7 +86,9 @@ def uncertainties(
 
     for symbol, kind in QUANTITIES.items():
         functions = (
-            kind.functions(at.design, at.layout) if symbols is None or symbol in symbols else ()
+            functions_of(symbol, at.design, at.layout)
+            if symbols is None or symbol in symbols
+            else ()
         )
         if not functions:
             continue

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import ballplate
 import numpy as np
-from ballplate.simulator.geometry.artefacts import BallLayout, GridSettings
+from ballplate.simulator.geometry.artefacts import GridSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.positions import (
     IN_PLANE_AXES,
     PlanePlacement,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.artefacts import ArtefactSettings, BallLayout, corners, frozen
+from ..geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
 from ..inputs.messages import Step, Steps
 from ..inputs.problems import Problems, written_text
 from ..inputs.settings import hint, listing, shorten

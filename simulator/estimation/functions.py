@@ -27,11 +27,23 @@ PLACES_AT_ONCE = 1000
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """Linear functions `rows` (m, s) of the shared parameters, each with its name and its unit."""
+    """Linear functions `rows` (m, s) of the shared parameters, each with its name and its unit.
+
+    :raises ValueError: not each has a name and a unit.
+    """
 
     rows: Array
     names: tuple[str, ...]
     units: tuple[Unit, ...]
+
+    def __post_init__(self) -> None:
+        counts = len(self.rows), len(self.names), len(self.units)
+        if len(set(counts)) > 1:
+            raise ValueError(
+                "Parameters has {} rows, {} names and {} units; give as many of each".format(
+                    *counts
+                )
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +67,20 @@ class BallPlaces:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoints:
-    """Corrected points for scale readings `points` (n, d) with probes of indices `probes` (n,)."""
+    """Corrected points for scale readings `points` (n, d) with probes of indices `probes` (n,).
+
+    :raises ValueError: not each has a probe.
+    """
 
     points: Array
     probes: Integers
+
+    def __post_init__(self) -> None:
+        if np.shape(self.probes) != (len(self.points),):
+            raise ValueError(
+                f"MeasuredPoints has {len(self.points)} points and probes of shape"
+                f" {np.shape(self.probes)}; give a probe for each point"
+            )
 
     @property
     def labels(self) -> Integers:
@@ -91,12 +113,29 @@ class Distances:
 
     `targets` are the uncertainties that each of these is to have, None where nothing is to be
     reached.
+
+    :raises ValueError: not each pair has a name, or a target where there are some; or a pair is not
+        of two of the places.
     """
 
     places: Places
     pairs: Integers | None = None
     names: tuple[str, ...] = ()
     targets: tuple[Target | None, ...] = ()
+
+    def __post_init__(self) -> None:
+        count = 0 if self.pairs is None else len(self.pairs)
+        if len(self.names) != count or len(self.targets) not in (0, count):
+            raise ValueError(
+                f"Distances has {count} pairs, {len(self.names)} names and {len(self.targets)}"
+                " targets; give a name for each pair, and a target for each or none"
+            )
+        if self.pairs is None:
+            return
+        most = len(self.places.labels) - 1
+        is_right = np.shape(self.pairs) == (count, 2)
+        if not is_right or (count and not 0 <= self.pairs.min() <= self.pairs.max() <= most):
+            raise ValueError(f"Distances has pairs that are not (m, 2) of places 0 to {most}")
 
 
 Functions = Parameters | Coordinates | Distances

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..design.lookup import Floats, References
 from ..design.objects import Machine, Volume
-from ..geometry.artefacts import frozen
+from ..geometry.ball_layouts import frozen
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems
 from ..inputs.quantities import LengthFunction, Target, format_length, typed_length

@@ -15,7 +15,7 @@ import numpy as np
 from ..design.lookup import Floats, Indices
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
-from ..geometry.artefacts import ArtefactSettings, BallLayout
+from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
 from ..inputs.quantities import Target

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from ..design.lookup import References, lengths_per_axis
-from ..geometry.artefacts import BallLayout
+from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
     IN_PLANE_AXES,
     Axis,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..design.lookup import Floats, Indices, References, lengths_per_axis
 from ..design.objects import Volume
-from ..geometry.artefacts import BallLayout
+from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,

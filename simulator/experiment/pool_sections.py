@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from ..design.observations.coordinates import CalibratedBalls
 from ..design.observations.kinds import CALIBRATIONS
-from ..geometry.artefacts import BallNames, Name
+from ..geometry.ball_layouts import BallNames, Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Duration, Length
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text

@@ -17,7 +17,7 @@ from ..design.lookup import Floats, ReadingCount, References
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
-from ..geometry.artefacts import frozen
+from ..geometry.ball_layouts import frozen
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
 from ..inputs.messages import Steps, format_path
 from ..inputs.problems import written_count, written_text

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..geometry.artefacts import BallNames, Coordinates, Name
+from ..geometry.ball_layouts import BallNames, Coordinates, Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Angle, Length, PositiveLength
 from ..inputs.settings import Forms, NonEmpty, Settings

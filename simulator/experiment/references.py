@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from ..design.lookup import Floats, References, lengths_per_axis
-from ..geometry.artefacts import (
+from ..geometry.artefacts import BallsSettings, BryanGaugeSettings
+from ..geometry.ball_layouts import (
     MOST_BALLS,
     ArtefactSettings,
     BallLayout,
-    BallsSettings,
-    BryanGaugeSettings,
+    LayoutError,
     coincident_balls,
     frozen,
 )
@@ -49,7 +49,11 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
         listed = _with_coordinates(settings, folder, steps, problems)
         if listed is None:
             continue
-        layout = listed.layout()
+        try:
+            layout = listed.layout()
+        except LayoutError as error:
+            problems.add(steps, f'kind "{settings.kind}" has a wrong layout: {error}')
+            continue
         balls += len(layout.names)
         if balls > MOST_BALLS_OF_ALL:
             text = (

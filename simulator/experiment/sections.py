@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StringConstraints
 
 from ..design.observations.kinds import CalibrationSettings
-from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name
+from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
+from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.quantities import Length, LengthFunction
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from ..machines.settings import ErrorModelSettings
@@ -164,7 +165,7 @@ class ExperimentSettings(Settings):
         ),
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
-        description="name → artefact: grid, square, balls, two_spheres, sphere or bryan_gauge"
+        description=f"name → artefact: {', '.join(ARTEFACTS)}"
     )
     positions: NonEmpty[PositionSettings] = Field(
         description="where the artefacts are put and what is read there"

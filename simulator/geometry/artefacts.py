@@ -1,150 +1,29 @@
 """Artefacts: their keys in an experiment file, and the places of their balls in their own
 frames.
 
-A further kind of artefact is one settings class with a ``layout`` and one line in ``ARTEFACTS``.
+A further kind of artefact is one file with a subclass of `ArtefactSettings` that has a ``layout``,
+and one line in ``ARTEFACTS``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
+from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..inputs.quantities import Length, PositiveLength
-from ..inputs.settings import NonEmpty, Settings, listing
+from ..inputs.quantities import PositiveLength
+from .ball_layouts import (
+    MOST_BALLS,
+    ArtefactSettings,
+    BallLayout,
+    BallsPerSide,
+    Coordinates,
+    Name,
+    Pairs,
+    frozen,
+)
 from .directions import DIRECTIONS, DirectionsSettings, directions
-
-MOST_BALLS = 40_000
-COINCIDENT = 1e-9
-
-PairSet = Literal["corner sides", "corner diagonals", "corners", "neighbours", "braced", "all"]
-Pairs = tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class BallLayout:
-    """The balls of an artefact in its own frame.
-
-    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name of
-    a set → pairs of ball indices, without "all". ``corner_set``: indices of the corner balls, empty
-    where undefined.
-    """
-
-    names: tuple[str, ...]
-    coordinates: NDArray[np.float64]
-    pair_sets: Mapping[str, Pairs] = field(default_factory=dict)
-    corner_set: tuple[int, ...] = ()
-
-
-def pairs(layout: BallLayout, set_name: str) -> NDArray[np.intp]:
-    """Return the ball indices of a named pair set, (m, 2).
-
-    :raises ValueError: the set is not defined for this artefact; the message names those that are.
-    """
-    if set_name == "all":
-        return np.column_stack(np.triu_indices(len(layout.names), k=1))
-    if set_name not in layout.pair_sets:
-        defined = listing([*layout.pair_sets, "all"])
-        raise ValueError(
-            f'"{set_name}" is not defined for this artefact; choose from: {defined}, or list pairs'
-            " of balls"
-        )
-    return np.array(layout.pair_sets[set_name], dtype=np.intp).reshape(-1, 2)
-
-
-def corners(layout: BallLayout) -> NDArray[np.intp]:
-    """Return the indices of the corner balls, (k,).
-
-    :raises ValueError: the artefact has no corners.
-    """
-    if not layout.corner_set:
-        raise ValueError('"corners" is not defined for this artefact; write all, or list the balls')
-    return np.array(layout.corner_set, dtype=np.intp)
-
-
-def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, int]]:
-    """Return pairs of balls nearer than a nanometre to each other, not many more than asked for."""
-    found: list[tuple[int, int]] = []
-    # Along a line askew to all that balls are usually in rows along, only coinciding balls are as
-    # far as one another.
-    along = layout.coordinates @ (0.6139, 0.5243, 0.5901)
-    order = np.argsort(along, kind="stable")
-    along = along[order]
-    for shift in range(1, len(order)):
-        near = np.flatnonzero(along[shift:] - along[:-shift] < COINCIDENT)
-        if not len(near) or len(found) >= at_most:
-            break
-        first, second = order[near], order[near + shift]
-        differences = layout.coordinates[second] - layout.coordinates[first]
-        near = np.flatnonzero(np.linalg.norm(differences, axis=1) < COINCIDENT)
-        found += [
-            (int(min(pair)), int(max(pair))) for pair in zip(first[near], second[near], strict=True)
-        ]
-    return sorted(found)
-
-
-def _text_of_whole_number(value: object) -> object:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-# Numbers are usual as names of balls, and YAML reads them as numbers.
-Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
-BallNames = NonEmpty[Name]
-Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
-BallsPerSide = Annotated[int, Field(ge=2, le=500)]
-
-
-class AxesSettings(Settings):
-    """The axes in which a plate's co-ordinates are reported: the ball at the origin, and one on the
-    x or the y axis.
-    """
-
-    origin: Name = Field(description="the ball at the origin")
-    x: Name | None = Field(
-        None, description="the ball on the x axis, on the half where it nominally is; this or y"
-    )
-    y: Name | None = Field(
-        None, description="the ball on the y axis, on the half where it nominally is; this or x"
-    )
-
-    @model_validator(mode="after")
-    def _two_balls(self) -> Self:
-        if (self.x is None) == (self.y is None):
-            raise ValueError(
-                'needs either "x" or "y", the ball that lies on that axis; give exactly one of them'
-            )
-        if self.origin in (self.x, self.y):
-            raise ValueError(
-                f'ball "{self.origin}" cannot be the origin and fix an axis too; name another one'
-            )
-        return self
-
-
-class ArtefactSettings(Settings):
-    """What artefacts of every kind have."""
-
-    kind: str
-    role: Literal["plate", "length_standard"] = Field(
-        "plate",
-        description=(
-            "plate: its ball co-ordinates are estimated; length_standard: it only carries distances"
-        ),
-    )
-    axes: AxesSettings | None = Field(
-        None,
-        description=(
-            "axes in which a two-dimensional fit reports the co-ordinates of the balls; default:"
-            " from the first ball through the farthest one that nominally lies on its x axis"
-        ),
-    )
-
-    def layout(self) -> BallLayout:
-        """Return the balls of the artefact in its own frame."""
-        raise NotImplementedError
 
 
 class GridSettings(ArtefactSettings):
@@ -367,10 +246,3 @@ def _rectangle(
         sets,
         (lower_left, lower_right, upper_left, upper_right),
     )
-
-
-def frozen(values: Any) -> NDArray[np.float64]:
-    """Return values as an array that cannot be changed."""
-    array = np.array(values, dtype=float)
-    array.setflags(write=False)
-    return array

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .artefacts import AxesSettings, BallLayout
+from .ball_layouts import AxesSettings, BallLayout
 
 # A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to
 # be on it.

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .artefacts import BallLayout
+from .ball_layouts import BallLayout
 from .rotations import rotation_matrix
 
 Axis = Literal["x", "y", "z"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -73,6 +74,15 @@ def ensure_type(kind: type, what: str, **given: object) -> None:
     for name, value in given.items():
         if value is not None and not isinstance(value, kind):
             raise TypeError(f"{name}={value!r}; give {what}")
+
+
+def ensure_path(name: str, given: object) -> None:
+    """Refuse what is no path.
+
+    :raises TypeError: no text and no path.
+    """
+    if not isinstance(given, str | os.PathLike):
+        raise TypeError(f"{name}={given!r}; give the path of a file or folder")
 
 
 def ensure_report(report: object) -> None:

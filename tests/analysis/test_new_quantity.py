@@ -1,5 +1,5 @@
-"""A quantity added as one entry in one file, U7, the body diagonals of the volume: every command
-then has it.
+"""A quantity added as one entry in one file, U7, the body diagonals of the volume as the
+documentation has them: every command then has it.
 """
 
 from __future__ import annotations
@@ -21,23 +21,11 @@ from tests.reference import dense
 
 TOP = Path(__file__).parents[2]
 
-ENTRY = """\
-    "U7": QuantityKind(
-        "lengths of the body diagonals",
-        lambda design, layout: (
-            Distances(
-                MeasuredPoints(
-                    np.stack(np.meshgrid(*zip(*design.machine.volume.corners)), axis=-1).reshape(-1, design.dimension),
-                    np.full(2**design.dimension, design.evaluation.probe),
-                ),
-                np.array([(i, 2**design.dimension - 1 - i) for i in range(2 ** (design.dimension - 1))]),
-                tuple(f"diagonal {i + 1}" for i in range(2 ** (design.dimension - 1))),
-            ),
-        ),
-        are_lengths=True,
-        effect="body diagonals",
-    ),
-"""
+PAGE = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
+FUNCTION, ENTRY = (
+    part.split("```\n")[0] for part in PAGE.partition("**A quantity**")[2].split("```python\n")[1:3]
+)
+START = "QUANTITIES: dict"
 END = "}\n\n\n# What all quantities"
 
 SWEEP = """\
@@ -126,8 +114,9 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict
     folder = tmp_path_factory.mktemp("package")
     file = package(folder)
     text = file.read_text(encoding="utf-8")
-    assert text.count(END) == 1
-    file.write_text(text.replace(END, ENTRY + END), encoding="utf-8")
+    assert text.count(END) == text.count(START) == 1
+    with_function = text.replace(START, f"{FUNCTION}\n\n{START}")
+    file.write_text(with_function.replace(END, ENTRY + END), encoding="utf-8")
     added = told(folder)
     file.write_text(text, encoding="utf-8")
     return added, told(folder)
@@ -175,6 +164,8 @@ def test_a_plan_makes_it_small(both: tuple[dict[str, Any], dict[str, Any]]) -> N
         # What a selection is worth is what `run` makes of the design.
         assert plan["value"] == pytest.approx(plan["plan"]["quantities"]["U7"][statistic], rel=1e-6)
         assert plan["bound"] <= plan["value"] <= plan["drawn"]
+        # The file's target is none of its own.
+        assert plan["target"] is None
     assert "U7, U7-maximum" in " ".join(both[0]["help"].split())
 
 

@@ -90,7 +90,8 @@ def test_every_form_has_every_row(results: list[Result]) -> None:
     for result in results:
         rows = result.rows()
         page = Cells(result.to_html())
-        assert not page.open and result._repr_html_() == result.to_html()
+        shown = Cells(result._repr_html_())
+        assert not page.open and not shown.open and shown.rows == page.rows[:61]
         assert_shows(page.rows, rows)
         assert_shows(from_markdown(result.to_markdown()), rows)
         latex = result.to_latex()

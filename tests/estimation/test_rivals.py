@@ -14,7 +14,7 @@ from ballplate.simulator.estimation.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
 )
-from ballplate.simulator.geometry.artefacts import pairs
+from ballplate.simulator.geometry.ball_layouts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings

@@ -15,7 +15,7 @@ from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import SMALL, eliminate
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.geometry.artefacts import BallLayout, coincident_balls
+from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_balls
 from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError
 from ballplate.simulator.inputs.yamltree import parse_tree, read_text
 from ballplate.simulator.readings.generate import true_artefacts

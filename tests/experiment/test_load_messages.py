@@ -262,10 +262,13 @@ POSITIONS = [
         "15:45: calibration[1].pairs: no position reads ball 2; read them, or leave them out"]),
 ]  # fmt: skip
 CALIBRATION = [
-    (SIDES, "pairs: corner, standard_uncertainty: 0 um", [
-        '14:47: calibration[0].pairs: unknown value "corner"; did you mean "corners"? '
-        "allowed: corner sides, corner diagonals, corners, neighbours, braced, all",
-        '14:77: calibration[0].standard_uncertainty: "0 um" must be above zero; give a small one, '
+    (SIDES, "pairs: corner, standard_uncertainty: 0.2 um", [
+        '14:47: calibration[0].pairs: "corner" is not defined for this artefact; did you mean '
+        '"corners"? choose from: corner sides, corner diagonals, corners, neighbours, braced, all, '
+        "or list pairs of balls",
+    ]),
+    (SIDES, "pairs: corners, standard_uncertainty: 0 um", [
+        '14:78: calibration[0].standard_uncertainty: "0 um" must be above zero; give a small one, '
         'such as 1 nm',
     ]),
     (SIDES, SIDES.replace("corner sides", "[[r1c1, r1c9], [r1c1, r1c1], [r1c1, r1c2], [r1c2, r1c1]]"), [

@@ -2,14 +2,8 @@
 
 import numpy as np
 import pytest
-from ballplate.simulator.geometry.artefacts import (
-    ARTEFACTS,
-    AnyArtefactSettings,
-    BallLayout,
-    coincident_balls,
-    corners,
-    pairs,
-)
+from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_balls, corners, pairs
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from ballplate.simulator.geometry.artefacts import BallLayout, GridSettings
+from ballplate.simulator.geometry.artefacts import GridSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,

@@ -241,6 +241,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     for part in ("simulator", "designs"):
         shutil.copytree(TOP / part, package / part, ignore=ignored)
     page = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
+    page = page.partition("**A kind of observation**")[2]
     file, entry = (part.split("```\n")[0] for part in page.split("```python\n")[1:3])
     rooms = package / "simulator" / "design" / "observations"
     (rooms / "flatness.py").write_text(file, encoding="utf-8")

@@ -12,12 +12,8 @@ from ballplate.simulator.design.lookup import Indices
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.design.observations.radius import RadiusCalibration
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.artefacts import (
-    BallLayout,
-    BryanGaugeSettings,
-    TwoSpheresSettings,
-    pairs,
-)
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout, pairs
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length
 
 from .changes import (

@@ -15,7 +15,7 @@ from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
-from ballplate.simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
+from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, pairs
 from ballplate.simulator.geometry.positions import Pose, ball_coordinates
 from ballplate.simulator.machines.protocol import Array
 

@@ -11,9 +11,7 @@ from ballplate.simulator.experiment.model import (
     Experiment,
     Position,
 )
-from ballplate.simulator.geometry.artefacts import (
-    TwoSpheresSettings,
-)
+from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
 from ballplate.simulator.geometry.positions import AXIS_INDEX, QUARTER_TURNS
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.machines.protocol import Array

@@ -8,9 +8,7 @@ import numpy as np
 from ballplate.simulator.experiment.model import (
     Experiment,
 )
-from ballplate.simulator.geometry.artefacts import (
-    BallLayout,
-)
+from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.machines.protocol import Array
 
 from ...rank.proposed_bars import bar_directions

@@ -13,9 +13,7 @@ from ballplate.simulator.experiment.model import (
     Position,
     ReadingGroup,
 )
-from ballplate.simulator.geometry.artefacts import (
-    TwoSpheresSettings,
-)
+from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
 from ballplate.simulator.geometry.positions import AXIS_INDEX, Axis, Pose, plane_rotation
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.machines.protocol import Array

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, cast
 
-from ...geometry.artefacts import BallLayout
+from ...geometry.ball_layouts import BallLayout
 from ...machines.protocol import Array, Unit
 from .balls import BallObservations
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...geometry.artefacts import BallLayout, BallNames, Name, frozen
+from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
 from ...inputs.messages import ExperimentError, Steps
 from ...inputs.quantities import PositiveLength

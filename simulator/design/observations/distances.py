@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...geometry.artefacts import COINCIDENT, BallLayout, Name, PairSet, frozen, pairs
+from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
 from ...inputs.messages import ExperimentError, Steps
 from ...inputs.quantities import LengthFunction, PositiveLength
 from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
@@ -108,7 +108,7 @@ class DistanceCalibration(Calibration):
 
 
 ListedPairs = NonEmpty[tuple[Name, Name]]
-PairSelection = Forms[PairSet, ListedPairs, ListedPairs]
+PairSelection = Forms[Text, ListedPairs, ListedPairs]
 
 
 class CertifiedDistance(Settings):
@@ -130,8 +130,8 @@ class DistancesSettings(Settings):
     )
     pairs: PairSelection = Field(
         description=(
-            "corner sides, corner diagonals, corners (both), neighbours, all, or a list of pairs of"
-            " balls"
+            "a set that the artefact has, such as corner sides, corner diagonals, corners (both),"
+            " neighbours, braced or all, or a list of pairs of balls"
         )
     )
     dimensions: Literal[2, 3] | None = Field(

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from ...geometry.artefacts import BallLayout, BryanGaugeSettings, Name
+from ...geometry.artefacts import BryanGaugeSettings
+from ...geometry.ball_layouts import BallLayout, Name
 from ...inputs.messages import Steps
 from ...inputs.quantities import PositiveLength
 from ...inputs.settings import Settings

@@ -1,0 +1,187 @@
+"""Balls of an artefact in its own frame, and what settings of artefacts of every kind have.
+
+Kinds of artefacts are built on this, each in a file of its own or in `artefacts`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, StringConstraints, model_validator
+
+from ..inputs.quantities import Length
+from ..inputs.settings import NonEmpty, Settings, listing, nearest, shorten
+
+MOST_BALLS = 40_000
+COINCIDENT = 1e-9
+
+Pairs = tuple[tuple[int, int], ...]
+
+
+class LayoutError(ValueError):
+    """A layout that contradicts itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class BallLayout:
+    """The balls of an artefact in its own frame.
+
+    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name of
+    a set → pairs of ball indices, without "all". ``corner_set``: indices of the corner balls, empty
+    where undefined.
+
+    :raises LayoutError: there are no balls, names are not one for each place or not unique, places
+        are no finite co-ordinates (n, 3), or a set is called "all" or names balls that there are
+        not.
+    """
+
+    names: tuple[str, ...]
+    coordinates: NDArray[np.float64]
+    pair_sets: Mapping[str, Pairs] = field(default_factory=dict)
+    corner_set: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        n, shape = len(self.names), np.shape(self.coordinates)
+        if n == 0 or shape != (n, 3) or not isinstance(self.coordinates, np.ndarray):
+            raise LayoutError(
+                f"{n} names for coordinates of shape {shape}; give n names, at least one, and an"
+                " array (n, 3) in metres, z too, as frozen makes it"
+            )
+        twice = [name for name, count in Counter(self.names).items() if count > 1]
+        if twice:
+            raise LayoutError(f"several balls are named {listing(twice)}; give each its own name")
+        if not np.isfinite(self.coordinates).all():
+            raise LayoutError("coordinates are not finite; give places in metres")
+        if "all" in self.pair_sets:
+            raise LayoutError('"all" always is the set of all pairs; leave it out of pair_sets')
+        for name, chosen in {**self.pair_sets, "corner_set": self.corner_set}.items():
+            index, tail = np.array(chosen), () if name == "corner_set" else (2,)
+            if index.size and (
+                index.shape[1:] != tail
+                or index.dtype.kind != "i"
+                or not 0 <= index.min() <= index.max() < n
+                or (tail and (index[:, 0] == index[:, 1]).any())
+            ):
+                what = "pairs of two different indices" if tail else "indices"
+                raise LayoutError(f"{name} has others than balls 0 to {n - 1}; give {what}")
+
+
+def pairs(layout: BallLayout, set_name: str) -> NDArray[np.intp]:
+    """Return the ball indices of a named pair set, (m, 2).
+
+    :raises ValueError: the set is not defined for this artefact; the message names those that are.
+    """
+    if set_name == "all":
+        return np.column_stack(np.triu_indices(len(layout.names), k=1))
+    if set_name not in layout.pair_sets:
+        defined = [*layout.pair_sets, "all"]
+        meant = nearest(set_name, defined)
+        raise ValueError(
+            f'"{shorten(set_name)}" is not defined for this artefact; '
+            + (f'did you mean "{meant}"? ' if meant else "")
+            + f"choose from: {listing(defined)}, or list pairs of balls"
+        )
+    return np.array(layout.pair_sets[set_name], dtype=np.intp).reshape(-1, 2)
+
+
+def corners(layout: BallLayout) -> NDArray[np.intp]:
+    """Return the indices of the corner balls, (k,).
+
+    :raises ValueError: the artefact has no corners.
+    """
+    if not layout.corner_set:
+        raise ValueError('"corners" is not defined for this artefact; write all, or list the balls')
+    return np.array(layout.corner_set, dtype=np.intp)
+
+
+def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, int]]:
+    """Return pairs of balls nearer than a nanometre to each other, not many more than asked for."""
+    found: list[tuple[int, int]] = []
+    # Along a line askew to all that balls are usually in rows along, only coinciding balls are as
+    # far as one another.
+    along = layout.coordinates @ (0.6139, 0.5243, 0.5901)
+    order = np.argsort(along, kind="stable")
+    along = along[order]
+    for shift in range(1, len(order)):
+        near = np.flatnonzero(along[shift:] - along[:-shift] < COINCIDENT)
+        if not len(near) or len(found) >= at_most:
+            break
+        first, second = order[near], order[near + shift]
+        differences = layout.coordinates[second] - layout.coordinates[first]
+        near = np.flatnonzero(np.linalg.norm(differences, axis=1) < COINCIDENT)
+        found += [
+            (int(min(pair)), int(max(pair))) for pair in zip(first[near], second[near], strict=True)
+        ]
+    return sorted(found)
+
+
+def _text_of_whole_number(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+# Numbers are usual as names of balls, and YAML reads them as numbers.
+Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
+BallNames = NonEmpty[Name]
+Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
+BallsPerSide = Annotated[int, Field(ge=2, le=500)]
+
+
+class AxesSettings(Settings):
+    """The axes in which a plate's co-ordinates are reported: the ball at the origin, and one on the
+    x or the y axis.
+    """
+
+    origin: Name = Field(description="the ball at the origin")
+    x: Name | None = Field(
+        None, description="the ball on the x axis, on the half where it nominally is; this or y"
+    )
+    y: Name | None = Field(
+        None, description="the ball on the y axis, on the half where it nominally is; this or x"
+    )
+
+    @model_validator(mode="after")
+    def _two_balls(self) -> Self:
+        if (self.x is None) == (self.y is None):
+            raise ValueError(
+                'needs either "x" or "y", the ball that lies on that axis; give exactly one of them'
+            )
+        if self.origin in (self.x, self.y):
+            raise ValueError(
+                f'ball "{self.origin}" cannot be the origin and fix an axis too; name another one'
+            )
+        return self
+
+
+class ArtefactSettings(Settings):
+    """What artefacts of every kind have."""
+
+    kind: str
+    role: Literal["plate", "length_standard"] = Field(
+        "plate",
+        description=(
+            "plate: its ball co-ordinates are estimated; length_standard: it only carries distances"
+        ),
+    )
+    axes: AxesSettings | None = Field(
+        None,
+        description=(
+            "axes in which a two-dimensional fit reports the co-ordinates of the balls; default:"
+            " from the first ball through the farthest one that nominally lies on its x axis"
+        ),
+    )
+
+    def layout(self) -> BallLayout:
+        """Return the balls of the artefact in its own frame."""
+        raise NotImplementedError
+
+
+def frozen(values: Any) -> NDArray[np.float64]:
+    """Return values as an array that cannot be changed."""
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array

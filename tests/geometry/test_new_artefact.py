@@ -1,0 +1,218 @@
+"""An artefact added as one file and one line, a ring of balls as the documentation has it: every
+command then knows it, and the pairs of balls that it names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from ballplate import experiment
+from ballplate.simulator.experiment.layout import lay_out
+from scipy.optimize import least_squares
+
+from tests.reference import dense
+
+TOP = Path(__file__).parents[2]
+
+BALLS, DIAMETER = 8, 0.3
+DIAMETERS = [[f"b{i}", f"b{i + 4}"] for i in range(1, 5)]
+
+SCRIPT = """
+import contextlib, io, json, sys
+from pathlib import Path
+
+import ballplate as bp
+from ballplate.cli import main
+from ballplate.simulator.inputs.messages import ExperimentError
+
+def said(*arguments):
+    stream, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(errors):
+        try:
+            main(list(arguments))
+        except SystemExit:
+            pass
+    return stream.getvalue() or errors.getvalue()
+
+def refused(work):
+    try:
+        work()
+    except ExperimentError as error:
+        return str(error)
+
+folder = Path(sys.argv[1])
+base, readings = str(folder / "base.yaml"), str(folder / "r.csv")
+start = bp.load(base)
+said("simulate", base, "-o", readings, "--seed", "5")
+fitted = bp.fit(start, bp.simulate(start, seed=5))
+layout = start.layouts["plate"]
+print(json.dumps({
+    "names": layout.names,
+    "places": layout.coordinates.tolist(),
+    "check": bp.check(start).to_dict(),
+    "run": bp.run(start).to_dict(),
+    "fit": json.loads(said("fit", base, readings, "--json")),
+    "x": fitted.observed.x.tolist(),
+    "balls": fitted.solution.state.balls.tolist(),
+    "S^2": fitted.solution.factor.sum_of_squares,
+    "pairs": bp.fit(start, bp.simulate(start), estimator="distances", pairs="diameters").to_dict(),
+    "by command": json.loads(
+        said("fit", base, readings, "--estimator", "distances", "--pairs", "diameters", "--json")
+    ),
+    "schema": json.loads(said("schema")),
+    "missing": said("check", str(folder / "missing.yaml")),
+    "wrong set": refused(lambda: bp.load(folder / "wrong.yaml")),
+    "wrong pairs": refused(
+        lambda: bp.fit(start, bp.simulate(start), estimator="distances", pairs="corners")
+    ),
+    "twins": refused(lambda: bp.load(folder / "twins.yaml")),
+}))
+"""
+
+# A kind whose layout contradicts itself.
+TWINS = """
+class TwinsSettings(ArtefactSettings):
+    kind: Literal["twins"]
+
+    def layout(self) -> BallLayout:
+        return BallLayout(("a", "a"), frozen([[0, 0, 0], [1, 0, 0]]))
+"""
+
+
+def sections(artefact: dict[str, Any], pairs: Any = "diameters") -> dict[str, Any]:
+    """The quickstart with another plate, and few coefficients and points."""
+    found = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    found["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    found["evaluation"]["points"] = {"random": 20, "seed": 1}
+    certificate = {"kind": "distances", "pairs": pairs, "standard_uncertainty": "0.2 um"}
+    return dict(found) | {"artefacts": {"plate": artefact}, "calibration": [certificate]}
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What a copy of the package says that has the file and the lines of the documentation."""
+    folder = tmp_path_factory.mktemp("package")
+    package, ignored = folder / "ballplate", shutil.ignore_patterns("__pycache__")
+    shutil.copytree(TOP / "analysis", package, ignore=ignored)
+    for part in ("simulator", "designs"):
+        shutil.copytree(TOP / part, package / part, ignore=ignored)
+    page = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
+    page = page.partition("**An artefact**")[2]
+    file, entry = (part.split("```\n")[0] for part in page.split("```python\n")[1:3])
+    room = package / "simulator" / "geometry"
+    (room / "ring.py").write_text(file + "\n" + TWINS, encoding="utf-8")
+    kinds = (room / "artefacts.py").read_text(encoding="utf-8")
+    line, registered = entry.strip().split("\n\n")
+    for mark, new in (
+        ("from .directions import", f"{line}, TwinsSettings\n"),
+        ('    "sphere": ', f'{registered}\n    "twins": TwinsSettings,\n'),
+    ):
+        assert kinds.count(mark) == 1
+        kinds = kinds.replace(mark, new + mark)
+    (room / "artefacts.py").write_text(kinds, encoding="utf-8")
+    work = folder / "work"
+    work.mkdir()
+    ring = {"kind": "ring", "balls": BALLS, "diameter": "300 mm"}
+    missing = sections(ring)
+    del missing["artefacts"]
+    for name, given in {
+        "base": sections(ring),
+        "wrong": sections(ring | {"balls": 7}),
+        "missing": missing,
+        "twins": sections({"kind": "twins"}),
+    }.items():
+        text = yaml.safe_dump(given, allow_unicode=True)
+        (work / f"{name}.yaml").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, str(work)],
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
+
+
+@pytest.fixture(scope="module")
+def problem() -> dense.Problem:
+    """The same with its balls and its pairs listed, for the dense computation."""
+    angles = [2 * np.pi * i / BALLS for i in range(BALLS)]
+    places = {
+        f"b{i + 1}": [f"{500 * DIAMETER * (1 + float(f(angle)))!r} mm" for f in (np.cos, np.sin)]
+        for i, angle in enumerate(angles)
+    }
+    listed = sections({"kind": "balls", "coordinates": places}, DIAMETERS)
+    return dense.planned(lay_out(experiment(listed)), 3, 3)
+
+
+def test_its_balls_are_along_a_circle(told: dict[str, Any]) -> None:
+    assert told["names"] == [f"b{i}" for i in range(1, BALLS + 1)]
+    places = np.array(told["places"])
+    from_middle = places - places.mean(axis=0)
+    np.testing.assert_allclose(np.linalg.norm(from_middle, axis=1), 0.5 * DIAMETER, rtol=1e-14)
+    assert not places[:, 2].any()
+
+
+def test_uncertainties_are_those_of_a_dense_computation(
+    told: dict[str, Any], problem: dense.Problem
+) -> None:
+    expected, found = dense.standard_uncertainties(problem), told["run"]["quantities"]
+    for symbol in ("U1", "U4", "U5", "U6"):
+        assert found[symbol]["maximum"] == pytest.approx(expected[symbol].max(), rel=1e-7)
+        assert found[symbol]["average"] == pytest.approx(expected[symbol].mean(), rel=1e-7)
+    deficiency = dense.linearised(problem).deficiency
+    assert told["check"]["rank_deficiency"] == told["run"]["rank_deficiency"] == deficiency
+
+
+def test_a_fit_minimises_the_sum_of_squares(told: dict[str, Any], problem: dense.Problem) -> None:
+    of = replace(problem, scales=np.array(told["x"]))
+    solution = least_squares(
+        lambda at: dense.residuals(of, at),
+        np.zeros(of.parameters),
+        lambda at: dense.jacobian(lambda step: dense.residuals(of, at + step), of.parameters),
+        x_scale="jac",
+        xtol=1e-15,
+        ftol=1e-15,
+    )
+    assert told["fit"]["status"] == "converged"
+    assert told["S^2"] == pytest.approx(2.0 * solution.cost, rel=1e-8)
+    # By nothing that counts beside their uncertainties.
+    away = np.abs(np.array(told["balls"]) - dense.unpack(of, solution.x)[0])
+    assert (away.ravel() < 1e-3 * dense.standard_uncertainties(of)["U1"].ravel()).all()
+
+
+def test_estimators_of_distances_take_its_pairs(told: dict[str, Any]) -> None:
+    assert told["pairs"]["pairs"] == told["by command"]["pairs"] == len(DIAMETERS)
+    known = "choose from: neighbours, diameters, all"
+    assert 'artefacts.plate: "corners" is not defined' in told["wrong pairs"]
+    assert known in told["wrong pairs"]
+
+
+def test_messages_and_the_schema_know_it(told: dict[str, Any]) -> None:
+    schema = told["schema"]
+    assert {"balls", "diameter", "kind"} <= set(schema["$defs"]["RingSettings"]["required"])
+    pairs = schema["$defs"]["DistancesSettings"]["properties"]["pairs"]["oneOf"]
+    assert any(one.get("type") == "string" and "enum" not in one for one in pairs)
+    assert "bryan_gauge" in told["missing"] and "ring" in told["missing"]
+    # With seven balls there are no diameters.
+    assert 'calibration[0].pairs: "diameters" is not defined' in told["wrong set"]
+    assert "choose from: neighbours, all" in told["wrong set"]
+
+
+def test_a_layout_that_contradicts_itself_is_refused_by_its_kind(told: dict[str, Any]) -> None:
+    assert (
+        'artefacts.plate: kind "twins" has a wrong layout: several balls are named a;'
+        in told["twins"]
+    )
