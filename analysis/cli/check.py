@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
 from .outputs import UsageError
-from .telling import warn
+from .telling import complain, warn
 
 if TYPE_CHECKING:
     from ..planning.requirements.goals import Goal
@@ -163,5 +163,9 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
     elif options.format == "text" and not options.diff:
         for design in checked.designs:
             print_lines(design.prediction.lines())
+    elif options.diff:
+        for design in checked.designs:
+            for complaint in design.complaints:
+                complain(f"{checked.file}: {design.prediction.label}: {complaint}")
     if options.format in ("text", "json"):
         print_errors(checked.messages, options)

@@ -277,6 +277,9 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
     if not getattr(options, "force", True):
         allowed -= before.keys()
+    if command == "check" and options.fix and not options.diff:
+        # The only files that are read and written, and asked for by that option.
+        allowed |= {_name(path, folder) for path in options.files}
     for path in stores:
         name = _name(path, folder)
         allowed |= {name + end for end in BESIDE_STORES}
