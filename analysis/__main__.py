@@ -30,9 +30,17 @@ def main() -> int:
         number = getattr(signal, name, None)
         if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _leave)
+    from .cli import internal_error
     from .cli import main as command
 
-    return command()
+    try:
+        return command()
+    except Exception as error:
+        # Status 1, which Python gives, is that of a design that is not as expected.
+        import traceback
+
+        traceback.print_exc()
+        return internal_error(f"{type(error).__name__}: {error}")
 
 
 if __name__ == "__main__":

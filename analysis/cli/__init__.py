@@ -134,7 +134,7 @@ def _run(options: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return BAD_FILE
     except InternalError as error:
-        return _reported(error)
+        return internal_error(error)
     except Exception as error:
         from .memory import no_memory
 
@@ -145,14 +145,11 @@ def _run(options: argparse.Namespace) -> int:
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)
             return BAD_FILE
-        import traceback
-
-        traceback.print_exc()
-        return _reported(f"{type(error).__name__}: {error}")
+        raise
 
 
-def _reported(error: object) -> int:
-    """Say that the program is wrong, not what it was given."""
+def internal_error(error: object) -> int:
+    """Say that the program is wrong, not what it was given; the exit status."""
     told = f"internal error: {error}. Please report it with the file and the command."
     print(told, file=sys.stderr)
     return INTERNAL

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence
-from .variants import override, place_of, removed
+from .variants import override, removed, steps_of
 
 
 def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
@@ -21,13 +21,12 @@ def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
     """
     mark = Mark(f"{file} as changed", 0, 0)
     messages = []
-    places: dict[tuple[str, ...], str] = {}
+    written: dict[tuple[str, ...], str] = {}
     for path, value in changes.items():
         try:
-            place = place_of(tree, path)
-            if place in places:
-                raise ValueError(f'is the same place as "{places[place]}"; replace it once')
-            places[place] = path
+            other = written.setdefault(tuple(steps_of(path)), path)
+            if other != path:
+                raise ValueError(f'is the same place as "{other}"; replace it once')
             tree = (
                 removed(tree, path)
                 if value is None

@@ -130,7 +130,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
 
     :raises ValueError: the path is malformed, or what it passes through does not exist.
     """
-    steps = _steps(path)
+    steps = steps_of(path)
     if (
         len(steps) == 1
         and steps[0] not in ExperimentSettings.model_fields
@@ -167,7 +167,11 @@ def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
     return replace(node, items={name: item for name, item in node.items.items() if name != step})
 
 
-def _steps(path: str) -> list[str]:
+def steps_of(path: str) -> list[str]:
+    """Steps of a path, with the keys of today.
+
+    :raises ValueError: the path is malformed.
+    """
     steps = [match[1] or match[2] or "" for match in STEP.finditer(path)]
     if not path or "".join(match[0] for match in STEP.finditer(path)) != path or "" in steps:
         raise ValueError(
@@ -185,7 +189,7 @@ def place_of(root: Node, path: str) -> tuple[str, ...]:
     """
     node: Node | None = root
     found: list[str] = []
-    for step in _steps(path):
+    for step in steps_of(path):
         if isinstance(node, Sequence):
             i = _index(node, step, tuple(found))
             node, step = node.items[i], str(i)

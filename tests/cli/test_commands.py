@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.__main__ import main as entry_point
 from ballplate.cli import main
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -476,6 +478,8 @@ def test_an_error_of_the_program_is_not_called_a_failed_check(
         raise AssertionError("two is one")
 
     monkeypatch.setattr("ballplate.cli.check_files.check_files", broken)
-    assert main(["check", "designs/quickstart.yaml"]) == 70
+    monkeypatch.setattr(sys, "argv", ["ballplate", "check", "designs/quickstart.yaml"])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    assert entry_point() == 70
     err = capsys.readouterr().err
     assert "Traceback" in err and "internal error: AssertionError: two is one. Please report" in err
