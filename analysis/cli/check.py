@@ -160,12 +160,12 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
         workspace = os.environ.get("GITHUB_WORKSPACE")
         for line in annotation_lines(checked, Path(workspace) if workspace else None):
             print(line, flush=True)
-    elif options.format == "text" and not options.diff:
-        for design in checked.designs:
-            print_lines(design.prediction.lines())
     elif options.diff:
         for design in checked.designs:
             for complaint in design.complaints:
                 complain(f"{checked.file}: {design.prediction.label}: {complaint}")
+    elif options.format == "text":
+        for design in checked.designs:
+            print_lines(design.prediction.lines())
     if options.format in ("text", "json"):
         print_errors(checked.messages, options)

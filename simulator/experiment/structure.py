@@ -31,9 +31,11 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
     "priors": (Sequence, PriorSettings),
 }
 
+# Sections that files complete which they name, and which may say something else next time.
+COMPLETED_LATER = ("error_model", "true_machine")
+
 # Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
 # a sweep's cells, share all others.
-COMPLETED_LATER = ("error_model", "true_machine")
 _VALID: WeakKeyDictionary[Node, dict[TypeAdapter[Any], Any]] = WeakKeyDictionary()
 
 
@@ -176,7 +178,6 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 def _validate(
     adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems
 ) -> dict[Steps, Any]:
-    # What these say is completed by files that they name, which may say something else next time.
     known = {} if steps[0] in COMPLETED_LATER else _VALID.setdefault(node, {})
     if adapter in known:
         return {steps: known[adapter]}
