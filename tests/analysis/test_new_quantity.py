@@ -5,10 +5,7 @@ documentation has them: every command then has it.
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ from ballplate import quickstart
 from ballplate.simulator.experiment.layout import lay_out
 
 from tests.reference import dense
+from tests.reference.package_copies import package_copy, said_by_copy
 
 TOP = Path(__file__).parents[2]
 
@@ -82,11 +80,7 @@ print(json.dumps({
 
 def package(folder: Path) -> Path:
     """A copy of the package, and the file of quantities in it."""
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(TOP / "analysis", folder / "ballplate", ignore=ignored)
-    for part in ("simulator", "designs"):
-        shutil.copytree(TOP / part, folder / "ballplate" / part, ignore=ignored)
-    return folder / "ballplate" / "uncertainty" / "quantities.py"
+    return package_copy(folder) / "uncertainty" / "quantities.py"
 
 
 def told(folder: Path) -> dict[str, Any]:
@@ -96,16 +90,7 @@ def told(folder: Path) -> dict[str, Any]:
     work.mkdir()
     shutil.copy(TOP / "designs" / "quickstart.yaml", work / "base.yaml")
     (work / "sweep.yaml").write_text(SWEEP)
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(work)],
-        env={**os.environ, "PYTHONPATH": str(folder)},
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return dict(json.loads(done.stdout))
+    return said_by_copy(folder, SCRIPT, work)
 
 
 @pytest.fixture(scope="module")

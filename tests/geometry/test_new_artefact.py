@@ -4,11 +4,6 @@ command then knows it, and the pairs of balls that it names.
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +16,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from scipy.optimize import least_squares
 
 from tests.reference import dense
+from tests.reference.package_copies import documented, package_copy, said_by_copy
 
 TOP = Path(__file__).parents[2]
 
@@ -102,13 +98,7 @@ def sections(artefact: dict[str, Any], pairs: Any = "diameters") -> dict[str, An
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What a copy of the package says that has the file and the lines of the documentation."""
     folder = tmp_path_factory.mktemp("package")
-    package, ignored = folder / "ballplate", shutil.ignore_patterns("__pycache__")
-    shutil.copytree(TOP / "analysis", package, ignore=ignored)
-    for part in ("simulator", "designs"):
-        shutil.copytree(TOP / part, package / part, ignore=ignored)
-    page = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
-    page = page.partition("**An artefact**")[2]
-    file, entry = (part.split("```\n")[0] for part in page.split("```python\n")[1:3])
+    package, (file, entry) = package_copy(folder), documented("**An artefact**")
     room = package / "simulator" / "geometry"
     (room / "ring.py").write_text(file + "\n" + TWINS, encoding="utf-8")
     kinds = (room / "artefacts.py").read_text(encoding="utf-8")
@@ -133,16 +123,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     }.items():
         text = yaml.safe_dump(given, allow_unicode=True)
         (work / f"{name}.yaml").write_text(text, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(work)],
-        env={**os.environ, "PYTHONPATH": str(folder)},
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return dict(json.loads(done.stdout))
+    return said_by_copy(folder, SCRIPT, work)
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,6 @@ documentation has them: every command then knows it.
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +18,7 @@ from scipy.optimize import least_squares
 from scipy.stats import norm
 
 from tests.reference import dense
+from tests.reference.package_copies import documented, package_copy, said_by_copy
 
 TOP = Path(__file__).parents[2]
 
@@ -236,13 +233,7 @@ def standard() -> str:
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What a copy of the package says that has the file and the line of the documentation."""
     folder = tmp_path_factory.mktemp("package")
-    package, ignored = folder / "ballplate", shutil.ignore_patterns("__pycache__")
-    shutil.copytree(TOP / "analysis", package, ignore=ignored)
-    for part in ("simulator", "designs"):
-        shutil.copytree(TOP / part, package / part, ignore=ignored)
-    page = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
-    page = page.partition("**A kind of observation**")[2]
-    file, entry = (part.split("```\n")[0] for part in page.split("```python\n")[1:3])
+    package, (file, entry) = package_copy(folder), documented("**A kind of observation**")
     rooms = package / "simulator" / "design" / "observations"
     (rooms / "flatness.py").write_text(file, encoding="utf-8")
     kinds = (rooms / "kinds.py").read_text(encoding="utf-8")
@@ -279,16 +270,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     }.items():
         (work / f"{name}.yaml").write_text(text, encoding="utf-8")
     (work / "goal.txt").write_text(f"U6 average {1e6 * angle_goal():.6f} um", encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", SCRIPT, str(work), *REFUSED, "length standard"],
-        env={**os.environ, "PYTHONPATH": str(folder)},
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return dict(json.loads(done.stdout))
+    return said_by_copy(folder, SCRIPT, work, *REFUSED, "length standard")
 
 
 def problem(**changes: Any) -> dense.Problem:

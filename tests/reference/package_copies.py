@@ -1,0 +1,44 @@
+"""Copies of the package, to which tests add what the documentation says that one may add."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+TOP = Path(__file__).parents[2]
+
+
+def package_copy(folder: Path) -> Path:
+    """The package copied into a folder; where it is."""
+    package, ignored = folder / "ballplate", shutil.ignore_patterns("__pycache__")
+    shutil.copytree(TOP / "analysis", package, ignore=ignored)
+    for part in ("simulator", "designs"):
+        shutil.copytree(TOP / part, package / part, ignore=ignored)
+    return package
+
+
+def documented(heading: str) -> tuple[str, str]:
+    """The new file and the lines of registration that stand in the page below a heading."""
+    page = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
+    page = page.partition(heading)[2]
+    file, entry = (part.split("```\n")[0] for part in page.split("```python\n")[1:3])
+    return file, entry
+
+
+def said_by_copy(folder: Path, script: str, *arguments: object) -> dict[str, Any]:
+    """What a script that imports the copy in a folder prints as JSON; a warning is an error."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script, *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
