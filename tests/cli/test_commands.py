@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -13,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.__main__ import main as entry_point
 from ballplate.cli import main
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -469,17 +467,21 @@ def test_checking_loads_nothing_slow() -> None:
     assert found.stderr.strip() == "[]"
 
 
-def test_an_error_of_the_program_is_not_called_a_failed_check(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Status 1 would say that a design is not as expected."""
-
-    def broken(*_: object) -> None:
-        raise AssertionError("two is one")
-
-    monkeypatch.setattr("ballplate.cli.check_files.check_files", broken)
-    monkeypatch.setattr(sys, "argv", ["ballplate", "check", "designs/quickstart.yaml"])
-    monkeypatch.setattr(signal, "signal", lambda *_: None)
-    assert entry_point() == 70
-    err = capsys.readouterr().err
-    assert "Traceback" in err and "internal error: AssertionError: two is one. Please report" in err
+def test_an_error_of_the_program_is_not_called_a_failed_check() -> None:
+    """Status 1 would say that a design is not as expected. In a process of its own, since the
+    command keeps the signals of the one in which it is started.
+    """
+    code = (
+        "import sys\n"
+        "import ballplate.cli.check_files as check_files\n"
+        "from ballplate.__main__ import main\n"
+        "def broken(*_):\n"
+        "    raise AssertionError('two is one')\n"
+        "check_files.check_files = broken\n"
+        "sys.argv = ['ballplate', 'check', 'designs/quickstart.yaml']\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 70
+    message = "internal error: AssertionError: two is one. Please report"
+    assert "Traceback" in done.stderr and message in done.stderr
