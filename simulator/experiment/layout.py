@@ -97,7 +97,9 @@ def lay_out(experiment: Experiment) -> Design:
         model,
         machine,
         Probes(
-            tuple(experiment.probes), np.array(list(experiment.probes.values())), _free(experiment)
+            tuple(experiment.probes),
+            np.array([probe.offset for probe in experiment.probes.values()]),
+            _free(experiment),
         ),
         Artefacts(tuple(artefacts), is_plate, is_gauge),
         laid,
@@ -121,7 +123,7 @@ def lay_out(experiment: Experiment) -> Design:
 
 def _free(experiment: Experiment) -> Flags:
     """Which probe offsets are parameters (l, d)."""
-    free = [name in experiment.offset_uncertainties for name in experiment.probes]
+    free = [probe.is_estimated for probe in experiment.probes.values()]
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
@@ -143,13 +145,9 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     if messages:
         raise ExperimentError(messages)
     nowhere = Mark(str(experiment.source), 0, 0)
-    for name, uncertainty in experiment.offset_uncertainties.items():
-        for axis in np.flatnonzero(np.isfinite(uncertainty)):
-            value, u = float(experiment.probes[name][axis]), float(uncertainty[axis])
-            label = f"probe {name}: offset {'xyz'[axis]}"
-            given.append(
-                Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere)
-            )
+    for probe, axis, value, u in experiment.certified_offsets:
+        label = f"probe {probe.name}: offset {'xyz'[axis]}"
+        given.append(Prior(label, None, probe.name, axis, np.zeros(parameters), value, u, nowhere))
     probes = list(experiment.probes)
     return Priors(
         tuple(prior.name for prior in given),

@@ -34,7 +34,7 @@ from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
-from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
+from .references import resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
@@ -203,8 +203,7 @@ def _build(
     check_radii(calibrations, problems)
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, references)
-    offset_uncertainties = resolve_offset_uncertainties(sections, references)
-    check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
+    check_size(sections, machine, positions, calibrations, probes, references)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
     if problems.messages or machine is None or evaluation is None:
@@ -232,7 +231,6 @@ def _build(
         builder=partial(_built, source=source, name=name, planning=planning),
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
-        offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
     )

@@ -23,6 +23,7 @@ from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
 from ..inputs.yamltree import Mapping, Node, written
 from ..inputs.yamltree import Sequence as SequenceNode
+from .model import Probe
 from .sections import ProbeSettings
 from .structure import Sections
 
@@ -112,8 +113,8 @@ def _check_axes(
             )
 
 
-def resolve_probes(sections: Sections, references: References) -> dict[str, Floats]:
-    """Return the offsets of the probes that are right."""
+def resolve_probes(sections: Sections, references: References) -> dict[str, Probe]:
+    """Return the probes that are right, by name."""
     problems, dimension = references.problems, references.dimension
     if written(problems.root, "probes") is None:
         if dimension == 3:
@@ -122,20 +123,26 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Floa
                 " reference point"
             )
             problems.add(("probes",), text)
-        return {DEFAULT_PROBE: frozen(np.zeros(dimension))} if dimension == 2 else {}
-    offsets = {}
-    for name, settings in sections.entries("probes").items():
-        offset = settings.offset if isinstance(settings, ProbeSettings) else settings
-        if references.has_dimension(offset, ("probes", name)):
-            offsets[str(name)] = frozen(offset)
-    return offsets
+            return {}
+        at_reference = Probe(DEFAULT_PROBE, frozen(np.zeros(dimension or 0)))
+        return {DEFAULT_PROBE: at_reference} if dimension == 2 else {}
+    reference = _reference_probe(sections, references)
+    probes = {}
+    for key, settings in sections.entries("probes").items():
+        name, steps, uncertainty = str(key), ("probes", str(key)), None
+        offset = settings
+        if isinstance(settings, ProbeSettings):
+            offset = settings.offset
+            uncertainty = _offset_uncertainty(settings, steps, references)
+        if references.has_dimension(offset, steps):
+            known = None if name == reference else uncertainty
+            probes[name] = Probe(name, frozen(offset), known)
+    return probes
 
 
-def resolve_offset_uncertainties(sections: Sections, references: References) -> dict[str, Floats]:
-    """Return standard uncertainties (d,) of the offsets that are estimated, infinite where they are
-    unknown.
-    """
-    problems, dimension = references.problems, references.dimension
+def _reference_probe(sections: Sections, references: References) -> str:
+    """Name of the probe whose offset is held, what is wrong with it told."""
+    problems = references.problems
     listed = {
         str(name): s
         for name, s in sections.entries("probes").items()
@@ -147,36 +154,41 @@ def resolve_offset_uncertainties(sections: Sections, references: References) -> 
             ("probes", name, "reference"),
             f'"{named[0]}" is the reference already; remove one of the two',
         )
-    reference = named[0] if named else references.probes[0] if references.probes else ""
-    found: dict[str, Floats] = {}
-    for name, settings in listed.items():
-        steps: Steps = ("probes", name)
-        stated = settings.standard_uncertainty
-        if settings.unknown and stated is not None:
-            problems.add(
-                (*steps, "unknown"),
-                'does not go with "standard_uncertainty"; remove one of the two',
-                True,
-            )
-        if settings.reference and (settings.unknown or stated is not None):
-            key = "unknown" if settings.unknown else "standard_uncertainty"
-            problems.add(
-                (*steps, key), "the offset of the reference is held as stated; remove it", True
-            )
-        if name == reference and not named and (settings.unknown or stated is not None):
-            text = (
-                "its offset is held as stated, as the first probe is the reference where none has"
-                " reference: true"
-            )
-            problems.doubt(steps, f"{text}; its stated uncertainty is ignored")
-        uncertainty, is_right = lengths_per_axis(
-            stated, (*steps, "standard_uncertainty"), references
+    if named:
+        return named[0]
+    first = references.probes[0] if references.probes else ""
+    if first in listed and (listed[first].unknown or listed[first].standard_uncertainty):
+        text = (
+            "its offset is held as stated, as the first probe is the reference where none has"
+            " reference: true"
         )
-        if settings.unknown and dimension is not None:
-            uncertainty = frozen([np.inf] * dimension)
-        if uncertainty is not None and is_right and name != reference:
-            found[name] = uncertainty
-    return found
+        problems.doubt(("probes", first), f"{text}; its stated uncertainty is ignored")
+    return first
+
+
+def _offset_uncertainty(
+    settings: ProbeSettings, steps: Steps, references: References
+) -> Floats | None:
+    """Standard uncertainties (d,) of an offset that is estimated, infinite where it is unknown,
+    None after saying what is wrong and where nothing is stated.
+    """
+    problems, dimension = references.problems, references.dimension
+    stated = settings.standard_uncertainty
+    if settings.unknown and stated is not None:
+        problems.add(
+            (*steps, "unknown"),
+            'does not go with "standard_uncertainty"; remove one of the two',
+            True,
+        )
+    if settings.reference and (settings.unknown or stated is not None):
+        key = "unknown" if settings.unknown else "standard_uncertainty"
+        problems.add(
+            (*steps, key), "the offset of the reference is held as stated; remove it", True
+        )
+    uncertainty, is_right = lengths_per_axis(stated, (*steps, "standard_uncertainty"), references)
+    if settings.unknown and dimension is not None:
+        return frozen([np.inf] * dimension)
+    return uncertainty if is_right else None
 
 
 def _with_coordinates(

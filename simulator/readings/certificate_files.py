@@ -49,12 +49,9 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
         for k, item in enumerate(experiment.calibration)
         for one in item.certified_values(experiment.layouts[item.artefact])
     ]
-    for name, axis in _certified_offsets(experiment):
-        value, u = (
-            float(experiment.probes[name][axis]),
-            float(experiment.offset_uncertainties[name][axis]),
-        )
-        found.append(CertifiedValue(format_path(("probes", name)), "offset", AXES[axis], value, u))
+    for probe, axis, value, u in experiment.certified_offsets:
+        item = format_path(("probes", probe.name))
+        found.append(CertifiedValue(item, "offset", AXES[axis], value, u))
     for prior in experiment.priors:
         item = prior.path.rpartition(".")[0]
         found.append(
@@ -63,13 +60,6 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
             )
         )
     return found
-
-
-def _certified_offsets(experiment: Experiment) -> Iterator[tuple[str, int]]:
-    """Probes and axes whose offsets are estimated and have a standard uncertainty."""
-    for name, uncertainty in experiment.offset_uncertainties.items():
-        for axis in np.flatnonzero(np.isfinite(uncertainty)).tolist():
-            yield name, axis
 
 
 def with_values(experiment: Experiment, values: Array) -> Experiment:
@@ -89,9 +79,10 @@ def with_values(experiment: Experiment, values: Array) -> Experiment:
         item.with_values(taken(len(list(item.certified_values(experiment.layouts[item.artefact])))))
         for item in experiment.calibration
     )
-    probes = {name: np.array(offset) for name, offset in experiment.probes.items()}
-    for name, axis in _certified_offsets(experiment):
-        probes[name][axis] = taken(1)[0]
+    probes = dict(experiment.probes)
+    for probe, axis, _, _ in experiment.certified_offsets:
+        offset = np.where(np.arange(len(probe.offset)) == axis, taken(1), probes[probe.name].offset)
+        probes[probe.name] = replace(probe, offset=offset)
     priors = tuple(replace(prior, value=float(taken(1)[0])) for prior in experiment.priors)
     return replace(experiment, calibration=calibration, probes=probes, priors=priors)
 

@@ -170,8 +170,8 @@ def test_machine(complete: Experiment) -> None:
     np.testing.assert_array_equal(complete.machine.volume.upper, [1.0, 1.0, 1.0])
     np.testing.assert_array_equal(complete.machine.repeatability, [2e-7, 2e-7, 3e-7])
     assert list(complete.probes) == ["down", "side"]
-    np.testing.assert_array_equal(complete.probes["side"], [0.05, 0.0, -0.05])
-    assert not complete.probes["side"].flags.writeable
+    np.testing.assert_array_equal(complete.probes["side"].offset, [0.05, 0.0, -0.05])
+    assert not complete.probes["side"].offset.flags.writeable
 
 
 def test_artefacts(complete: Experiment) -> None:
@@ -249,7 +249,7 @@ def test_evaluation_points_of_a_file(tmp_path: Path) -> None:
 def test_plane_experiment_with_defaults(plane: Experiment) -> None:
     assert plane.dimension == 2
     np.testing.assert_array_equal(plane.machine.repeatability, [2e-7, 3e-7])
-    np.testing.assert_array_equal(plane.probes["probe"], [0.0, 0.0])
+    np.testing.assert_array_equal(plane.probes["probe"].offset, [0.0, 0.0])
     assert plane.evaluation.points.shape == (0, 2) and plane.evaluation.probe == "probe"
     assert (plane.description, plane.sigma, plane.seed) == ("", "estimated", 1)
     assert plane.target_uncertainty is None and plane.expected_rank_deficiency is None
