@@ -314,6 +314,12 @@ class Observations(ABC):
         """Starting values with what these observations tell of them."""
         return state
 
+    def as_read(self, design: Design, x: Array) -> Design:
+        """The design with probe offsets that readings tell, for these observations, by far better
+        than the drawing.
+        """
+        return design
+
     def reread(self, design: Design, place: Integers) -> Self:
         """The same where the design's readings stand at other places (readings,)."""
         return self
@@ -344,6 +350,7 @@ class Replicates:
 
     `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
     S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
+    `offsets` (l, d) are the columns of probe offsets, -1 where they are held.
     """
 
     start: State
@@ -353,6 +360,7 @@ class Replicates:
     squares: Array
     by_ball: Array
     by_shared: Array
+    offsets: Integers
 
     def pull(self, balls: Integers, forces: Array) -> None:
         """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""

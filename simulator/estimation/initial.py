@@ -27,6 +27,8 @@ def initial_state(design: Design, x: Array) -> State:
 
     Where too few balls join a position to the others, the nominal geometry closes the gap.
     """
+    for one in design.observations:
+        design = one.as_read(design, x)
     d = design.dimension
     balls = design.balls.places.copy()
     rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
