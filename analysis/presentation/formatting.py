@@ -12,7 +12,16 @@ import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
-SHOWN = {"m": "µm", "rad": "µrad", "1": "ppm"}
+SHOWN = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "mK"}
+
+
+def shown_factor(unit: str) -> float:
+    """What takes a value to the unit it is shown in.
+
+    >>> shown_factor("m"), shown_factor("K")
+    (1000000.0, 1000.0)
+    """
+    return 1e3 if unit == "K" else 1e6
 
 
 def shown_unit(unit: str) -> str:
