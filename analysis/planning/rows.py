@@ -218,7 +218,7 @@ def calibration_rows(
         one length.
     """
     if experiment.artefacts[item.artefact].role == "plate":
-        design = lay_out(replace(experiment, calibration=(item,), priors=()))
+        design = lay_out(replace(experiment, calibration=(item,), priors=(), stars=()))
         return _of_observations(drawn, design.observed(no_priors()))
     named = drawn.design.unknown_lengths.of(drawn.design.artefacts.names.index(item.artefact))
     if len(named) != 1:

@@ -128,6 +128,8 @@ def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
             "probe offsets with a standard uncertainty",
             _with_offsets(experiment, certified, np.inf),
         )
+    if experiment.stars:
+        yield "tips of stars", _without_stars(experiment)
     if exact_offsets(experiment):
         yield EXACT_OFFSETS, with_offsets(experiment, np.inf)
 
@@ -149,6 +151,15 @@ def _with_offsets(experiment: Experiment, names: Iterable[str], uncertainty: flo
     for name in names:
         probes[name] = replace(probes[name], standard_uncertainty=own)
     return replace(experiment, probes=probes)
+
+
+def _without_stars(experiment: Experiment) -> Experiment:
+    """The experiment with unknown offsets in place of stars, but for one that is the reference."""
+    probes = dict(experiment.probes)
+    if all(probe.is_estimated for probe in probes.values()):
+        first = next(iter(probes.values()))
+        probes[first.name] = replace(first, standard_uncertainty=None)
+    return replace(experiment, probes=probes, stars=())
 
 
 def scale_uncertainty(experiment: Experiment) -> float:

@@ -26,6 +26,7 @@ from ..design.observations.coordinates import CalibratedCoordinates, no_coordina
 from ..design.observations.distances import CalibratedDistances, no_distances
 from ..design.observations.priors import Priors
 from ..design.observations.radius import RadiusCalibration
+from ..design.observations.star import Stars, observed_stars
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
@@ -108,7 +109,7 @@ def lay_out(experiment: Experiment) -> Design:
             tuple(place.name for place in places), position_artefact, rotations, origins, held
         ),
         readings,
-        (distances, coordinates, lengths, priors, *others),
+        (distances, coordinates, lengths, priors, *others, *_stars(experiment)),
         unknown,
         EvaluationPoints(points, probe_index[experiment.evaluation.probe]),
         Tasks(
@@ -160,6 +161,12 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
         np.array([p.value for p in given], float),
         np.array([p.standard_uncertainty for p in given], float),
     )
+
+
+def _stars(experiment: Experiment) -> list[Stars]:
+    if not experiment.stars:
+        return []
+    return [observed_stars(experiment.stars, list(experiment.probes))]
 
 
 def random_points(volume: Volume, count: int, seed: int) -> Array:

@@ -16,6 +16,7 @@ from ..design.influences.protocol import InfluenceSettings
 from ..design.lookup import Floats, Indices
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
+from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
@@ -237,6 +238,7 @@ class Experiment:
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     influences: tuple[InfluenceSettings, ...] = ()
+    stars: tuple[Star, ...] = ()
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..design.lookup import Floats, References, lengths_per_axis
+from ..design.lookup import References
 from ..geometry.artefacts import BallsSettings, BryanGaugeSettings
 from ..geometry.ball_layouts import (
     MOST_BALLS,
@@ -14,7 +14,6 @@ from ..geometry.ball_layouts import (
     BallLayout,
     LayoutError,
     coincident_balls,
-    frozen,
 )
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems, written_keys
@@ -23,8 +22,6 @@ from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
 from ..inputs.yamltree import Mapping, Node, written
 from ..inputs.yamltree import Sequence as SequenceNode
-from .model import Probe
-from .sections import ProbeSettings
 from .structure import Sections
 
 DEFAULT_PROBE = "probe"
@@ -111,84 +108,6 @@ def _check_axes(
             problems.add(
                 (*steps, key), f'unknown ball "{shorten(name)}"; {hint(name, layout.names)}'
             )
-
-
-def resolve_probes(sections: Sections, references: References) -> dict[str, Probe]:
-    """Return the probes that are right, by name."""
-    problems, dimension = references.problems, references.dimension
-    if written(problems.root, "probes") is None:
-        if dimension == 3:
-            text = (
-                'missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: offsets from the'
-                " reference point"
-            )
-            problems.add(("probes",), text)
-            return {}
-        at_reference = Probe(DEFAULT_PROBE, frozen(np.zeros(dimension or 0)))
-        return {DEFAULT_PROBE: at_reference} if dimension == 2 else {}
-    reference = _reference_probe(sections, references)
-    probes = {}
-    for key, settings in sections.entries("probes").items():
-        name, steps, uncertainty = str(key), ("probes", str(key)), None
-        offset = settings
-        if isinstance(settings, ProbeSettings):
-            offset = settings.offset
-            uncertainty = _offset_uncertainty(settings, steps, references)
-        if references.has_dimension(offset, steps):
-            known = None if name == reference else uncertainty
-            probes[name] = Probe(name, frozen(offset), known)
-    return probes
-
-
-def _reference_probe(sections: Sections, references: References) -> str:
-    """Name of the probe whose offset is held, what is wrong with it told."""
-    problems = references.problems
-    listed = {
-        str(name): s
-        for name, s in sections.entries("probes").items()
-        if isinstance(s, ProbeSettings)
-    }
-    named = [name for name, settings in listed.items() if settings.reference]
-    for name in named[1:]:
-        problems.add(
-            ("probes", name, "reference"),
-            f'"{named[0]}" is the reference already; remove one of the two',
-        )
-    if named:
-        return named[0]
-    first = references.probes[0] if references.probes else ""
-    if first in listed and (listed[first].unknown or listed[first].standard_uncertainty):
-        text = (
-            "its offset is held as stated, as the first probe is the reference where none has"
-            " reference: true"
-        )
-        problems.doubt(("probes", first), f"{text}; its stated uncertainty is ignored")
-    return first
-
-
-def _offset_uncertainty(
-    settings: ProbeSettings, steps: Steps, references: References
-) -> Floats | None:
-    """Standard uncertainties (d,) of an offset that is estimated, infinite where it is unknown,
-    None after saying what is wrong and where nothing is stated.
-    """
-    problems, dimension = references.problems, references.dimension
-    stated = settings.standard_uncertainty
-    if settings.unknown and stated is not None:
-        problems.add(
-            (*steps, "unknown"),
-            'does not go with "standard_uncertainty"; remove one of the two',
-            True,
-        )
-    if settings.reference and (settings.unknown or stated is not None):
-        key = "unknown" if settings.unknown else "standard_uncertainty"
-        problems.add(
-            (*steps, key), "the offset of the reference is held as stated; remove it", True
-        )
-    uncertainty, is_right = lengths_per_axis(stated, (*steps, "standard_uncertainty"), references)
-    if settings.unknown and dimension is not None:
-        return frozen([np.inf] * dimension)
-    return uncertainty if is_right else None
 
 
 def _with_coordinates(

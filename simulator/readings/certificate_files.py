@@ -52,6 +52,10 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
     for probe, axis, value, u in experiment.certified_offsets:
         item = format_path(("probes", probe.name))
         found.append(CertifiedValue(item, "offset", AXES[axis], value, u))
+    for k, star in enumerate(experiment.stars):
+        item, u = format_path(("stars", k)), star.standard_uncertainty
+        for (tip, letter), value in zip(star.names, star.coordinates.ravel().tolist(), strict=True):
+            found.append(CertifiedValue(item, tip, letter, value, u))
     for prior in experiment.priors:
         item = prior.path.rpartition(".")[0]
         found.append(
@@ -83,8 +87,9 @@ def with_values(experiment: Experiment, values: Array) -> Experiment:
     for probe, axis, _, _ in experiment.certified_offsets:
         offset = np.where(np.arange(len(probe.offset)) == axis, taken(1), probes[probe.name].offset)
         probes[probe.name] = replace(probe, offset=offset)
+    stars = tuple(star.with_values(taken(star.coordinates.size)) for star in experiment.stars)
     priors = tuple(replace(prior, value=float(taken(1)[0])) for prior in experiment.priors)
-    return replace(experiment, calibration=calibration, probes=probes, priors=priors)
+    return replace(experiment, calibration=calibration, probes=probes, stars=stars, priors=priors)
 
 
 def drawn_values(
@@ -111,7 +116,11 @@ def drawn_values(
     # Those of offsets come last in the design, and first here.
     priors = design.of(Priors).true_values(design, truth, model)
     priors = priors[design.of(Priors).of_influence < 0]
-    true += [*priors[len(experiment.priors) :], *priors[: len(experiment.priors)]]
+    true += priors[len(experiment.priors) :].tolist()
+    for star in experiment.stars:
+        own = [design.probes.names.index(name) for name in star.probes]
+        true += star.true_values(truth.probes[own]).tolist()
+    true += priors[: len(experiment.priors)].tolist()
     if generator is None:
         return np.array(true, float)
     uncertainty = np.array([one.standard_uncertainty for one in certified_values(experiment)])

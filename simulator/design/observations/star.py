@@ -82,12 +82,12 @@ class Star:
 def _moves(star: Star) -> Array:
     """How small turns, and shifts where its place is unknown, move its tips: (l d, k)."""
     arms = star.coordinates if star.has_place else star.coordinates - star.coordinates.mean(axis=0)
-    l, d = arms.shape
-    turns = rotation_sensitivity(arms).reshape(l * d, -1)
+    count, d = arms.shape
+    turns = rotation_sensitivity(arms).reshape(count * d, -1)
     if star.has_place:
         return turns
     size = max(float(np.sqrt((arms**2).sum())), np.finfo(float).tiny)
-    return np.concatenate([turns, np.tile(size * np.eye(d), (l, 1)) / np.sqrt(l)], axis=1)
+    return np.concatenate([turns, np.tile(size * np.eye(d), (count, 1)) / np.sqrt(count)], axis=1)
 
 
 def _free(star: Star) -> Array:
