@@ -82,11 +82,11 @@ def test_the_parameters_are_those_stated(drawn: Experiment) -> None:
     places = ["z low", "z high", "x low", "x high", "y low", "y high"]
     assert found == [
         ("expansion of plate", "1/K", 11.5e-6, 0.6e-6),
-        ("sensor of plate", "K", 0.0, SENSOR),
-        *((f"temperature of plate in {place}", "K", 0.0, EACH) for place in places),
+        ("sensor error of plate", "K", 0.0, SENSOR),
+        *((f"temperature error of plate in {place}", "K", 0.0, EACH) for place in places),
         ("expansion of the scales", "1/K", 8e-6, 0.3e-6),
-        ("sensor of the scales", "K", 0.0, SENSOR),
-        *((f"temperature of the scales in {place}", "K", 0.0, EACH) for place in places),
+        ("sensor error of the scales", "K", 0.0, SENSOR),
+        *((f"temperature error of the scales in {place}", "K", 0.0, EACH) for place in places),
     ]
     assert lay_out(drawn).parameter_count == len(linearise(lay_out(drawn)).layout) + 27
 
