@@ -18,7 +18,7 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
-from ..presentation.formatting import SHOWN, shown_factor
+from ..presentation.formatting import amount_of
 from .canonical import elementary_mixture, principal_directions
 from .missing_bars import reasons, relative_changes
 
@@ -516,4 +516,5 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    return f"{printable(value * shown_factor(unit)):.3g} {SHOWN[unit]}"
+    amount, shown = amount_of(value, unit)
+    return f"{printable(amount):.3g} {shown}"

@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
@@ -90,6 +91,13 @@ class Influence(ABC):
     """
 
     in_order: ClassVar[bool] = False
+
+    @property
+    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+        """Columns of a file of readings that it asks for, with the units that each may have; what
+        a reading has there is a `column` of `Disturbed`.
+        """
+        return {}
 
     @property
     @abstractmethod

@@ -3,13 +3,15 @@
 A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x stands for
 x (1 + c s), where b and c are coefficients of thermal expansion and t and s what artefact and
 scales are above the reference temperature. Products of the errors of a coefficient and of a
-temperature are neglected.
+temperature are neglected. A file of readings may have temperatures of each reading in place of those
+of its position.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Literal
 
 import numpy as np
@@ -26,10 +28,11 @@ from .protocol import Disturbed, Influence, InfluenceParameter, InfluenceSetting
 
 REFERENCE = 20.0
 
-# Columns of readings with temperatures of their own, in degrees Celsius.
-ARTEFACT_COLUMN = "temperature_artefact_degC"
-SCALES_COLUMN = "temperature_scales_degC"
-AXIS_COLUMNS = ("temperature_x_degC", "temperature_y_degC", "temperature_z_degC")
+# Columns of readings with temperatures of their own, and their unit.
+ARTEFACT_COLUMN = "temperature_artefact"
+SCALES_COLUMN = "temperature_scales"
+AXIS_COLUMNS = ("temperature_x", "temperature_y", "temperature_z")
+UNITS = {"degC": Fraction(1)}
 
 # What the effects of parameters are told for at least, in K and 1/K: a coefficient matters little
 # where a temperature is just the reference, and still has a size.
@@ -233,6 +236,13 @@ class Part:
     wrong: np.ndarray
     parameters: tuple[InfluenceParameter, ...]
 
+    @property
+    def columns(self) -> list[str]:
+        """Columns with its temperature, the last that a reading has counting."""
+        if self.axis == -2:
+            return [ARTEFACT_COLUMN]
+        return [SCALES_COLUMN, *([AXIS_COLUMNS[self.axis]] if self.axis >= 0 else [])]
+
 
 @dataclass(frozen=True)
 class Temperatures(Influence):
@@ -246,6 +256,11 @@ class Temperatures(Influence):
     def parameters(self) -> tuple[InfluenceParameter, ...]:
         return tuple(parameter for part in self.parts for parameter in part.parameters)
 
+    @property
+    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+        """Temperatures of single readings, where a file has them."""
+        return {name: UNITS for part in self.parts for name in part.columns}
+
     def shifts(self, at: Disturbed) -> tuple[Array, Array]:
         """Location and derivative: an artefact's expansion moves balls, and that of scales is
         taken off, since the scales say too little by it.
@@ -256,13 +271,11 @@ class Temperatures(Influence):
         for part in self.parts:
             if part.axis == -2:
                 length = np.where(self.balls[at.ball][:, None], at.arms, 0.0)
-                columns = [ARTEFACT_COLUMN]
             else:
                 axes = np.arange(at.x.shape[1])
                 length = np.where((axes == part.axis) | (part.axis == -1), -at.x, 0.0)
-                columns = [SCALES_COLUMN, *([AXIS_COLUMNS[part.axis]] if part.axis >= 0 else [])]
             difference = part.differences[at.position]
-            for column in columns:
+            for column in part.columns:
                 given = at.column(column) - self.reference
                 difference = np.where(np.isnan(given), difference, given)
             shift += part.expansion * difference[:, None] * length
@@ -302,11 +315,11 @@ def _part(
     if not shared:
         words = f"expansion of {'the scales' if axis == 'all' else name}"
         add(words, "1/K", expansion.value, np.inf if u is None else u, most * reach)
-    add(f"sensor of {name}", "K", 0.0, measured.sensor_uncertainty, size)
+    add(f"sensor error of {name}", "K", 0.0, measured.sensor_uncertainty, size)
     wrong = np.full(len(here), -1)
     for k in np.flatnonzero(here) if measured.standard_uncertainty else ():
         wrong[k] = len(parameters)
-        words = f"temperature of {name} in {setup.positions.names[k]}"
+        words = f"temperature error of {name} in {setup.positions.names[k]}"
         add(words, "K", 0.0, measured.standard_uncertainty, size, int(k))
     return Part(
         -1 if axis == "all" else axis,
