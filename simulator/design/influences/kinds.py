@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Union
 from pydantic import Field
 
 from .protocol import InfluenceSettings
+from .reindexing import ReindexingSettings
 from .temperature import TemperatureSettings
 
-INFLUENCES: tuple[type[InfluenceSettings], ...] = (TemperatureSettings,)
+INFLUENCES: tuple[type[InfluenceSettings], ...] = (TemperatureSettings, ReindexingSettings)
 """Settings class of every kind of influence quantity."""
 
 if TYPE_CHECKING:
