@@ -22,7 +22,7 @@ from ..design.objects import (
     Volume,
 )
 from ..design.observations.balls import BallObservations
-from ..design.observations.coordinates import CalibratedCoordinates, no_coordinates
+from ..design.observations.coordinates import CalibratedCoordinates, flat, no_coordinates
 from ..design.observations.distances import CalibratedDistances, no_distances
 from ..design.observations.priors import Priors
 from ..design.observations.radius import RadiusCalibration
@@ -91,7 +91,13 @@ def lay_out(experiment: Experiment) -> Design:
         np.repeat(np.arange(len(artefacts)), sizes),
         balls,
     )
+    across = _across(experiment, rotations, position_artefact)
     held = _held(laid, position_artefact, rotations, of_balls)
+    if across is not None:
+        read = np.flatnonzero(across >= 0)
+        # Nothing is read of a shift across the plane and, of what is in it, of tilts.
+        held[read, across[read]] = True
+        held[read, d:] |= np.arange(d) != across[read][:, None]
     # A pivot has a place; how the bar turns about it is what the readings say.
     held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     priors = _priors(experiment, held, len(model.parameters))
@@ -106,7 +112,12 @@ def lay_out(experiment: Experiment) -> Design:
         Artefacts(tuple(artefacts), is_plate, is_gauge),
         laid,
         Positions(
-            tuple(place.name for place in places), position_artefact, rotations, origins, held
+            tuple(place.name for place in places),
+            position_artefact,
+            rotations,
+            origins,
+            held,
+            across,
         ),
         readings,
         (distances, coordinates, lengths, priors, *others, *_stars(experiment)),
@@ -161,6 +172,19 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
         np.array([p.value for p in given], float),
         np.array([p.standard_uncertainty for p in given], float),
     )
+
+
+def _across(
+    experiment: Experiment, rotations: Array, position_artefact: NDArray[np.int64]
+) -> NDArray[np.int64] | None:
+    """The machine's axis (k,) across artefacts that are read in their plane, -1 for others; None
+    where there are no such artefacts.
+    """
+    in_plane = [one.reads == "in plane" for one in experiment.artefacts.values()]
+    if not any(in_plane):
+        return None
+    axis = np.abs(rotations[:, :, -1]).argmax(axis=1)
+    return np.where(np.array(in_plane)[position_artefact], axis, -1)
 
 
 def _stars(experiment: Experiment) -> list[Stars]:
@@ -218,6 +242,11 @@ def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallOb
         if experiment.artefacts[item.artefact].role == "plate":
             one = item.observed(int(first_ball[item.artefact]))
             parts.setdefault(type(one), []).append(one)
+    for name, artefact in experiment.artefacts.items():
+        if artefact.flatness is not None:
+            parts[CalibratedCoordinates].append(
+                flat(experiment.layouts[name], int(first_ball[name]), artefact.flatness)
+            )
     return [kind.joined(own) for kind, own in parts.items()]
 
 

@@ -78,6 +78,10 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
             problems.add(where, text)
         elif not twins:
             artefacts[name], layouts[name] = listed, layout
+        if listed.reads == "in plane":
+            text = "what is read in its plane is a plate in space; remove it, and flatness"
+            if listed.role != "plate" or dimension == 2:
+                problems.add((*steps, "reads"), text)
         if listed.axes is not None:
             _check_axes(listed, layout, (*steps, "axes"), dimension, problems)
     return References(
