@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..design.arrays import Design
-from ..design.influences.protocol import InfluenceSettings, Setup
+from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
 from .model import Experiment, Position
@@ -45,7 +45,7 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
         return design
     order = np.arange(len(design.readings), dtype=float)
     readings = replace(design.readings, beside={"order": order})
-    setup = Setup(
+    parts = DesignParts(
         design.machine,
         design.probes,
         design.artefacts,
@@ -53,7 +53,7 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
         design.positions,
         readings,
     )
-    influences = tuple(one.influence(setup) for one in experiment.influences)
+    influences = tuple(one.influence(parts) for one in experiment.influences)
     disturbed = replace(design, readings=readings, influences=influences)
     parameters = disturbed.influence_parameters
     known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Union
 from pydantic import Field
 
 from .protocol import InfluenceSettings
-from .temperature import TemperatureSettings
+from .temperature import TemperaturesSettings
 
-INFLUENCES: tuple[type[InfluenceSettings], ...] = (TemperatureSettings,)
+INFLUENCES: tuple[type[InfluenceSettings], ...] = (
+    # In the order of the documentation.
+    TemperaturesSettings,
+)
 """Settings class of every kind of influence quantity."""
 
 if TYPE_CHECKING:
