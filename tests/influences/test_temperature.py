@@ -338,8 +338,7 @@ def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
     outcome = trials(drawn, 1024).outcome
     assert outcome is not None and not outcome.failed
     for one in outcome.comparisons.values():
-        ratio = one.spread_ratio
-        assert abs(ratio.value - 1.0) < 4.0 * ratio.standard_error
+        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
 
 
 UNKNOWN = {
