@@ -236,7 +236,7 @@ def campaign(design: Design, generator: np.random.Generator) -> tuple[Design, St
 @dataclass(frozen=True)
 class Shares:
     """Share of distances within 1.96 uncertainties, root mean square of their errors in
-    uncertainties, and share of fits whose S^2 is beyond its 95 % limit.
+    uncertainties, and share of fits that would warn of S^2: one in a thousand does by chance.
     """
 
     within: dict[str, float]
@@ -258,7 +258,7 @@ def coverage(experiment: Experiment, told: Design, count: int) -> Shares:
         at = linearised_fit(one, solution)
         noticed += int(
             solution.factor.sum_of_squares
-            > chi2.isf(0.05, one.observation_count - one.parameter_count)
+            > chi2.isf(0.001, one.observation_count - one.parameter_count)
         )
         for symbol, errors in ratios.items():
             (functions,) = QUANTITIES[symbol].functions(one, at.layout)
@@ -308,7 +308,7 @@ def assert_covered(found: Shares, count: int) -> None:
     for symbol in ("U5", "U6"):
         assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
         assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
-    assert found.noticed < 0.05 + 4.0 * np.sqrt(0.95 * 0.05 / count)
+    assert found.noticed < 0.001 + 6.0 * np.sqrt(0.001 / count)
 
 
 def test_declared_temperatures_are_covered(drawn: Experiment) -> None:
