@@ -152,7 +152,7 @@ def check(
     >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
     ('goal not met: average U6 at most 0.1 µm; average U6 0.1426 µm',)
     """
-    from .cli.check_files import Wanted, checked_design
+    from .planning.repair.checked_files import Wanted, checked_design
     from .planning.requirements.goals import parse_goal
     from .simulator.experiment.load import with_pool
 
