@@ -12,6 +12,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
+from ballplate.cli import main
 from ballplate.estimators.estimator_choice import fit_readings
 from ballplate.montecarlo.experiments import trials
 from ballplate.rank.verdict import verdict
@@ -517,3 +518,18 @@ def test_a_plan_knows_what_temperatures_leave(tmp_path: Path) -> None:
     (functions,) = QUANTITIES["U6"].functions(design, at.layout)
     expected = at.uncertainty(linear_functions(at, functions)).mean()
     assert plan.to_dict()["value"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_file_of_a_plan_has_temperatures_of_its_positions(tmp_path: Path) -> None:
+    file_with(tmp_path, [STATED])
+    told = yaml.safe_load((tmp_path / "file.yaml").read_text(encoding="utf-8"))
+    told["pool"] = {"candidates": told.pop("positions")}
+    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
+    command = ["plan", str(tmp_path / "pool.yaml"), "--positions", "3", "-q"]
+    main([*command, "-o", str(tmp_path / "chosen.yaml")])
+    (chosen,) = load(tmp_path / "chosen.yaml")
+    names = [one.name for one in chosen.positions]
+    (item,) = yaml.safe_load((tmp_path / "chosen.yaml").read_text(encoding="utf-8"))["influences"]
+    assert item.get("positions", {}) == {
+        name: at for name, at in STATED["positions"].items() if name in names
+    }
