@@ -481,6 +481,19 @@ def test_length_standards_are_refused(tmp_path: Path) -> None:
         load(tmp_path / "bar.yaml")
 
 
+def test_more_parameters_than_there_is_room_for_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment = file_with(tmp_path, [STATED])
+    design = lay_out(experiment)
+    shared = len(linearise(design).layout)
+    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared)
+    lay_out(experiment)
+    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared - 1)
+    with pytest.raises(ExperimentError, match=rf"their 16 parameters make {shared} besides"):
+        lay_out(experiment)
+
+
 def test_other_estimators_refuse(drawn: Experiment) -> None:
     simulated = simulated_readings(drawn)
     observed = observe(simulated.design, simulated.readings, simulated.x)
