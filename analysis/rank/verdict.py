@@ -18,7 +18,6 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
-from ..presentation.formatting import amount_of
 from .canonical import elementary_mixture, principal_directions
 from .missing_bars import reasons, relative_changes
 
@@ -516,5 +515,5 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    amount, shown = amount_of(value, unit)
-    return f"{printable(amount):.3g} {shown}"
+    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}[unit]
+    return f"{printable(value * 1e6):.3g} {shown}"

@@ -70,10 +70,11 @@ def read_table(
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
     unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are
-    ``absent``; those of ``units`` are no lengths and have units of their own; ``defaults`` tell what
-    required columns of text say where they are missing; lengths of columns ``empty`` may be left
-    out in some rows and then are NaN. Empty lines and lines that begin with # are skipped. Messages about rows are added to ``problems`` if
-    it is given, so that the caller can say more at once; a length that is wrong is then NaN.
+    ``absent``; those of ``units`` are no lengths and have units of their own; ``defaults`` tell
+    what required columns of text say where they are missing; lengths in columns ``empty`` are NaN
+    where their cells are empty. Empty lines and lines that begin with # are skipped. Messages about
+    rows are added to ``problems`` if it is given, so that the caller can say more at once; a length
+    that is wrong is then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
         a number, there are no rows; all problems of the file at once.

@@ -95,8 +95,9 @@ def read_readings(
     The probe's column may be left out where there is one probe only. An optional column u, with a
     unit as in u_um, states the standard uncertainty of each co-ordinate of a reading; without it a
     reading has the uncertainty that the design plans for it, and one that is not planned the
-    machine's repeatability. Influence quantities have further columns. A reading stands in the file no more often than the design plans it;
-    one that is not planned, once. Unless `every_ball` has to be read, some may be missing.
+    machine's repeatability. Influence quantities have further columns. A reading stands in the file
+    no more often than the design plans it; one that is not planned, once. Unless `every_ball` has
+    to be read, some may be missing.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.

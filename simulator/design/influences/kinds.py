@@ -12,9 +12,13 @@ from pydantic import Field
 
 from .protocol import InfluenceSettings
 from .reindexing import ReindexingSettings
-from .temperature import TemperatureSettings
+from .temperature import TemperaturesSettings
 
-INFLUENCES: tuple[type[InfluenceSettings], ...] = (TemperatureSettings, ReindexingSettings)
+INFLUENCES: tuple[type[InfluenceSettings], ...] = (
+    # In the order of the documentation.
+    TemperaturesSettings,
+    ReindexingSettings,
+)
 """Settings class of every kind of influence quantity."""
 
 if TYPE_CHECKING:

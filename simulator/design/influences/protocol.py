@@ -42,7 +42,7 @@ class InfluenceParameter:
 
 
 @dataclass(frozen=True)
-class Setup:
+class DesignParts:
     """What an influence quantity is laid out for; `readings` are those planned."""
 
     machine: Machine
@@ -119,6 +119,6 @@ class InfluenceSettings(Settings):
         artefacts.
         """
 
-    def influence(self, setup: Setup) -> Influence:
+    def influence(self, design: DesignParts) -> Influence:
         """The influence quantity in a design."""
         raise NotImplementedError

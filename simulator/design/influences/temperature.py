@@ -1,10 +1,10 @@
 """Temperature of artefacts and scales: both expand from a reference temperature on.
 
-A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x stands for
-x (1 + c s), where b and c are coefficients of thermal expansion and t and s what artefact and
-scales are above the reference temperature. Products of the errors of a coefficient and of a
-temperature are neglected. A file of readings may have temperatures of each reading in place of those
-of its position.
+A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x stands for x (1 +
+c s), where b and c are coefficients of thermal expansion and t and s what artefact and scales are
+above the reference temperature. Products of the errors of a coefficient and of a temperature are
+neglected. A file of readings may have temperatures of each reading in place of those of its
+position.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...inputs.settings import Forms, NonEmpty, Settings, hint
 from ...machines.protocol import Array, Unit
 from ..lookup import References
 from ..objects import Flags
-from .protocol import Disturbed, Influence, InfluenceParameter, InfluenceSettings, Setup
+from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
 
 REFERENCE = 20.0
 
@@ -71,7 +71,7 @@ class PlaceSettings(Settings):
     )
 
 
-class TemperatureSettings(InfluenceSettings):
+class TemperaturesSettings(InfluenceSettings):
     """Temperatures of an artefact and of the machine's scales, and how much these expand."""
 
     kind: Literal["temperature"] = Field(description="temperature of artefact and scales")
@@ -153,18 +153,18 @@ class TemperatureSettings(InfluenceSettings):
                     f"has {len(value)} axes, but the experiment has {references.dimension}",
                 )
 
-    def influence(self, setup: Setup) -> Temperatures:
+    def influence(self, design: DesignParts) -> Temperatures:
         """The temperatures in a design."""
         name = self.artefact or (
-            setup.artefacts.names[0] if len(setup.artefacts.names) == 1 else "the artefacts"
+            design.artefacts.names[0] if len(design.artefacts.names) == 1 else "the artefacts"
         )
-        every = np.arange(len(setup.artefacts.names))
-        chosen = every if self.artefact is None else [setup.artefacts.names.index(self.artefact)]
-        arm = float(np.abs(setup.balls.places).max(initial=0.1))
+        every = np.arange(len(design.artefacts.names))
+        chosen = every if self.artefact is None else [design.artefacts.names.index(self.artefact)]
+        arm = float(np.abs(design.balls.places).max(initial=0.1))
         parts: list[Part] = []
         if self.artefact_expansion is not None and self.artefact_temperature is not None:
-            here = np.isin(setup.positions.artefact, chosen)
-            temperatures = self._at_positions(setup, "artefact", self.artefact_temperature.value)
+            here = np.isin(design.positions.artefact, chosen)
+            temperatures = self._at_positions(design, "artefact", self.artefact_temperature.value)
             parts.append(
                 _part(
                     name,
@@ -173,18 +173,18 @@ class TemperatureSettings(InfluenceSettings):
                     temperatures - self.reference,
                     here,
                     arm,
-                    setup,
+                    design,
                 )
             )
         if self.scale_expansion is not None and self.scale_temperature is not None:
             listed = self.scale_expansion
             per_axis = isinstance(listed, tuple) or self._has_axes()
-            reach = float(np.abs(setup.machine.volume.corners).max())
-            everywhere = np.ones(len(setup.positions.names), bool)
-            for axis in range(setup.machine.dimension) if per_axis else (-1,):
+            reach = float(np.abs(design.machine.volume.corners).max())
+            everywhere = np.ones(len(design.positions.names), bool)
+            for axis in range(design.machine.dimension) if per_axis else (-1,):
                 own = listed[axis] if isinstance(listed, tuple) else listed
                 temperatures = self._at_positions(
-                    setup, "scales", self.scale_temperature.value, axis
+                    design, "scales", self.scale_temperature.value, axis
                 )
                 parts.append(
                     _part(
@@ -194,13 +194,13 @@ class TemperatureSettings(InfluenceSettings):
                         temperatures - self.reference,
                         everywhere,
                         reach,
-                        setup,
+                        design,
                         "all" if axis < 0 else axis,
                         shared=per_axis and not isinstance(listed, tuple) and axis > 0,
                     )
                 )
         return Temperatures(
-            tuple(parts), np.isin(setup.balls.artefact, chosen), float(self.reference)
+            tuple(parts), np.isin(design.balls.artefact, chosen), float(self.reference)
         )
 
     def _has_axes(self) -> bool:
@@ -209,10 +209,12 @@ class TemperatureSettings(InfluenceSettings):
         assert self.scale_temperature is not None
         return any(isinstance(one, tuple) for one in (self.scale_temperature.value, *stated))
 
-    def _at_positions(self, setup: Setup, key: str, otherwise: object, axis: int = 0) -> Array:
+    def _at_positions(
+        self, design: DesignParts, key: str, otherwise: object, axis: int = 0
+    ) -> Array:
         """Temperatures (k,) in all positions, of scales along an axis."""
         listed = [
-            getattr((self.positions or {}).get(name), key, None) for name in setup.positions.names
+            getattr((self.positions or {}).get(name), key, None) for name in design.positions.names
         ]
         chosen = [otherwise if one is None else one for one in listed]
         return np.array([one[axis] if isinstance(one, tuple) else one for one in chosen], float)
@@ -299,7 +301,7 @@ def _part(
     differences: Array,
     here: Flags,
     reach: float,
-    setup: Setup,
+    design: DesignParts,
     axis: int | Literal["all"] = -2,
     shared: bool = False,
 ) -> Part:
@@ -319,7 +321,7 @@ def _part(
     wrong = np.full(len(here), -1)
     for k in np.flatnonzero(here) if measured.standard_uncertainty else ():
         wrong[k] = len(parameters)
-        words = f"temperature error of {name} in {setup.positions.names[k]}"
+        words = f"temperature error of {name} in {design.positions.names[k]}"
         add(words, "K", 0.0, measured.standard_uncertainty, size, int(k))
     return Part(
         -1 if axis == "all" else axis,
