@@ -21,7 +21,7 @@ from ...inputs.quantities import Length
 from ...inputs.settings import NonEmpty
 from ...machines.protocol import Array, Integers
 from ..lookup import References
-from .protocol import Disturbed, Influence, InfluenceParameter, InfluenceSettings, Setup
+from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
 
 
 class ReindexingSettings(InfluenceSettings):
@@ -50,20 +50,20 @@ class ReindexingSettings(InfluenceSettings):
             "is below zero; give it without the sign",
         )
 
-    def influence(self, setup: Setup) -> Reindexing:
+    def influence(self, design: DesignParts) -> Reindexing:
         """The shifts in a design: of every probe in every position that it reads in."""
-        names, d = setup.probes.names, setup.machine.dimension
+        names, d = design.probes.names, design.machine.dimension
         count = len(names)
         chosen = [k for k, name in enumerate(names) if name in (self.probes or names)]
-        turned = np.isin(setup.readings.probe, chosen)
-        key = setup.readings.position[turned] * count + setup.readings.probe[turned]
+        turned = np.isin(design.readings.probe, chosen)
+        key = design.readings.position[turned] * count + design.readings.probe[turned]
         used = np.unique(key)
-        place = np.full(len(setup.positions.names) * count, -1)
+        place = np.full(len(design.positions.names) * count, -1)
         place[used] = np.arange(len(used))
         u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
         parameters = tuple(
             InfluenceParameter(
-                f"re-indexing of {names[k % count]} in {setup.positions.names[k // count]}:"
+                f"re-indexing of {names[k % count]} in {design.positions.names[k // count]}:"
                 f" {letter}",
                 "m",
                 0.0,
