@@ -160,9 +160,8 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
                 free = np.flatnonzero(columns[:, axis] >= 0)
                 by_shared[free, :, columns[free, axis]] = blocks.by_offset[free, :, axis]
         if blocks.by_influence is not None:
-            start = drawn.layout.influences.start
-            places = np.flatnonzero(drawn.columns >= start)
-            by_shared[:, :, places] = blocks.by_influence[:, :, drawn.columns[places] - start]
+            at = drawn.columns - drawn.layout.influences.start
+            by_shared[:, :, np.flatnonzero(at >= 0)] = blocks.by_influence[:, :, at[at >= 0]]
         by_shared *= drawn.scale
         for k in range(first, last):
             if k in lengths:
