@@ -11,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Visit, cheapest, kind_of
+from .short_names import with_short_name
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Step:
     itself, and `start` when its change-over begins, in seconds from the first position that is to
     be read. What is `done` has neither. Of a position that is completed, `whole` has all readings
     and `candidate` those still to be taken. One that was interrupted and is not completed is `left`
-    so.
+    so. `short` is the short name of a position whose name the pool composed.
     """
 
     candidate: Candidate
@@ -46,10 +47,28 @@ class Step:
     done: bool
     whole: Candidate | None = None
     left: bool = False
+    short: str = ""
+
+    @property
+    def position(self) -> Candidate:
+        """The position with all its readings, also those taken already."""
+        return self.whole or self.candidate
 
     @property
     def name(self) -> str:
-        return (self.whole or self.candidate).name
+        return self.short or self.position.name
+
+    @property
+    def description(self) -> str:
+        """What the position is, beside its name; empty where the name says all there is."""
+        item = self.position.item
+        assert isinstance(item, Position)
+        return item.description if self.name == self.position.name else self.position.name
+
+    @property
+    def title(self) -> str:
+        """Name and description."""
+        return f"{self.name}, {self.description}" if self.description else self.name
 
     @property
     def artefact(self) -> str:
@@ -85,6 +104,15 @@ class RunSheet:
         return (*(step.whole or step.candidate for step in steps), *self.calibration)
 
     @property
+    def written(self) -> tuple[Candidate, ...]:
+        """The same under their short names, as an experiment file says them."""
+        named = {
+            step.position.name: with_short_name(step.position, step.name, step.probes)
+            for step in self.steps
+        }
+        return tuple(named.get(one.name, one) for one in self.chosen)
+
+    @property
     def seconds(self) -> float:
         """What is yet to be spent: on positions that are not done, changes between them, and
         calibration.
@@ -104,6 +132,7 @@ def run_sheet(
     done: Sequence[Candidate] = (),
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
+    names: Mapping[str, str] | None = None,
 ) -> RunSheet:
     """The run sheet of chosen candidates: the order that costs least, what is done already first
     and as it was.
@@ -111,13 +140,15 @@ def run_sheet(
     Candidates that are `done` may be among the chosen ones too. They take no time any more, and as
     before any first position nothing is changed before the first that is left. A position that is
     `completed` is that first one, as long as its artefact stands; only its rest takes time. What
-    else is `interrupted` stays as it is.
+    else is `interrupted` stays as it is. `names` are short names by those of candidates.
     """
     again = set() if completed is None else {completed.whole.name}
     before = [one for one in done if isinstance(one.item, Position) and one.name not in again]
-    names = {candidate.name for candidate in before} | again
+    earlier = {candidate.name for candidate in before} | again
     left = {one.name for one in interrupted} - again
-    positions = [one for one in chosen if isinstance(one.item, Position) and one.name not in names]
+    positions = [
+        one for one in chosen if isinstance(one.item, Position) and one.name not in earlier
+    ]
     sequence = ordered(positions, changes, before, None if completed is None else completed.rest)
     steps: list[Step] = []
     elapsed = 0.0
@@ -147,6 +178,7 @@ def run_sheet(
                 is_done,
                 whole,
                 is_left,
+                (names or {}).get((whole or candidate).name, ""),
             )
         )
         elapsed += change + seconds

@@ -44,15 +44,15 @@ class Campaign(Selection, Result):
     def sheet(self) -> RunSheet:
         """The choice in the order in which it is to be read."""
         return run_sheet(
-            self.chosen, self.pool.changes, self.done, self.completed, self.interrupted
+            self.chosen, self.pool.changes, self.done, self.completed, self.interrupted, self.names
         )
 
     @property
     def chosen_experiment(self) -> Experiment:
         """The experiment with the chosen positions and certificates alone, in the order of the run
-        sheet.
+        sheet and under its short names.
         """
-        return with_chosen(self.experiment, self.sheet.chosen)
+        return with_chosen(self.experiment, self.sheet.written)
 
     def to_yaml(self, folder: str | Path = ".") -> str:
         """The choice as the text of an experiment file that is to stand in a folder.
@@ -64,7 +64,7 @@ class Campaign(Selection, Result):
         header += f" than {self.budget}."
         deficiency = self.left_open or None
         return experiment_text(
-            self.experiment, self.sheet.chosen, header, Path(folder), None, deficiency
+            self.experiment, self.sheet.written, header, Path(folder), None, deficiency
         )
 
     def sheet_text(self, form: str = ".txt") -> str:
@@ -157,7 +157,7 @@ def _interrupted(campaign: Campaign) -> list[str]:
     lines = []
     for one in campaign.interrupted:
         text = (
-            f"{one.name} was interrupted after {one.readings}"
+            f"{campaign.title_of(one)} was interrupted after {one.readings}"
             f" reading{'' if one.readings == 1 else 's'}"
         )
         if campaign.completed is not None and campaign.completed.whole.name == one.name:
@@ -219,7 +219,10 @@ def _spent(spent: Spent) -> list[str]:
 
 def _gain_table(campaign: Campaign) -> list[str]:
     rows = [["", f"{campaign.criterion} without it", "with it", "minutes"]]
-    rows += [["chosen: " + gain.candidate.name, *_gain(campaign, gain)] for gain in campaign.gains]
+    rows += [
+        ["chosen: " + campaign.title_of(gain.candidate), *_gain(campaign, gain)]
+        for gain in campaign.gains
+    ]
     rows += [
         ["left out: " + gain.candidate.name, *_gain(campaign, gain)]
         for gain in campaign.left_out[:TOLD]
@@ -262,6 +265,7 @@ def _data(campaign: Campaign) -> dict[str, Any]:
         "excluded": campaign.excluded,
         "spent": asdict(campaign.spent),
         "chosen": [candidate.name for candidate in campaign.chosen],
+        "names": dict(campaign.names),
         "done": [candidate.name for candidate in campaign.done],
         "interrupted": [
             {"name": one.name, "readings": one.readings} for one in campaign.interrupted
