@@ -50,7 +50,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
     parts = [
         (
-            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img"'
+            f'<svg viewBox="0 {top - 18:.1f} {SIZE:g} {height + 38:.1f}" role="img"'
             f' aria-label="{escaped(candidate.name)}" font-family="sans-serif" font-size="10">'
         ),
         (

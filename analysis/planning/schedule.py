@@ -87,10 +87,13 @@ class Step:
 class RunSheet:
     """Positions in the order to read them, those done first, and items of calibration with their
     price in seconds.
+
+    Where no times are stated it is not `timed`, and all times are zero.
     """
 
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
+    timed: bool = True
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -156,9 +159,9 @@ def run_sheet(
         is_done = k < len(before)
         change, words = 0.0, ""
         if k > len(before):
-            change, words = _change(sequence[k - 1], sequence[k], changes)
+            change, words = change_over(sequence[k - 1], sequence[k], changes)
         seconds = 0.0 if is_done else candidate.seconds
-        place, balls, whole = _place(candidate), _balls(candidate), None
+        place, balls, whole = place_words(candidate), ball_words(candidate), None
         if completed is not None and candidate is completed.rest:
             whole = completed.whole
             place = f"as it stands: {place}"
@@ -187,11 +190,12 @@ def run_sheet(
     )
 
 
-def _change(
+def change_over(
     one: tuple[Candidate, tuple[str, ...]],
     other: tuple[Candidate, tuple[str, ...]],
     changes: ChangeTimes,
 ) -> tuple[float, str]:
+    """Seconds of the change from one position to another, and what is changed in words."""
     before, after = kind_of(one[0]), kind_of(other[0])
     words = []
     if before.artefact != after.artefact:
@@ -205,7 +209,7 @@ def _change(
     return seconds, ", ".join(words)
 
 
-def _place(candidate: Candidate) -> str:
+def place_words(candidate: Candidate) -> str:
     """How the artefact is set up, in words; lengths are those of the file."""
     said: Mapping[str, Any] = candidate.settings
     if said.get("pose") is not None:
@@ -213,9 +217,11 @@ def _place(candidate: Candidate) -> str:
         rotation = pose.get("rotation")
         turned = "not turned"
         if rotation is not None:
-            one = isinstance(rotation, str)
+            several = isinstance(rotation, list | tuple)
             turned = (
-                f"turned by {rotation}" if one else f"turned by {', '.join(rotation)} about x, y, z"
+                f"turned by {', '.join(map(str, rotation))} about x, y, z"
+                if several
+                else f"turned by {rotation}"
             )
         return (
             f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))},"
@@ -242,7 +248,7 @@ def _at(lengths: Mapping[str, str]) -> str:
     return ", ".join(f"{axis} = {lengths[axis]}" for axis in sorted(lengths))
 
 
-def _balls(candidate: Candidate) -> str:
+def ball_words(candidate: Candidate) -> str:
     """Which balls are read, in words; with several groups of readings, by which probes."""
     assert isinstance(candidate.item, Position)
     groups = candidate.item.readings

@@ -19,7 +19,8 @@ from .criteria import DESCRIPTIONS
 from .done import base_name
 from .experiment_file import experiment_text
 from .schedule import RunSheet, run_sheet
-from .sheet_forms import sheet_csv, sheet_data, sheet_lines, sheet_markdown, sheet_page
+from .sheet import Sheet
+from .sheet_forms import sheet_data, sheet_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,16 +73,12 @@ class Campaign(Selection, Result):
 
         :raises ValueError: another form.
         """
-        sheet, experiment = self.sheet, self.experiment
-        if form == ".html":
-            return sheet_page(sheet, experiment, experiment.title)
-        if form == ".md":
-            return sheet_markdown(sheet, experiment.title)
-        if form == ".csv":
-            return sheet_csv(sheet)
-        if form == ".txt":
-            return "\n".join([experiment.title, "", *sheet_lines(sheet), ""])
-        raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
+        return self.to_print.text(form)
+
+    @property
+    def to_print(self) -> Sheet:
+        """The run sheet with what it is printed with: the table to fill in, and the points."""
+        return Sheet(self.experiment, self.sheet)
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
