@@ -48,10 +48,15 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
     )
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
+    # The name goes where there are no balls, and where it is outside the volume other words make
+    # room for it.
+    y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
+    above, below = (11 if y < top + 4 else 0), (11 if y > top + height else 0)
     parts = [
         (
-            f'<svg viewBox="0 {top - 18:.1f} {SIZE:g} {height + 38:.1f}" role="img"'
-            f' aria-label="{escaped(candidate.name)}" font-family="sans-serif" font-size="10">'
+            f'<svg viewBox="0 {top - 18 - above:.1f} {SIZE:g} {height + 38 + above + below:.1f}"'
+            f' role="img" aria-label="{escaped(candidate.name)}" font-family="sans-serif"'
+            ' font-size="10">'
         ),
         (
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
@@ -69,8 +74,6 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
             f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}"'
             ' stroke="#222"/>'
         )
-    # The name goes where there are no balls.
-    y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
     label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
     parts.append(
         f'{label} stroke="white" stroke-width="3"'
@@ -78,7 +81,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     )
     arrow = f"← {across}" if to_left else f"{across} →"
     parts.append(
-        f'<text x="{SIZE / 2:g}" y="{top + height + 13:.1f}" text-anchor="middle"'
+        f'<text x="{SIZE / 2:g}" y="{top + height + 13 + below:.1f}" text-anchor="middle"'
         f' fill="#555">{arrow}</text>'
     )
     x, y = left - 6, top + height / 2
@@ -88,7 +91,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     )
     seen = f"seen from +{plane}" if d == 3 else "seen from above"
     parts.append(
-        f'<text x="{SIZE / 2:g}" y="{top - 6:.1f}" text-anchor="middle"'
+        f'<text x="{SIZE / 2:g}" y="{top - 6 - above:.1f}" text-anchor="middle"'
         f' fill="#555">{seen}</text></svg>'
     )
     return "".join(parts)

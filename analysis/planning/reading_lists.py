@@ -32,14 +32,12 @@ AROUND, RAISED = 4, np.radians(25.0)
 class PlannedReading:
     """One reading: where the ball's centre is expected (d,) in machine co-ordinates, in metres.
 
-    `repeat` counts from 1 the readings of the ball there with the probe; `feature` is a name for
-    the program of a machine, position_ball_probe, and the number of the repeat from the second on.
+    `feature` is a name for the program of a machine, position_ball_probe, the same for all repeats.
     """
 
     position: str
     ball: str
     probe: str
-    repeat: int
     feature: str
     centre: Array
 
@@ -65,44 +63,31 @@ def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedRea
     :raises ExperimentError: two of them would have the same name as features.
     """
     found: list[PlannedReading] = []
-    meant: dict[str, tuple[str, str, str, int]] = {}
+    meant: dict[str, tuple[str, str, str]] = {}
     for step in sheet.steps:
         item = step.candidate.item
         assert isinstance(item, Position)
         centres = ball_coordinates(item.pose, experiment.layouts[item.artefact])
         for probe, balls in () if step.done else sequence(step):
-            count: dict[str, int] = {}
             for ball, k, repeats in balls:
-                for _ in range(repeats):
-                    count[ball] = count.get(ball, 0) + 1
-                    key = (step.name, ball, probe, count[ball])
-                    name = feature_name(*key)
-                    other = meant.setdefault(name.casefold(), key)
-                    if other != key:
-                        both = " and ".join(f'"{", ".join(one[:3])}"' for one in (other, key))
-                        text = f"{both} would both be the feature {name}; rename one of them"
-                        raise refused(experiment.source, text, "positions")
-                    found.append(
-                        PlannedReading(
-                            step.name,
-                            ball,
-                            probe,
-                            count[ball],
-                            name,
-                            centres[k, : experiment.dimension],
-                        )
-                    )
+                key = step.name, ball, probe
+                name = feature_name(*key)
+                other = meant.setdefault(name.casefold(), key)
+                if other != key:
+                    both = " and ".join(f'"{", ".join(one)}"' for one in (other, key))
+                    text = f"{both} would both be the feature {name}; rename one of them"
+                    raise refused(experiment.source, text, "positions")
+                found += [PlannedReading(*key, name, centres[k, : experiment.dimension])] * repeats
     return found
 
 
-def feature_name(position: str, ball: str, probe: str, repeat: int = 1) -> str:
+def feature_name(position: str, ball: str, probe: str) -> str:
     """The name of a reading's feature.
 
-    >>> feature_name("P1", "r1c2", "down"), feature_name("flat low", "3", "A0_B90", 2)
-    ('P1_r1c2_down', 'flat-low_3_A0-B90_2')
+    >>> feature_name("P1", "r1c2", "down"), feature_name("flat low", "3", "A0_B90")
+    ('P1_r1c2_down', 'flat-low_3_A0-B90')
     """
-    parts = [UNUSUAL.sub("-", part) for part in (position, ball, probe)]
-    return "_".join([*parts, *([str(repeat)] if repeat > 1 else [])])
+    return "_".join(UNUSUAL.sub("-", part) for part in (position, ball, probe))
 
 
 def template_csv(readings: Sequence[PlannedReading], dimension: int) -> str:
@@ -142,16 +127,20 @@ def points_dmis(
     lines = [
         f"DMISMN/'{said}',05.2",
         "UNITS/MM,ANGDEC",
+        "D(MCS)=DATSET/MCS",
+        "MODE/PROG,MAN",
         "$$ Centres and points in machine co-ordinates, where the plan has the artefacts.",
         "$$ No moves between balls and no alignment: add both before this runs anywhere.",
     ]
-    selected = ""
+    selected, defined = "", set[str]()
     for one in readings:
         if one.probe != selected:
             selected = one.probe
             lines.append(f"SNSLCT/SA({UNUSUAL.sub('-', selected)})")
-        centre = _numbers(1e3 * one.centre)
-        lines.append(f"F({one.feature})=FEAT/SPHERE,OUTER,CART,{centre},{1e3 * diameter:.4f}")
+        if one.feature not in defined:
+            defined.add(one.feature)
+            sphere = f"{_numbers(1e3 * one.centre)},{1e3 * diameter:.4f}"
+            lines.append(f"F({one.feature})=FEAT/SPHERE,OUTER,CART,{sphere}")
         normals = _normals(styli[one.probe])
         lines.append(f"MEAS/SPHERE,F({one.feature}),{len(normals)}")
         for normal in normals:

@@ -18,6 +18,9 @@ from .drawings import escaped
 # Sizes in the drawings' own units, of which a page has about 700 from side to side.
 PLATE, VOLUME, MARGIN = 340.0, 660.0, 34.0
 
+# Room for a ball with its name, in an artefact no larger than this.
+ROOM, LARGEST = 42.0, 620.0
+
 # Lines of positions, so that nothing depends on colour.
 PATTERNS = ("", "7 3", "2 3", "7 3 2 3", "12 3", "4 2 1 2")
 
@@ -34,7 +37,10 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
     """
     points = np.array(layout.coordinates)[:, :2]
     lower, size = points.min(axis=0), np.ptp(points, axis=0)
-    scale = (PLATE - 2 * MARGIN) / (float(size.max()) or 1.0)
+    across = float(size.max())
+    # Of many balls, more room.
+    wanted = ROOM * (across / _pitch(points) + 1.0) if across else PLATE
+    scale = (min(max(PLATE, wanted), LARGEST) - 2 * MARGIN) / (across or 1.0)
     width, height = scale * size + 2 * MARGIN
     drawn = np.column_stack(
         [
@@ -42,7 +48,7 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
             height - MARGIN - scale * (points[:, 1] - lower[1]),
         ]
     )
-    pitch = _pitch(drawn)
+    pitch = _pitch(drawn) if across else PLATE
     longest = max(map(len, layout.names))
     letter = min(11.0, 1.5 * pitch / max(longest, 2))
     named = set(range(len(points)))
@@ -50,7 +56,7 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
         letter, named = 9.0, {*map(int, layout.corner_set or ()), int(order[0]) if order else 0}
     radius = min(4.0, 0.2 * pitch)
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in drawn[list(order)])
-    edge = min(0.45 * MARGIN, 0.6 * pitch)
+    edge = min(0.62 * MARGIN, 0.6 * pitch)
     parts = [
         f'<svg class="artefact" viewBox="0 0 {width:.0f} {height + 16:.0f}"'
         f' style="width:{width:.0f}px" role="img" aria-label="{escaped(name)}: its balls and the'
@@ -82,7 +88,7 @@ def _pitch(points: Array) -> float:
     some = points[:400]
     apart = np.linalg.norm(some[:, None] - some[None], axis=2)
     apart = apart[apart > 1e-9]
-    return float(apart.min()) if len(apart) else PLATE
+    return float(apart.min()) if len(apart) else 1.0
 
 
 def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
@@ -102,7 +108,8 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
         return np.column_stack([MARGIN + moved[:, 0], height - MARGIN - moved[:, 1]])
 
     parts = [
-        f'<svg class="volume" viewBox="0 0 {width:.0f} {height:.0f}" role="img"'
+        f'<svg class="volume" viewBox="0 0 {width:.0f} {height:.0f}"'
+        f' style="width:{width:.0f}px" role="img"'
         ' aria-label="The volume of the machine with all positions" font-family="sans-serif">'
     ]
     for edge, is_hidden in zip(drawn.box.edges, drawn.box.hidden, strict=True):
@@ -185,5 +192,6 @@ def _line(ends: Array, colour: str, more: str = "") -> str:
 def _text(x: float, y: float, text: str, size: float, colour: str = INK, more: str = "") -> str:
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:.1f}" text-anchor="middle"'
-        f' fill="{colour}"{more}>{escaped(text)}</text>'
+        f' fill="{colour}" stroke="white" stroke-width="2.5" paint-order="stroke"{more}>'
+        f"{escaped(text)}</text>"
     )

@@ -80,8 +80,10 @@ def degrees(angle: float) -> str:
 def stylus_rows(sheet: RunSheet, experiment: Experiment) -> list[list[str]]:
     """A table of the styli with a line of headings; offsets in millimetres."""
     axes = [f"{axis}, mm" for axis in "xyz"[: experiment.dimension]]
-    rows = [["probe", *axes, "from -z", "from +x"]]
+    has_angles = experiment.dimension == 3
+    rows = [["probe", *axes, *(["from -z", "from +x"] if has_angles else [])]]
     for one in styli(sheet, experiment):
         lengths = [f"{1e3 * length:.6g}" for length in one.offset]
-        rows.append([one.name, *lengths, degrees(one.from_down), degrees(one.around)])
+        angles = [degrees(one.from_down), degrees(one.around)] if has_angles else []
+        rows.append([one.name, *lengths, *angles])
     return rows

@@ -40,10 +40,8 @@ tr { break-inside: avoid; }
 figure { margin: 0; max-width: 100%; break-inside: avoid; }
 figcaption { color: #555; }
 svg { display: block; max-width: 100%; height: auto; }
-svg.volume { width: 660px; }
 .step { border-top: 2px solid #222; padding: 0.6em 0 0.8em; margin-top: 1.2em;
   break-inside: avoid; }
-.step.long { break-inside: auto; }
 .step.done { color: #777; }
 .head { display: flex; gap: 0.8em; align-items: baseline; break-after: avoid; }
 .head h2 { margin: 0; flex: 1; min-width: 0; }
@@ -73,12 +71,9 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
   .wide { overflow: visible; }
   .change { background: none; }
   .words { display: flex; }
-  svg.volume { width: 150mm; }
+  svg.volume { max-height: 112mm; }
 }
 """
-
-# Readings of a position that fit on a page; one with more may be broken.
-PAGEFUL = 150
 
 
 def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
@@ -222,8 +217,7 @@ def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> s
     )
     rows = set_up_rows(step, experiment)
     items = "".join(f"<dt>{key}</dt><dd>{escaped(value)}</dd>" for key, value in rows)
-    is_long = step.readings > PAGEFUL
-    kind = f"step{' done' if step.done else ''}{' long' if is_long else ''}"
+    kind = "step done" if step.done else "step"
     lists = "" if step.done else _readings(step) + _fields(dict.fromkeys(NOTES, ""))
     return (
         f'<section class="{kind}"><div class="head">'

@@ -22,11 +22,11 @@ def short_names(
     used = {name.casefold() for name in (*taken, *known.values())}
     found: dict[str, str] = {}
     number = 0
-    for candidate in order:
-        number += 1
+    for place, candidate in enumerate(order, 1):
         if candidate.name in known:
             found[candidate.name] = known[candidate.name]
         elif is_composed(candidate):
+            number = max(number + 1, place)
             while f"p{number}" in used:
                 number += 1
             found[candidate.name] = f"P{number}"
