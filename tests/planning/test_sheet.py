@@ -287,10 +287,18 @@ def test_a_template_that_is_filled_in_fits_as_the_readings_do(
     assert main(["simulate", file, "-o", str(readings), "--seed", "3"]) == 0
     assert main(["sheet", file, "--readings", str(table)]) == 0
     capsys.readouterr()
-    # As it was printed it has no readings, and fit says of which cells.
+    # As it was printed it has no readings, which fit says once.
     assert main(["fit", file, str(table)]) == 3
-    assert re.match(r".*table\.csv:2:.*no x; write a number", capsys.readouterr().err)
+    (said_once,) = capsys.readouterr().err.splitlines()
+    count = len(table.read_text().splitlines()) - 1
+    assert re.search(rf"table\.csv:2:1: .* x, y, z are empty in all {count} rows", said_once)
     table.write_text(filled(table.read_text(), readings.read_text()))
+    # With one row left empty it says which.
+    lines = table.read_text().splitlines()
+    gap = [*lines[:4], re.sub(r"(,[-0-9.e]+)+$", ",,,", lines[4]), *lines[5:], ""]
+    (tmp_path / "gap.csv").write_text("\n".join(gap))
+    assert main(["fit", file, str(tmp_path / "gap.csv")]) == 3
+    assert {one.split(":")[1] for one in capsys.readouterr().err.splitlines()} == {"5"}
     said = []
     for path in (readings, table):
         assert main(["fit", file, str(path), "--json"]) in (0, 1)
