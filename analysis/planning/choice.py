@@ -11,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
+from .done import REST
 from .schedule import Completion
 
 
@@ -84,8 +85,11 @@ class Selection:
 
     def title_of(self, candidate: Candidate) -> str:
         """The name of a candidate, after its short name if it has one."""
-        short = self.names.get(candidate.name, candidate.name)
-        return candidate.name if short == candidate.name else f"{short}, {candidate.name}"
+        rest, name = "", candidate.name
+        if name.startswith(REST):
+            rest, name = REST, name.removeprefix(REST)
+        short = self.names.get(name, name)
+        return candidate.name if short == name else f"{rest}{short}, {name}"
 
     @property
     def efficiency(self) -> float:
