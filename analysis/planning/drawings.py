@@ -10,6 +10,8 @@ from ballplate.simulator.geometry.positions import AXIS_INDEX, ball_coordinates
 from ballplate.simulator.inputs.messages import in_one_line
 
 SIZE, MARGIN = 170.0, 22.0
+# A name longer than this is told by a number instead.
+LONGEST_NAME = 9
 # Of more balls only those at the corners are drawn.
 MOST_BALLS = 400
 # Axis across the drawing, whether it runs to the left, and axis upwards, as seen from the end of
@@ -52,6 +54,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     # room for it.
     y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
     above, below = (11 if y < top + 4 else 0), (11 if y > top + height else 0)
+    name = layout.names[0] if len(layout.names[0]) <= LONGEST_NAME else "1"
     parts = [
         (
             f'<svg viewBox="0 {top - 18 - above:.1f} {SIZE:g} {height + 38 + above + below:.1f}"'
@@ -76,8 +79,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         )
     label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
     parts.append(
-        f'{label} stroke="white" stroke-width="3"'
-        f' paint-order="stroke">{escaped(layout.names[0])}</text>'
+        f'{label} stroke="white" stroke-width="3" paint-order="stroke">{escaped(name)}</text>'
     )
     arrow = f"← {across}" if to_left else f"{across} →"
     parts.append(

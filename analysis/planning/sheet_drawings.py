@@ -13,7 +13,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from ..presentation.scene import Box, DrawnPosition, scene
 from ..presentation.svg import SERIES
-from .drawings import escaped
+from .drawings import LONGEST_NAME, escaped
 
 # Sizes in the drawings' own units, of which a page has about 700 from side to side.
 PLATE, VOLUME, MARGIN = 340.0, 660.0, 34.0
@@ -24,16 +24,14 @@ ROOM, LARGEST = 42.0, 620.0
 # Lines of positions, so that nothing depends on colour.
 PATTERNS = ("", "7 3", "2 3", "7 3 2 3", "12 3", "4 2 1 2")
 
-# A name longer than this is told by the position's number instead.
-LONGEST_NAME = 9
-
 INK, GREY = "#222", "#777"
 
 
 def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str:
     """An artefact seen against its normal, with its balls named and the path of the reading order.
 
-    Where balls are too close for their names, those at the corners and the first have one.
+    Where balls are too close for their names, those at the corners and the first have one; names
+    that are too long are told by numbers.
     """
     points = np.array(layout.coordinates)[:, :2]
     lower, size = points.min(axis=0), np.ptp(points, axis=0)
@@ -49,7 +47,9 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
         ]
     )
     pitch = _pitch(drawn) if across else PLATE
-    longest = max(map(len, layout.names))
+    is_long = max(map(len, layout.names)) > LONGEST_NAME
+    names = [str(k) for k in range(1, len(points) + 1)] if is_long else layout.names
+    longest = max(map(len, names))
     letter = min(11.0, 1.5 * pitch / max(longest, 2))
     named = set(range(len(points)))
     if letter < 5.5:
@@ -72,8 +72,7 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{fill}" stroke="{INK}"/>'
         )
     parts += [
-        _text(drawn[k, 0], drawn[k, 1] - radius - 2.5, layout.names[k], letter)
-        for k in sorted(named)
+        _text(drawn[k, 0], drawn[k, 1] - radius - 2.5, names[k], letter) for k in sorted(named)
     ]
     parts.append(_text(width / 2, height + 4, "x of the artefact →", 10.0, GREY))
     x, y = 10.0, height / 2

@@ -5,11 +5,12 @@ from __future__ import annotations
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.geometry.ball_layouts import BallLayout
 
-from .drawings import escaped, place_drawing
+from .drawings import LONGEST_NAME, escaped, place_drawing
 from .reading_lists import sequence
 from .schedule import RunSheet, Step
-from .sheet_drawings import LONGEST_NAME, artefact_drawing, volume_drawing
+from .sheet_drawings import artefact_drawing, volume_drawing
 from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows
 from .sheet_words import count, price, set_up_rows, summary, times
 
@@ -32,7 +33,7 @@ th { text-align: left; font-weight: normal; color: #555; }
 td, th { padding: 0.2em 0.8em 0.2em 0; border-bottom: 1px solid #ddd; vertical-align: top;
   overflow-wrap: break-word; }
 td.number, th.number { text-align: right; white-space: nowrap; }
-td.name { white-space: nowrap; font-weight: bold; }
+td.name { font-weight: bold; }
 th { white-space: nowrap; }
 tr { break-inside: avoid; }
 .wide { overflow-x: auto; }
@@ -59,8 +60,8 @@ svg { display: block; max-width: 100%; height: auto; }
 .words svg { flex: none; width: 170px; }
 .probe { margin: 0.5em 0 0.1em; break-after: avoid; }
 ol.balls { list-style: none; margin: 0; padding: 0; display: grid;
-  grid-template-columns: repeat(auto-fill, minmax(var(--width), 1fr)); gap: 0.15em 0.6em; }
-ol.balls li { white-space: nowrap; }
+  grid-template-columns: repeat(auto-fill, minmax(min(100%, var(--width)), 1fr));
+  gap: 0.15em 0.6em; }
 ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px solid #555;
   margin-right: 0.25em; vertical-align: -0.05em; }
 @media (max-width: 40em) { .words { display: block; } }
@@ -185,7 +186,8 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
         figures.append(
             f"<figure>{artefact_drawing(name, experiment.layouts[name], order)}"
             f"<figcaption>{escaped(name)}, seen from the side that its z points to; the line is the"
-            " order of reading, from the dark ball on</figcaption></figure>"
+            f" order of reading, from the dark ball on{_numbered(experiment.layouts[name])}"
+            "</figcaption></figure>"
         )
     pictures = (
         f'<h2>Artefacts</h2><div class="pictures">{"".join(figures)}</div>' if figures else ""
@@ -205,6 +207,12 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
     )
 
 
+def _numbered(layout: BallLayout) -> str:
+    """What is to be said where balls have numbers in place of names that are too long."""
+    is_long = max(map(len, layout.names)) > LONGEST_NAME
+    return "; numbers are places in the artefact's list of balls" if is_long else ""
+
+
 def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> str:
     said = f" <small>{escaped(step.description)}</small>" if step.description else ""
     checked = " checked" if step.done else ""
@@ -218,13 +226,17 @@ def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> s
     rows = set_up_rows(step, experiment)
     items = "".join(f"<dt>{key}</dt><dd>{escaped(value)}</dd>" for key, value in rows)
     kind = "step done" if step.done else "step"
-    lists = "" if step.done else _readings(step) + _fields(dict.fromkeys(NOTES, ""))
+    body = ""
+    if not step.done:
+        body = (
+            f'<div class="words"><dl>{items}</dl>{place_drawing(step.candidate, experiment)}</div>'
+            f"{_readings(step)}{_fields(dict.fromkeys(NOTES, ''))}"
+        )
     return (
         f'<section class="{kind}"><div class="head">'
         f'<input type="checkbox" class="tick" aria-label="position {number} done"{checked}>'
         f'<h2>{number}. {escaped(step.name)}{said}</h2><div class="time">{told}</div></div>{change}'
-        f'<div class="words"><dl>{items}</dl>{place_drawing(step.candidate, experiment)}</div>'
-        f"{lists}</section>"
+        f"{body}</section>"
     )
 
 

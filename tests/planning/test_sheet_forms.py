@@ -101,8 +101,8 @@ def test_page_stands_alone_and_has_a_box_for_each_position(
     tags.feed(page)
     names = [tag for tag, _ in tags.seen]
     assert names.count("section") == 4
-    # One for each position, and of each artefact still to be read and the volume.
-    assert names.count("svg") == 4 + 2 + 1
+    # Of each position still to be read, of each artefact and of the volume.
+    assert names.count("svg") == 3 + 2 + 1
     assert "script" not in names and "link" not in names and "img" not in names
     boxes = [found for tag, found in tags.seen if tag == "input"]
     # One for each position, and one for each probe of those that are still to be read.
