@@ -28,7 +28,7 @@ from .offer import Offer, offer, open_directions
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
-from .short_names import short_names
+from .short_names import short_names, with_names
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -198,7 +198,10 @@ def _campaign(
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
         predict(
-            replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)
+            replace(
+                with_chosen(with_names(experiment, names), in_order),
+                expected_rank_deficiency=left_open or None,
+            )
         ),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,

@@ -21,6 +21,7 @@ from .experiment_file import experiment_text
 from .schedule import RunSheet, run_sheet
 from .sheet import Sheet
 from .sheet_forms import sheet_data, sheet_lines
+from .short_names import with_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +54,7 @@ class Campaign(Selection, Result):
         """The experiment with the chosen positions and certificates alone, in the order of the run
         sheet and under its short names.
         """
-        return with_chosen(self.experiment, self.sheet.written)
+        return with_chosen(with_names(self.experiment, self.names), self.sheet.written)
 
     def to_yaml(self, folder: str | Path = ".") -> str:
         """The choice as the text of an experiment file that is to stand in a folder.
@@ -64,8 +65,9 @@ class Campaign(Selection, Result):
         header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
         header += f" than {self.budget}."
         deficiency = self.left_open or None
+        written = self.sheet.written
         return experiment_text(
-            self.experiment, self.sheet.written, header, Path(folder), None, deficiency
+            self.experiment, written, header, Path(folder), None, deficiency, self.names
         )
 
     def sheet_text(self, form: str = ".txt") -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
@@ -195,7 +197,8 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
     positions = [one for one in sheet.written if isinstance(one.item, Position)]
     if not positions:
         return pictures
-    design = lay_out(with_chosen(experiment, positions))
+    # Where things stand does not depend on what disturbs their readings.
+    design = lay_out(with_chosen(replace(experiment, influences=()), positions))
     numbers = {step.name: str(number) for number, step in enumerate(sheet.steps, 1)}
     names = {
         name: name if len(name) <= LONGEST_NAME else number for name, number in numbers.items()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 
@@ -64,6 +65,22 @@ def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) ->
         readings = (replace(readings[0], probes=probes),)
     item = replace(item, name=name, description=description, readings=readings)
     return replace(candidate, name=name, item=item, settings=said)
+
+
+def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
+    """The experiment with what it says of single positions under their short names."""
+    influences = tuple(
+        one.model_copy(update={"positions": renamed_keys(stated, names)})
+        if isinstance(stated := getattr(one, "positions", None), Mapping)
+        else one
+        for one in experiment.influences
+    )
+    return replace(experiment, influences=influences)
+
+
+def renamed_keys(stated: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """What is stated by position, by short names."""
+    return {names.get(name, name): one for name, one in stated.items()}
 
 
 def names_of_plan(chosen: Experiment, candidates: Collection[str]) -> dict[str, str]:

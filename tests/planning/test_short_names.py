@@ -167,3 +167,49 @@ def test_a_position_that_is_set_up_again_after_its_own_name_keeps_it(pool: Path)
     _, given, composed, *_ = experiment.pool.candidates
     order = [renamed(given, "my own again 2"), renamed(composed, f"{composed.name} again")]
     assert short_names(order, {}, []) == {f"{composed.name} again": "P2"}
+
+
+def test_what_disturbs_a_composed_position_is_that_of_its_short_name(pool: Path) -> None:
+    """Temperatures stated for a place of the pool hold for it under its short name, in the file
+    and in what is computed of the choice.
+    """
+    pool.write_text(
+        POOL.replace("keep: [p2, my own]", "keep: [p2, my own, 'flat z 200 mm at 10, 20 mm']")
+    )
+    (experiment,) = load(pool, planning=True)
+    assert experiment.pool is not None
+    warm = "flat z 200 mm at 10, 20 mm"
+    assert warm in [one.name for one in experiment.pool.candidates]
+    disturbed = f"""
+influences:
+  - kind: temperature
+    artefact_expansion: {{value: 11.5 um/m/K, standard_uncertainty: 5 um/m/K}}
+    artefact_temperature: {{value: 20 degC, standard_uncertainty: 1 mK}}
+    positions:
+      p2: {{artefact: 21 degC}}
+      {warm!r}: {{artefact: 29 degC}}
+"""
+    pool.write_text(pool.read_text() + disturbed)
+    said = planned(pool, "day.yaml", "--positions", "6")
+    assert isinstance(said["names"], dict)
+    day = pool.with_name("day.yaml")
+    stated = load(day)[0].influences[0].positions  # type: ignore[attr-defined]
+    assert set(stated) == {"p2", said["names"][warm]}
+    assert f"{stated[said['names'][warm]].artefact}" != f"{stated['p2'].artefact}"
+    # What the plan told of the choice is what the file gives, and depends on that temperature.
+    worth = _quantities(day)
+    assert said["plan"]["quantities"]["U5"]["average"] == pytest.approx(  # type: ignore[index]
+        worth["U5"]["average"], rel=1e-9
+    )
+    cold = day.read_text().replace("29 degC", "20 degC")
+    assert cold != day.read_text()
+    pool.with_name("cold.yaml").write_text(cold)
+    other = _quantities(pool.with_name("cold.yaml"))
+    assert other["U5"]["average"] != pytest.approx(worth["U5"]["average"], rel=1e-3)
+
+
+def _quantities(path: Path) -> dict[str, dict[str, float]]:
+    import ballplate as bp
+
+    found: dict[str, dict[str, float]] = bp.run(path).to_dict()["quantities"]
+    return found
