@@ -221,8 +221,11 @@ def _refuse_many_terms(
 def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
     """Refuse what estimators of distances alone cannot follow.
 
-    :raises ExperimentError: a Bryan gauge, a length standard without a certificate, or holes.
+    :raises ExperimentError: a Bryan gauge, a length standard without a certificate, holes or a star.
     """
+    if experiment.stars:
+        text = "estimators of distances alone cannot follow where a star points; use the full one"
+        raise refused(experiment.source, text, "stars")
     if design.positions.across is not None:
         text = "estimators of distances alone cannot follow what is read in plane; use the full one"
         raise refused(experiment.source, text, "artefacts")

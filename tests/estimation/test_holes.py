@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from ballplate import compare
 from ballplate.gross_errors.redundancy import reliability
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design, nominal_state
@@ -204,3 +205,18 @@ def test_what_cannot_be_read_in_its_plane_is_refused(
 ) -> None:
     with pytest.raises(ExperimentError, match=expected):
         small(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, "cannot follow what is read in plane"),
+        (
+            {"artefacts": {"plate": PLATE}, "stars": [{"standard_uncertainty": "0.2 um"}]},
+            "cannot follow where a star points",
+        ),
+    ],
+)
+def test_estimators_of_distances_alone_refuse(changes: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ExperimentError, match=expected):
+        compare(small(**changes), trials=2)

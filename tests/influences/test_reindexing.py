@@ -28,6 +28,7 @@ ANGLES: dict[str, Any] = {
     "front": {"A": "90 deg", "B": "0 deg"},
 }
 U, SIGMA = 5e-7, 2e-7
+REINDEXED = [{"kind": "re-indexing", "standard_uncertainty": "0.5 um"}]
 
 
 def small(**changes: Any) -> Experiment:
@@ -43,9 +44,6 @@ def small(**changes: Any) -> Experiment:
         **changes,
     }
     return written_in_python(stated, Path())
-
-
-REINDEXED = [{"kind": "re-indexing", "standard_uncertainty": "0.5 um"}]
 
 
 def test_a_head_makes_the_offsets_of_a_star() -> None:
@@ -81,6 +79,10 @@ def test_an_offset_of_any_angles_is_that_of_two_turns_one_after_the_other() -> N
             'unknown probe "dwon"; did you mean "down"',
         ),
         (
+            {"influences": REINDEXED + REINDEXED},
+            "re-indexing of down in z low: x is stated by two of them",
+        ),
+        (
             {"influences": [{"kind": "re-indexing", "standard_uncertainty": "-1 um"}]},
             "is below zero",
         ),
@@ -88,7 +90,7 @@ def test_an_offset_of_any_angles_is_that_of_two_turns_one_after_the_other() -> N
 )
 def test_what_is_wrong_is_told(changes: dict[str, Any], expected: str) -> None:
     with pytest.raises(ExperimentError, match=expected):
-        small(**changes)
+        lay_out(small(**changes))
 
 
 def whitening(design: Design) -> np.ndarray:
