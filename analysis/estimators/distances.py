@@ -221,7 +221,7 @@ def _refuse_many_terms(
 def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
     """Refuse what estimators of distances alone cannot follow.
 
-    :raises ExperimentError: a Bryan gauge, a length standard without a certificate, holes or a star.
+    :raises ExperimentError: a gauge, a length standard without a certificate, holes, or a star.
     """
     if experiment.stars:
         text = "estimators of distances alone cannot follow where a star points; use the full one"
