@@ -16,7 +16,7 @@ from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
 from .columns import headings, is_number, with_point
-from .report import UNSTATED, Feature, Format, Problems, Report
+from .report import UNSTATED, Feature, Format, Report, ReportProblems
 from .text import Text, read_lines
 
 UNITS = {
@@ -135,7 +135,7 @@ class _Located:
 @dataclass
 class _Reader:
     table: _Table
-    problems: Problems
+    problems: ReportProblems
     unit: Fraction | None
     located: dict[str, _Located] = field(default_factory=dict)
     complete: list[_Located] = field(default_factory=list)
@@ -258,7 +258,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
 
     :raises ExperimentError: no headings, a row that is cut off or wrong, or no unit.
     """
-    text, problems = read_lines(content, file), Problems(file)
+    text, problems = read_lines(content, file), ReportProblems(file)
     table = _table(text)
     if table is None:
         told = "no headings such as id, actual, nominal, or id, type, x, y, z"

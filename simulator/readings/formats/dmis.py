@@ -16,7 +16,7 @@ import numpy as np
 from ...inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
-from .report import POINT, SPHERE, Feature, Format, Place, Problems, Report, System
+from .report import POINT, SPHERE, Feature, Format, Place, Report, ReportProblems, System
 from .text import Text, read_lines
 
 UNITS = {
@@ -70,7 +70,7 @@ class Statement:
         return [part.strip() for part in self.rest.split(",")]
 
 
-def statements(text: Text, problems: Problems) -> Iterator[Statement]:
+def statements(text: Text, problems: ReportProblems) -> Iterator[Statement]:
     """Statements of a file, comments left out; those that cannot be parted are told."""
     joined, start = "", 0
     for number, line in enumerate(text.lines, start=1):
@@ -98,7 +98,7 @@ def statements(text: Text, problems: Problems) -> Iterator[Statement]:
 class _Reader:
     """What the statements so far have set, and the features that they gave."""
 
-    problems: Problems
+    problems: ReportProblems
     unit: Fraction | None
     angle: str = "ANGDEC"
     plane: str = "XYPLAN"
@@ -243,7 +243,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     :raises ExperimentError: a statement about a feature is wrong, or the unit is not stated.
     """
     text = read_lines(content, file)
-    reader = _Reader(Problems(file), unit)
+    reader = _Reader(ReportProblems(file), unit)
     for one in statements(text, reader.problems):
         reader.take(one)
     reader.problems.finish()

@@ -15,7 +15,7 @@ from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
 from .columns import is_number, with_point
-from .report import UNSTATED, Feature, Format, Problems, Report
+from .report import UNSTATED, Feature, Format, Report, ReportProblems
 from .text import Text, read_lines
 
 UNITS = {"MM": LENGTH_UNITS["mm"], "IN": LENGTH_UNITS["in"], "INCH": LENGTH_UNITS["in"]}
@@ -68,7 +68,7 @@ class _Located:
 @dataclass
 class _Reader:
     text: Text
-    problems: Problems
+    problems: ReportProblems
     unit: Fraction | None
     probe: str = ""
     dimension: _Dimension | None = None
@@ -89,8 +89,7 @@ class _Reader:
             return
         headed = HEADED.fullmatch(line)
         if headed is not None:
-            unit = UNITS[headed[1].upper()]
-            self.dimension = _Dimension(headed[3], UNSTATED, unit)
+            self.dimension = _Dimension(headed[3], UNSTATED, UNITS[headed[1].upper()])
             return
         probe = PROBE.fullmatch(line)
         if probe is not None:
@@ -186,7 +185,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     :raises ExperimentError: a row of a location is wrong, or its unit is not stated.
     """
     text = read_lines(content, file)
-    reader = _Reader(text, Problems(file), unit)
+    reader = _Reader(text, ReportProblems(file), unit)
     for number, line in enumerate(text.lines, start=1):
         reader.take(number, line)
     reader.problems.finish()

@@ -19,7 +19,7 @@ from ...inputs.quantities import QuantityError, exact_number
 from ...inputs.settings import shorten
 from ...inputs.xmltree import Element, parse_xml
 from ...machines.protocol import Array
-from .report import SPHERE, Feature, Format, Problems, Report, System
+from .report import SPHERE, Feature, Format, Report, ReportProblems, System
 
 NAMESPACE = re.compile(r"http://qifstandards\.org/xsd/qif[0-9]*")
 MEASURED = ("FeatureMeasurement", "FeatureActual")
@@ -31,7 +31,7 @@ class _Document:
     """A document with what others refer to, by id."""
 
     root: Element
-    problems: Problems
+    problems: ReportProblems
     by_id: dict[str, Element]
     units: dict[str, Fraction]
 
@@ -56,7 +56,7 @@ class _Document:
         return [self.problems.length(text, factor, one.mark) for text in one.text.split()]
 
 
-def _units(root: Element, problems: Problems, unit: Fraction | None) -> dict[str, Fraction]:
+def _units(root: Element, problems: ReportProblems, unit: Fraction | None) -> dict[str, Fraction]:
     """Metres per unit of length, by the unit's name; those of the file under no name."""
     units = {} if unit is None else {"": unit}
     for where in ("PrimaryUnits", "OtherUnits"):
@@ -162,7 +162,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     if root.name != "QIFDocument" or not NAMESPACE.fullmatch(root.namespace):
         told = f"<{shorten(root.name)}> is no document of QIF 2 or 3"
         raise ExperimentError([Message(file, root.mark.line, root.mark.column, "", told)])
-    problems = Problems(file)
+    problems = ReportProblems(file)
     by_id = {one.attributes["id"]: one for one in root.walk() if "id" in one.attributes}
     document = _Document(root, problems, by_id, _units(root, problems, unit))
     sets = [*root.all("Results"), *root.all("MeasurementsResults")]

@@ -69,7 +69,7 @@ class Format:
 
 
 @dataclass
-class Problems:
+class ReportProblems:
     """Messages about a file, raised together."""
 
     file: str
