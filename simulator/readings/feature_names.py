@@ -7,7 +7,7 @@ known, capitals and whatever is no letter or digit do not count.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -39,10 +39,13 @@ Parts = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Named:
-    """The parts of each feature's name by a rule, none where it is not of the rule."""
+    """The parts of each feature's name by a rule, none where it is not of the rule; `numbered` are
+    those of which names have the number.
+    """
 
     rule: str
     parts: tuple[Parts | None, ...]
+    numbered: tuple[str, ...] = ()
 
 
 def check_rule(rule: str) -> str:
@@ -63,12 +66,12 @@ def check_rule(rule: str) -> str:
 
 
 def fold(name: str) -> str:
-    """A name in small letters and digits alone.
+    """A name in small letters and digits alone, numbers without zeros before them.
 
-    >>> fold("z low: r1-C1")
+    >>> fold("z low: r1-C01")
     'zlowr1c1'
     """
-    return re.sub(r"[\W_]+", "", name).casefold()
+    return re.sub(r"[\W_]+", "", re.sub(r"(?<![0-9])0+(?=[0-9])", "", name)).casefold()
 
 
 def named(names: Sequence[str], rule: str | None, design: Design | None, file: str) -> Named:
@@ -130,60 +133,76 @@ def _likely(names: Sequence[str], file: str) -> str:
     raise refused(file, text)
 
 
-def _lookup(rule: str, design: Design) -> dict[str, Parts | None]:
+def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Parts | None]:
     """Names by a rule of all balls in all positions with all probes, folded; None where several
-    have the same.
+    have the same. Of what is `numbered` the names have the number in its place, from 1.
     """
     places = [name for name in PLACE.findall(rule) if name != "point"]
     positions = enumerate(design.positions.names) if "position" in places else ((-1, ""),)
-    probes: Iterable[str] = design.probes.names if "probe" in places else ("",)
+    probes = design.probes.names if "probe" in places else ("",)
     found: dict[str, Parts | None] = {}
-    for (k, position), probe in product(positions, tuple(probes)):
-        artefacts = [design.positions.artefact[k]] if k >= 0 else range(len(design.artefacts.names))
-        balls = {design.balls.names[b] for a in artefacts for b in design.balls.of(int(a))}
-        for ball in balls:
-            every = {"position": position, "ball": ball, "probe": probe}
-            parts = {name: every[name] for name in places}
-            key = fold(PLACE.sub(lambda match, of=parts: of[match[1]], rule))  # type: ignore[misc]
-            found[key] = None if found.get(key, parts) != parts else parts
+    for (k, position), probe in product(positions, probes):
+        artefacts = [int(design.positions.artefact[k])] if k >= 0 else design.artefacts.plates
+        for artefact in artefacts:
+            for number, b in enumerate(design.balls.of(artefact), start=1):
+                every = {"position": position, "ball": design.balls.names[b], "probe": probe}
+                numbers = {"position": str(k + 1), "ball": str(number)}
+                written = {**every, **{name: numbers[name] for name in numbered}}
+                parts = {name: every[name] for name in places}
+                key = fold(rule.format(**written))
+                found[key] = None if found.get(key, parts) != parts else parts
     return found
 
 
 def _known(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named:
-    """The parts of names of an experiment's, by the rule that most of them follow."""
+    """The parts of names of an experiment's, by the rule that most of them follow; where none has
+    the names of balls, or of positions, by their numbers.
+    """
     folded = [fold(name) for name in names]
-    rules = [rule] if rule else [prefix + one for one in RULES for prefix in PREFIXES]
-    found: list[Named] = []
-    best = 0
-    for one in rules:
-        first = fold(PLACE.split(one)[0])
-        if not any(name.startswith(first) for name in folded):
-            continue
-        lookup = _lookup(one, design)
-        parts = tuple(lookup.get(name) for name in folded)
-        ambiguous = [name for name, key in zip(names, folded, strict=True) if key in lookup]
-        count = sum(part is not None for part in parts)
-        if rule and not count and ambiguous:
-            text = f'"{shorten(ambiguous[0])}" fits several balls by {one}; give another rule'
+    for numbered in ((), ("ball",), ("position", "ball")):
+        prefixes = ("",) if numbered else PREFIXES
+        rules = [rule] if rule else [prefix + one for one in RULES for prefix in prefixes]
+        found = _fitting(folded, [one for one in rules if _has(one, numbered)], design, numbered)
+        if len(found) > 1:
+            told = " and ".join(one.rule for one in found[:2])
+            text = f"the names can be read as {told}; state the one that is right with --name"
             raise refused(file, text)
+        if found:
+            return found[0]
+    some = listing((shorten(name, 30) for name in names), 3)
+    text = (
+        f"no names of the experiment in {some}; its positions are"
+        f" {listing(design.positions.names, 3)}, its balls"
+        f" {listing(dict.fromkeys(design.balls.names), 3)}; state the rule with --name, such as"
+        " {position}_{ball}"
+    )
+    raise refused(file, text)
+
+
+def _has(rule: str, places: Sequence[str]) -> bool:
+    return all(f"{{{place}}}" in rule for place in places)
+
+
+def _fitting(
+    folded: Sequence[str], rules: Sequence[str], design: Design, numbered: Sequence[str]
+) -> list[Named]:
+    """The rules by which the most names are those of an experiment, one for each way to read
+    them.
+    """
+    found: list[Named] = []
+    best = 1
+    for rule in rules:
+        beginning = fold(PLACE.split(rule)[0])
+        if not any(name.startswith(beginning) for name in folded):
+            continue
+        lookup = _lookup(rule, design, numbered)
+        parts = tuple(lookup.get(name) for name in folded)
+        count = sum(part is not None for part in parts)
         if count > best:
             found, best = [], count
-        if count and count == best and all(other.parts != parts for other in found):
-            found.append(Named(one, parts))
-    if len(found) > 1:
-        told = " and ".join(one.rule for one in found[:2])
-        text = f"the names can be read as {told}; state the one that is right with --name"
-        raise refused(file, text)
-    if not found:
-        some = listing((shorten(name, 30) for name in names), 3)
-        balls = listing(dict.fromkeys(design.balls.names), 3)
-        text = (
-            f"no names of the experiment in {some}; its positions are"
-            f" {listing(design.positions.names, 3)}, its balls {balls}; state the rule with --name,"
-            " such as {position}_{ball}"
-        )
-        raise refused(file, text)
-    return found[0]
+        if count == best and all(other.parts != parts for other in found):
+            found.append(Named(rule, parts, tuple(numbered)))
+    return found
 
 
 def position_of_file(stem: str, design: Design | None, file: str) -> str:

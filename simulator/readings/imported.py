@@ -18,10 +18,12 @@ from ..inputs.messages import ExperimentError, refused
 from ..inputs.settings import listing, shorten
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.yamltree import Mark
-from .feature_names import LONGEST_NAME, fold, named, position_of_file, without_point
+from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file, without_point
 from .formats.registered import read_report
 from .formats.report import CIRCLE, POINT, SPHERE, UNSTATED, Feature, Report
 
+# How programs number the points of a sphere behind its name.
+NUMBERED = re.compile(r"(.*[^-_.:# 0-9])[-_.:# ]+(?:P|PT|PNT)?([0-9]{1,6})", re.IGNORECASE)
 # Decimals of a millimetre that are written: a picometre, below every digit of a report.
 DECIMALS = 9
 IN_WORDS = {
@@ -192,17 +194,19 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
     found, kinds = _Taken(report), settings.kinds
     found.left.update(one.kind for one in report.features if one.kind not in kinds)
     found.left.update(report.others)
+    rule, apart = without_point(settings.rule or "")
     candidates = [one for one in report.features if one.kind in kinds]
-    rule = settings.rule
-    if rule is not None and (parted := without_point(rule))[1] is not None:
-        rule, candidates = parted[0], _grouped(candidates, parted[1], found)
+    if apart is not None:
+        candidates = _grouped(candidates, apart, found)
+    else:
+        candidates = _with_points(candidates, report, found)
     for why in dict.fromkeys(one.lacks for one in candidates if one.lacks):
         found.leave([one for one in candidates if one.lacks == why], why)
     complete = [one for one in map(found.centred, candidates) if one is not None]
     if not complete:
         told = "; ".join(_counted(found.left)) or "nothing"
         raise refused(report.file, f"no measured centre of a sphere in this {report.title}: {told}")
-    names = named([one.name for one in complete], rule, settings.design, report.file)
+    names = _named(complete, rule or None, settings.design, report.file)
     is_of_file = "{position}" not in names.rule
     position = position_of_file(path.stem, settings.design, str(path)) if is_of_file else ""
     others = [one for one, own in zip(complete, names.parts, strict=True) if own is None]
@@ -217,6 +221,8 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
         known.add((one.name, one.centre))
         found.features.append((one, {"position": position, "probe": "", **own}))
     source = f'; position "{position}" by the name of the file' if is_of_file else ""
+    for place in names.numbered:
+        source += f"; {place}s by their numbers, from 1 in the experiment's order"
     found.remarks.append(f"{report.file}: names are read as {names.rule}{source}")
     found.remarks += _about_systems(report.file, [one for one, _ in found.features])
     return found
@@ -234,6 +240,44 @@ def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
     return remarks
 
 
+def _named(
+    features: Sequence[Feature], rule: str | None, design: Design | None, file: str
+) -> Named:
+    """The parts of features' names, or of those of the dimensions that tell them."""
+    try:
+        return named([one.name for one in features], rule, design, file)
+    except ExperimentError:
+        others = [one.dimension for one in features]
+        if not all(others):
+            raise
+        try:
+            return named(others, rule, design, file)
+        except ExperimentError:
+            pass
+        raise
+
+
+def _with_points(candidates: list[Feature], report: Report, found: _Taken) -> list[Feature]:
+    """Spheres that were not measured, with the points that have their names and a number; without
+    any sphere, all points that have the same name but for their number.
+    """
+    lacking = {one.name: one for one in candidates if one.lacks}
+    points: dict[str, list[Feature]] = {}
+    for one in report.features:
+        match = NUMBERED.fullmatch(one.name[:LONGEST_NAME]) if one.kind == POINT else None
+        if match is not None and one.centre is not None and (match[1] in lacking or not candidates):
+            points.setdefault(match[1], []).append(one)
+    found.left[POINT] -= sum(map(len, points.values()))
+    found.left += Counter()
+    made = [one for one in candidates if not (one.lacks and one.name in points)]
+    return [*made, *(_of_points(name, several) for name, several in points.items())]
+
+
+def _of_points(name: str, points: Sequence[Feature]) -> Feature:
+    places = np.array([one.centre for one in points])
+    return replace(points[0], name=name, kind=SPHERE, centre=None, points=places)
+
+
 def _grouped(candidates: list[Feature], apart: re.Pattern[str], found: _Taken) -> list[Feature]:
     """Spheres of points that have the same name but for the number of the point."""
     groups: dict[str, list[Feature]] = {}
@@ -245,16 +289,7 @@ def _grouped(candidates: list[Feature], apart: re.Pattern[str], found: _Taken) -
         else:
             groups.setdefault(match[1], []).append(one)
     found.leave(others, "the name has no number of a point")
-    return [
-        replace(
-            points[0],
-            name=name,
-            kind=SPHERE,
-            centre=None,
-            points=np.array([one.centre for one in points]),
-        )
-        for name, points in groups.items()
-    ]
+    return [_of_points(name, points) for name, points in groups.items()]
 
 
 def _readings(

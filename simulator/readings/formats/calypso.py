@@ -16,7 +16,7 @@ from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
 from .columns import headings, is_number, with_point
-from .report import UNSTATED, Feature, Format, Report, ReportProblems
+from .report import UNSTATED, Feature, Format, Report, ReportProblems, System
 from .text import Text, read_lines
 
 UNITS = {
@@ -48,7 +48,11 @@ OF_FEATURES = {
     **dict.fromkeys(("y", "yactual", "yist", "yistwert"), "Y"),
     **dict.fromkeys(("z", "zactual", "zist", "zistwert"), "Z"),
     **dict.fromkeys(("unit", "einheit"), "unit"),
+    **dict.fromkeys(("stylus", "taster"), "stylus"),
+    **dict.fromkeys(("alignment", "koordinatensystem"), "alignment"),
 }
+# Alignments that are the machine's own system.
+OF_MACHINE = ("gerät", "geraet", "machine", "cmm", "gerätekoordinatensystem", "device")
 KINDS = {
     **dict.fromkeys(("sphere", "kugel"), "sphere"),
     **dict.fromkeys(("circle", "kreis"), "circle"),
@@ -58,6 +62,12 @@ KINDS = {
     **dict.fromkeys(("cone", "kegel"), "cone"),
     **dict.fromkeys(("line", "gerade", "line2d", "line3d"), "line"),
 }
+# A unit that is given once, above the table or in a heading.
+STATED = re.compile(
+    r"(?:unit|einheit|masseinheit|maßeinheit)s?\s{0,9}[:=]?\s{0,9}\W?(mm|cm|m|µm|inch|in|zoll)\b|"
+    r"[\[(](mm|cm|µm|um|inch|in|zoll)[\])]",
+    re.IGNORECASE,
+)
 AXIS = re.compile(r"([XYZ])(?:[-_ ]?(?:value|wert|coordinate|koordinate|position))?[0-9]*", re.I)
 BEFORE = re.compile(r"([XYZ])[-_ ]?(?:value|wert)?[-_.: ]+(\S.*)", re.IGNORECASE)
 BEHIND = re.compile(r"(\S.*?)[-_.: ]+([XYZ])(?:[-_ ]?(?:value|wert))?", re.IGNORECASE)
@@ -94,7 +104,7 @@ def _table(text: Text) -> _Table | None:
                 (OF_CHARACTERISTICS, {"id", "actual"}),
                 (OF_FEATURES, {"id", "X", "Y", "Z"}),
             ):
-                columns = headings(cells, known)
+                columns = headings([STATED.sub("", cell) for cell in cells], known)
                 if needed <= columns.keys():
                     return _Table(text, separator, columns, number, "X" in needed)
     return None
@@ -119,16 +129,21 @@ class _Located:
     mark: Mark
     name: str
     kind: str = UNSTATED
+    probe: str = ""
+    alignment: str = ""
     axes: dict[str, float] = field(default_factory=dict)
 
     def feature(self) -> Feature:
+        """The feature, lacking its centre if an axis was not told."""
         missing = [axis for axis in AXES if axis not in self.axes]
-        if missing:
-            return Feature(
-                self.mark, self.name, self.kind, lacks=f"no row of {' or '.join(missing)}"
-            )
+        lacks = f"no value of {' or '.join(missing)}" if missing else ""
+        centre = None if missing else (self.axes["X"], self.axes["Y"], self.axes["Z"])
+        system: System = "part" if self.alignment else "unstated"
+        system = "machine" if self.alignment.casefold() in OF_MACHINE else system
         return Feature(
-            self.mark, self.name, self.kind, (self.axes["X"], self.axes["Y"], self.axes["Z"])
+            *(self.mark, self.name, self.kind, centre, None, self.probe, system),
+            of=self.alignment,
+            lacks=lacks,
         )
 
 
@@ -193,7 +208,7 @@ class _Reader:
             if word in KINDS
         ]
         kind = kinds[0] if kinds else UNSTATED
-        one = _Located(mark, row["id"], kind)
+        one = _Located(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", ""))
         for axis in AXES:
             if is_number(row[axis]):
                 one.axes[axis] = self._length(mark, row, row[axis])
@@ -263,6 +278,9 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     if table is None:
         told = "no headings such as id, actual, nominal, or id, type, x, y, z"
         raise ExperimentError([text.mark(1).message("", told)])
+    for line in text.lines[: table.start] if unit is None else ():
+        stated = STATED.search(line)
+        unit = UNITS[(stated[1] or stated[2]).lower()] if stated else unit
     reader = _Reader(table, problems, unit)
     for mark, row in reader.rows():
         reader.take(mark, row)

@@ -19,7 +19,7 @@ from .report import UNSTATED, Feature, Format, Report, ReportProblems
 from .text import Text, read_lines
 
 UNITS = {"MM": LENGTH_UNITS["mm"], "IN": LENGTH_UNITS["in"], "INCH": LENGTH_UNITS["in"]}
-DIMENSION = re.compile(r"\s*DIM(?:ENSION)?\s+[^\s=]+\s*=\s*(.*)", re.IGNORECASE)
+DIMENSION = re.compile(r"\s*DIM(?:ENSION)?\s+([^\s=]+)\s*=\s*(.*)", re.IGNORECASE)
 UNIT = re.compile(r"\bUNITS\s*=\s*(\w+)", re.IGNORECASE)
 LOCATION = re.compile(r"LOCATION OF\s+(\S+)\s+(\S+)", re.IGNORECASE)
 HEADED = re.compile(r"\s*(?:\S{1,3}\s+)?(MM|IN|INCH)\s+(\S.*?)\s+-\s+(\S.*?)\s*", re.IGNORECASE)
@@ -41,6 +41,7 @@ class _Dimension:
     """The location of a feature that is being read, its unit, and the names of its columns."""
 
     name: str
+    title: str
     kind: str
     unit: Fraction | None
     columns: list[str] = field(default_factory=list)
@@ -52,17 +53,22 @@ class _Located:
 
     mark: Mark
     name: str
+    title: str
     kind: str
     probe: str
     axes: dict[str, float] = field(default_factory=dict)
 
     def feature(self) -> Feature:
+        """The feature, lacking its centre if an axis was not told."""
         missing = [axis for axis in AXES if axis not in self.axes]
-        if missing:
-            told = f"no row {' or '.join(missing)}"
-            return Feature(self.mark, self.name, self.kind, probe=self.probe, lacks=told)
-        centre = self.axes["X"], self.axes["Y"], self.axes["Z"]
-        return Feature(self.mark, self.name, self.kind, centre, probe=self.probe)
+        lacks = f"no row {' or '.join(missing)}" if missing else ""
+        centre = None if missing else (self.axes["X"], self.axes["Y"], self.axes["Z"])
+        return Feature(
+            *(self.mark, self.name, self.kind, centre),
+            probe=self.probe,
+            lacks=lacks,
+            dimension=self.title,
+        )
 
 
 @dataclass
@@ -84,12 +90,12 @@ class _Reader:
             return
         found = DIMENSION.fullmatch(line)
         if found is not None:
-            unit = UNIT.search(found[1])
-            self._start(found[1], unit[1] if unit else None, mark)
+            unit = UNIT.search(found[2])
+            self._start(found[1], found[2], unit[1] if unit else None, mark)
             return
         headed = HEADED.fullmatch(line)
         if headed is not None:
-            self.dimension = _Dimension(headed[3], UNSTATED, UNITS[headed[1].upper()])
+            self.dimension = _Dimension(headed[3], headed[2], UNSTATED, UNITS[headed[1].upper()])
             return
         probe = PROBE.fullmatch(line)
         if probe is not None:
@@ -108,7 +114,7 @@ class _Reader:
         elif first in AXES and len(first) == 1:
             self._row(first, words[1:], mark, number == len(self.text.lines))
 
-    def _start(self, words: str, unit: str | None, mark: Mark) -> None:
+    def _start(self, title: str, words: str, unit: str | None, mark: Mark) -> None:
         located = LOCATION.match(words)
         if located is None:
             self.dimension = None
@@ -118,7 +124,7 @@ class _Reader:
         if unit is not None and unit.upper() not in UNITS:
             self.problems.add(mark, f'unknown unit "{shorten(unit)}"; PC-DMIS has MM and IN')
         own = UNITS.get(unit.upper(), self.unit) if unit is not None else self.unit
-        self.dimension = _Dimension(located[2].rstrip(","), located[1].lower(), own)
+        self.dimension = _Dimension(located[2].rstrip(","), title, located[1].lower(), own)
 
     def _row(self, axis: str, cells: list[str], mark: Mark, is_last: bool) -> None:
         assert self.dimension is not None
@@ -153,10 +159,10 @@ class _Reader:
     def _locate(self, axis: str, value: float, mark: Mark) -> None:
         """Add a co-ordinate to its feature; one that it has already begins another reading."""
         assert self.dimension is not None
-        name = self.dimension.name
+        name, title = self.dimension.name, self.dimension.title
         one = self.located.get(name)
         if one is None or axis in one.axes:
-            one = _Located(mark, name, self.dimension.kind, self.probe)
+            one = _Located(mark, name, title, self.dimension.kind, self.probe)
             self.located[name] = one
             self.complete.append(one)
         one.axes[axis] = value

@@ -26,7 +26,8 @@ class Feature:
     """A measured feature: its centre, or points (n, 3) on its surface, in metres.
 
     `lacks` says why there is neither. `probe` is the label of the sensor that was in use, empty
-    where the report has none, `system` what its co-ordinates are in, and `of` a part's name for it.
+    where the report has none, `system` what its co-ordinates are in, and `of` that system's name.
+    `dimension` is what the report calls the characteristic that tells them, if it has a name.
     """
 
     mark: Mark
@@ -38,6 +39,7 @@ class Feature:
     system: System = "unstated"
     of: str = ""
     lacks: str = ""
+    dimension: str = ""
 
 
 @dataclass(frozen=True)
