@@ -23,7 +23,7 @@ from .formats.registered import read_report
 from .formats.report import CIRCLE, POINT, SPHERE, UNSTATED, Feature, Report
 
 # How programs number the points of a sphere behind its name.
-NUMBERED = re.compile(r"(.*[^-_.:# 0-9])[-_.:# ]+(?:P|PT|PNT)?([0-9]{1,6})", re.IGNORECASE)
+NUMBERED = re.compile(r"(.+)[-_.:# ](?:P|PT|PNT)?([0-9]{1,6})", re.IGNORECASE)
 # Decimals of a millimetre that are written: a picometre, below every digit of a report.
 DECIMALS = 9
 IN_WORDS = {
@@ -130,7 +130,7 @@ class _Taken:
     def leave(self, features: Sequence[Feature], why: str) -> None:
         """Leave features for a reason, which is told with their names."""
         if features:
-            self.left.update(f"{one.kind} {why}" for one in features)
+            self.left.update(f"{one.kind} ({why})" for one in features)
             names = listing((f'"{shorten(one.name, 30)}"' for one in features), 5)
             self.remarks.append(f"{self.report.file}: {len(features)} left, {why}: {names}")
 
@@ -216,7 +216,7 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
         if own is None:
             continue
         if (one.name, one.centre) in known:
-            found.left[f"{one.kind} printed again"] += 1
+            found.left[f"{one.kind} (printed again)"] += 1
             continue
         known.add((one.name, one.centre))
         found.features.append((one, {"position": position, "probe": "", **own}))
@@ -342,13 +342,11 @@ def _probe(feature: Feature, position: str, design: Design | None, file: str) ->
 
 
 def _counted(counts: Counter[str]) -> list[str]:
-    """Kinds with how many there are of each, the most first."""
+    """Kinds with how many there are of each, the most first; why they are left is in brackets."""
     words = []
     for kind, count in counts.most_common():
-        first, _, rest = kind.partition(" ")
-        is_one_word = not rest or first not in (SPHERE, CIRCLE, POINT, UNSTATED, "line")
-        noun, behind = (kind, "") if is_one_word else (first, f" {rest}")
-        words.append(f"{count} {noun}{'s' * (count != 1)}{behind}")
+        noun, bracket, why = kind.partition(" (")
+        words.append(f"{count} {noun}{'s' * (count != 1)}{bracket}{why}")
     return words
 
 

@@ -122,7 +122,9 @@ def calypso(balls: Sequence[Ball], comma: bool = False) -> str:
 def german(balls: Sequence[Ball]) -> str:
     """A printed table with German headings and decimal commas, columns parted by blanks."""
     lines = ["Messprotokoll   CALYPSO", "Prüfplan: Kugelplatte", ""]
-    lines.append("Name                    Istwert    Sollwert    Ob.Tol    Unt.Tol    Abweichung")
+    lines.append(
+        "Name                    Istwert [mm]    Sollwert    Ob.Tol    Unt.Tol    Abweichung"
+    )
     lines.append("=" * 70)
     for ball in balls:
         for axis, one, other in zip("XYZ", ball.centre, ball.nominal, strict=True):

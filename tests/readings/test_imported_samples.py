@@ -109,4 +109,4 @@ def test_points_on_the_surface_fit_to_the_estimates_within_the_rounding_of_point
         spread += (np.array(numbers(estimates(rounded))) - expected) ** 2 / 10
     # Every number within five standard deviations of what rounding the readings alone would do.
     assert (np.abs(found - expected) <= 5 * np.sqrt(spread) + 1e-12).all()
-    assert 0.0 < np.sqrt(spread).max()
+    assert np.sqrt(spread).max() > 0.0

@@ -167,11 +167,11 @@ class _Reader:
             if not line.strip() or set(line.strip()) <= set("-=_*"):
                 continue
             if len(cells) == 1 or (not table.is_of_features and not _has_number(cells)):
-                self.others["line of text"] += 1
+                self.others["line (text)"] += 1
                 continue
             mark = text.mark(number)
-            is_last = text.is_cut and number == len(text.lines)
-            if len(cells) <= needed or (is_last and len(cells) == needed + 1 and width > needed):
+            is_cut = text.is_cut and number == len(text.lines)
+            if len(cells) <= needed or (is_cut and len(cells) - 1 in table.columns.values()):
                 told = f"{len(cells)} cells below {width} headings; was the line cut off?"
                 self.problems.add(mark, told)
                 continue

@@ -199,6 +199,8 @@ class _Reader:
                 told = "the file ends within this line; end it, or take a whole copy"
             self.problems.add(one.mark, told)
             return nowhere
+        for text in numbers[3:least]:
+            self.problems.length(text, self.unit, one.mark)
         if form.upper() == "CART":
             return self.problems.place(numbers[:3], self.unit, one.mark)
         radius = self.problems.length(numbers[0], self.unit, one.mark)

@@ -119,7 +119,7 @@ class _Reader:
         if located is None:
             self.dimension = None
             kind = re.split(r"\s+(?:OF|FROM|BETWEEN)\b", words, maxsplit=1)[0]
-            self.others[f"{shorten(kind.lower(), 30)} dimension"] += 1
+            self.others[f"dimension ({shorten(kind.lower(), 30)})"] += 1
             return
         if unit is not None and unit.upper() not in UNITS:
             self.problems.add(mark, f'unknown unit "{shorten(unit)}"; PC-DMIS has MM and IN')

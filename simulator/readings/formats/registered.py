@@ -38,6 +38,7 @@ def read_report(
         return chosen[name].read(content, file, unit)
     encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8"
     beginning = content[:BEGINNING].decode(encoding, errors="replace").removeprefix("\ufeff")
+    beginning = "\n".join(beginning.splitlines())
     for one in FORMATS:
         if one.recognises(beginning):
             return one.read(content, file, unit)
