@@ -66,12 +66,14 @@ def check_rule(rule: str) -> str:
 
 
 def fold(name: str) -> str:
-    """A name in small letters and digits alone, numbers without zeros before them.
+    """A name in small letters and digits alone, numbers without zeros before them and apart from
+    each other.
 
-    >>> fold("z low: r1-C01")
-    'zlowr1c1'
+    >>> fold("z low: r1-C01"), fold("Z 1.02")
+    ('zlowr1c1', 'z1_2')
     """
-    return re.sub(r"[\W_]+", "", re.sub(r"(?<![0-9])0+(?=[0-9])", "", name)).casefold()
+    apart = re.sub(r"(?<=[0-9])[\W_]+(?=[0-9])", "|", re.sub(r"(?<![0-9])0+(?=[0-9])", "", name))
+    return re.sub(r"[^\w|]|_", "", apart).replace("|", "_").casefold()
 
 
 def named(names: Sequence[str], rule: str | None, design: Design | None, file: str) -> Named:

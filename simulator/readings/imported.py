@@ -91,8 +91,8 @@ class ImportedReadings:
     def key(self) -> str:
         """What the experiment has to say about the co-ordinates."""
         return (
-            "a measuring program's values are centres of balls: the experiment has to say"
-            f" readings: {{coordinates: {self.coordinates}}}"
+            "these are centres of balls; say so in the experiment, readings: {coordinates:"
+            f' {self.coordinates}}}, or with fit --coordinates "{self.coordinates}"'
         )
 
 
@@ -176,7 +176,8 @@ def import_readings(
     if fits:
         worst = max(one.uncertainty or 0.0 for one in readings)
         told.append(
-            f"{len(fits)} centres are of points on the surface, which leave"
+            f"{len(fits)} {'centre is' if len(fits) == 1 else 'centres are'} of points on the"
+            " surface, which leave"
             f" {1e6 * variance**0.5:.3g} µm ({freedom} degrees of freedom):"
             f" standard uncertainty of a co-ordinate of a centre up to {1e6 * worst:.3g} µm"
         )
