@@ -301,8 +301,8 @@ def read_report(
     `experiment`. `form` is dmis, pcdmis, calypso or qif, and is recognised if it is left out;
     `unit` is that of reports which state none; `circles` takes centres of circles, too.
 
-    >>> read_report("designs/imports/report.dmo", "designs/quickstart.yaml").told
-    ('designs/imports/report.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
+    >>> read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
+    ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
     """
     from .results.imported import ReadReport
     from .simulator.experiment.layout import lay_out
