@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
@@ -122,8 +123,7 @@ class _Taken:
     """What of a report are readings, with the parts of their names, and what is left."""
 
     report: Report
-    features: list[tuple[Feature, dict[str, str]]] = field(default_factory=list)
-    fits: dict[int, SphereFit] = field(default_factory=dict)
+    features: list[tuple[Feature, dict[str, str], SphereFit | None]] = field(default_factory=list)
     left: Counter[str] = field(default_factory=Counter)
     remarks: list[str] = field(default_factory=list)
 
@@ -134,12 +134,12 @@ class _Taken:
             names = listing((f'"{shorten(one.name, 30)}"' for one in features), 5)
             self.remarks.append(f"{self.report.file}: {len(features)} left, {why}: {names}")
 
-    def centred(self, one: Feature) -> Feature | None:
-        """A feature with its centre, that of the closest sphere where it has points; None, and
+    def centred(self, one: Feature) -> tuple[Feature, SphereFit | None] | None:
+        """A feature with its centre, and the closest sphere where that is of points; None, and
         left, where there is none.
         """
         if one.lacks or one.points is None:
-            return None if one.lacks else one
+            return None if one.lacks else (one, None)
         fit = closest_sphere(one.points)
         if fit is None:
             few = len(one.points) < FEWEST_POINTS
@@ -147,9 +147,7 @@ class _Taken:
             self.leave([one], why if few else "has points about in a plane")
             return None
         x, y, z = fit.centre.tolist()
-        made = replace(one, centre=(x, y, z))
-        self.fits[id(made)] = fit
-        return made
+        return replace(one, centre=(x, y, z)), fit
 
 
 def import_readings(
@@ -163,7 +161,7 @@ def import_readings(
     found = [
         _taken(read_report(path, settings.form, settings.unit), path, settings) for path in paths
     ]
-    fits = [fit for one in found for fit in one.fits.values()]
+    fits = [fit for one in found for _, _, fit in one.features if fit is not None]
     freedom = sum(fit.degrees_of_freedom for fit in fits)
     squares = sum(float((fit.residuals**2).sum()) for fit in fits)
     variance = squares / freedom if freedom else 0.0
@@ -182,7 +180,11 @@ def import_readings(
             f" standard uncertainty of a co-ordinate of a centre up to {1e6 * worst:.3g} µm"
         )
     remarks = [remark for one in found for remark in (*one.report.remarks, *one.remarks)]
-    systems = {feature.system for one in found for feature, _ in one.features}
+    systems = {feature.system for one in found for feature, _, _ in one.features}
+    if {"machine", "part"} <= systems:
+        remarks.append(
+            "warning: centres in the machine's and in a part's system; import each apart"
+        )
     coordinates = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
     return ImportedReadings(
@@ -207,25 +209,26 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
     if not complete:
         told = "; ".join(_counted(found.left)) or "nothing"
         raise refused(report.file, f"no measured centre of a sphere in this {report.title}: {told}")
-    names = _named(complete, rule or None, settings.design, report.file)
+    features = [one for one, _ in complete]
+    names, whose = _named(features, rule or None, settings.design, report.file)
     is_of_file = "{position}" not in names.rule
     position = position_of_file(path.stem, settings.design, str(path)) if is_of_file else ""
-    others = [one for one, own in zip(complete, names.parts, strict=True) if own is None]
+    others = [one for one, own in zip(features, names.parts, strict=True) if own is None]
     found.leave(others, f"the name is not of {names.rule}")
     known: set[tuple[object, ...]] = set()
-    for one, own in zip(complete, names.parts, strict=True):
+    for (one, fit), own in zip(complete, names.parts, strict=True):
         if own is None:
             continue
         if (one.name, one.centre) in known:
             found.left[f"{one.kind} (printed again)"] += 1
             continue
         known.add((one.name, one.centre))
-        found.features.append((one, {"position": position, "probe": "", **own}))
+        found.features.append((one, {"position": position, "probe": "", **own}, fit))
     source = f'; position "{position}" by the name of the file' if is_of_file else ""
     for place in names.numbered:
         source += f"; {place}s by their numbers, from 1 in the experiment's order"
-    found.remarks.append(f"{report.file}: names are read as {names.rule}{source}")
-    found.remarks += _about_systems(report.file, [one for one, _ in found.features])
+    found.remarks.append(f"{report.file}: names{whose} are read as {names.rule}{source}")
+    found.remarks += _about_systems(report.file, [one for one, _, _ in found.features])
     return found
 
 
@@ -243,18 +246,17 @@ def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
 
 def _named(
     features: Sequence[Feature], rule: str | None, design: Design | None, file: str
-) -> Named:
-    """The parts of features' names, or of those of the dimensions that tell them."""
+) -> tuple[Named, str]:
+    """The parts of features' names, or of those of the dimensions that tell them, and whose names
+    it is in the latter case.
+    """
     try:
-        return named([one.name for one in features], rule, design, file)
+        return named([one.name for one in features], rule, design, file), ""
     except ExperimentError:
         others = [one.dimension for one in features]
-        if not all(others):
-            raise
-        try:
-            return named(others, rule, design, file)
-        except ExperimentError:
-            pass
+        if all(others):
+            with suppress(ExperimentError):
+                return named(others, rule, design, file), " of dimensions"
         raise
 
 
@@ -298,8 +300,7 @@ def _readings(
 ) -> list[ImportedReading]:
     """The readings of a report, with the probe that its names, its sensors or the plan tell."""
     readings = []
-    for feature, parts in one.features:
-        fit = one.fits.get(id(feature))
+    for feature, parts, fit in one.features:
         uncertainty = None
         if fit is not None:
             uncertainty = float(np.sqrt(variance * np.diag(fit.cofactor).max()))
@@ -355,7 +356,7 @@ def _told(one: _Taken) -> str:
     """What was taken of a file and what was left, counted by kind."""
     taken = Counter(
         "centre" if feature.kind == UNSTATED else f"{feature.kind} centre"
-        for feature, _ in one.features
+        for feature, _, _ in one.features
     )
     counts = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in taken.items())
     left = ", ".join(_counted(one.left)) or "nothing"

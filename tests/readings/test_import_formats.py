@@ -146,7 +146,8 @@ FA(A_4)=FEAT/SPHERE,OUTER,CART,1,2,3,4"""
         ("TIP_1", "machine", ""), ("TIP2", "part", "PART"), ("TIP2", "machine", ""), ("TIP2", "part", "PART"),
     ]  # fmt: skip
     read = bp.read_report(tmp_path / "report")
-    assert "2 centres are in a part's co-ordinate system (PART)" in read.remarks[-1]
+    assert "2 centres are in a part's co-ordinate system (PART)" in read.remarks[-2]
+    assert read.remarks[-1].startswith("warning: centres in the machine's and in a part's system")
     assert "coordinates: ball centres" in read.imported.key
 
 

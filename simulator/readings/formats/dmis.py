@@ -44,6 +44,7 @@ STATEMENT = re.compile(
     r"(?:([A-Za-z]+)\s*\(([^()]*)\)\s*=\s*)?([A-Za-z]+)\s*(?:/\s*(.*))?", re.DOTALL
 )
 LABEL = re.compile(r"\b(?:F|FA|S|SA|D|DA|SW)\s*\(([^()]*)\)", re.IGNORECASE)
+DATUM = re.compile(r"DA?\s*\(", re.IGNORECASE)
 BEGINNING = re.compile(
     r"^[ \t]*(?:DMISMN[ \t]*/|FILNAM[ \t]*/|FA?[ \t]*\([^()\n]*\)[ \t]*=[ \t]*FEAT\b)",
     re.MULTILINE | re.IGNORECASE,
@@ -130,7 +131,7 @@ class _Reader:
             self.probe = found[1].strip() if found else one.parts[0]
         elif one.word == "WKPLAN" and one.parts[0].upper() in PLANES:
             self.plane = one.parts[0].upper()
-        elif one.word in SYSTEMS or one.word == "RECALL" and LABEL.search(one.rest):
+        elif one.word in SYSTEMS or one.word == "RECALL" and DATUM.match(one.rest):
             self._system(one)
         elif one.word == "MEAS":
             found = LABEL.search(one.rest)
