@@ -246,11 +246,51 @@ def test_rows_of_pcdmis_that_are_damaged_are_told(tmp_path: Path) -> None:
         "report:14:1: X: the deviation is not measured minus nominal; is the line damaged?"
     )
     short = text.replace("     0.0500     10.0001200", "     10.0001200")
-    assert "numbers below 6 headings" in refusal(tmp_path, short.replace("0.0500    10.", "10."))
+    assert "its numbers are not below the 6 headings" in refusal(
+        tmp_path, short.replace("0.0500    10.", "10.")
+    )
     headless = text.replace("MEAS", "MIST")
     assert "no column MEAS" in refusal(tmp_path, headless)
     unitless = text.replace("UNITS=MM", "")
     assert "no UNITS= of this dimension" in refusal(tmp_path, unitless)
+
+
+PCDMIS = """DIM #4A,5 LOC1= LOCATION OF SPHERE P1_r1c1  UNITS=MM
+AX    NOMINAL       +TOL       -TOL       MEAS        DEV     OUTTOL
+X     100.000      0.400      0.400    100.049      0.049      0.000 -----#---
+Y     -57.000                          -57.049     -0.049            ---#-----
+PART NUMBER=PLATE    DATE=30-Aug-25     TIME=11:56:18 AM           PAGE#=4
+Z       1.000      0.400      0.400      1.002      0.002      0.000
+DIM #42A,43A LOC7= POSITION OF SPHERE P1_r1c2  UNITS=MM
+AX    NOMINAL       +TOL       -TOL      BONUS       MEAS        DEV     OUTTOL
+X    -197.000                                    -196.998      0.002
+TP        MMC      0.200                 0.000      0.079      0.079      0.000 ---#-----
+DIM #6 LOC2= LOCATION OF PLANE PLN24  UNITS=MM
+AX    NOMINAL       +TOL       -TOL       MEAS        DEV     OUTTOL
+X      57.750      damaged
+"""
+
+
+def test_reports_of_pcdmis_have_names_with_blanks_and_blank_columns(tmp_path: Path) -> None:
+    assert spheres(tmp_path, PCDMIS) == {"P1_r1c1": (0.100049, -0.057049, 0.001002)}
+    told = bp.read_report(tmp_path / "report").told[0]
+    assert "1 dimension (position of sphere), 1 dimension (location of plane)" in told
+    # Where a column is blank and the others are not below their headings, it is not clear.
+    shifted = PCDMIS.replace("Y     -57.000   ", "Y     -57.000")
+    assert "report:4:1: its numbers are not below the 6 headings" in refusal(tmp_path, shifted)
+
+
+def test_circles_of_every_format(tmp_path: Path) -> None:
+    texts = (
+        DMIS.format(units="MM", lines="FA(P_1)=FEAT/CIRCLE,INNER,CART,1,2,3,0,0,1,22"),
+        "DIM A= LOCATION OF CIRCLE P_1 UNITS=MM\nAX MEAS\nX 1\nY 2\nZ 3\n",
+        makers.qif([Ball("P_1", "", (D(1), D(2), D(3)))]).replace("Sphere", "Circle"),
+    )
+    for text in texts:
+        (tmp_path / "report").write_text(text, encoding="utf-8")
+        (one,) = bp.read_report(tmp_path / "report", circles=True).imported.readings
+        assert one.centre == (0.001, 0.002, 0.003)
+        assert "circle" in refusal(tmp_path, text)
 
 
 def test_a_feature_without_all_axes_is_left(tmp_path: Path) -> None:
@@ -258,7 +298,7 @@ def test_a_feature_without_all_axes_is_left(tmp_path: Path) -> None:
     lines = [line for line in every if not (line.startswith("Z") and " 30.0" in line)]
     (tmp_path / "report").write_text("\n".join(lines), encoding="utf-8")
     found = bp.read_report(tmp_path / "report")
-    assert "left: 1 dimension (flatness), 1 sphere (no row Z)" in found.told[0]
+    assert "left: 1 dimension (flatness of plane), 1 sphere (no row Z)" in found.told[0]
     assert '1 left, no row Z: "P2_r1c1"' in found.remarks[0]
 
 

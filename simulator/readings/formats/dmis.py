@@ -16,7 +16,7 @@ import numpy as np
 from ...inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
-from .report import POINT, SPHERE, Feature, Format, Place, Report, ReportProblems, System
+from .report import LOCATED, SPHERE, Feature, Format, Place, Report, ReportProblems, System
 from .text import Text, read_lines
 
 UNITS = {
@@ -171,7 +171,7 @@ class _Reader:
         parts = one.parts
         kind = KINDS.get(parts[0].upper(), parts[0].lower())
         here = Feature(one.mark, one.name, kind, probe=self.probe, system=self.system, of=self.of)
-        if kind in (SPHERE, POINT):
+        if kind in LOCATED:
             if parts[1:2] and parts[1].upper() in ("INNER", "OUTER"):
                 parts = parts[1:]
             place = self._place(one, parts[1:], 4 if kind == SPHERE else 3)

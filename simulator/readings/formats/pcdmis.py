@@ -10,23 +10,27 @@ import re
 from collections import Counter
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import takewhile
 
 from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
 from .columns import is_number, with_point
-from .report import UNSTATED, Feature, Format, Report, ReportProblems
+from .report import CIRCLE, SPHERE, UNSTATED, Feature, Format, Report, ReportProblems
 from .text import Text, read_lines
 
 UNITS = {"MM": LENGTH_UNITS["mm"], "IN": LENGTH_UNITS["in"], "INCH": LENGTH_UNITS["in"]}
-DIMENSION = re.compile(r"\s*DIM(?:ENSION)?\s+([^\s=]+)\s*=\s*(.*)", re.IGNORECASE)
+DIMENSION = re.compile(r"\s*DIM(?:ENSION)?\s+([^=]*[^=\s])\s*=\s*(.*)", re.IGNORECASE)
 UNIT = re.compile(r"\bUNITS\s*=\s*(\w+)", re.IGNORECASE)
+# What a dimension is, and of which kind of feature.
+WHAT = re.compile(r"[A-Z0-9 ]*?\b(?:OF|FROM|BETWEEN)\s+\S+", re.IGNORECASE)
 LOCATION = re.compile(r"LOCATION OF\s+(\S+)\s+(\S+)", re.IGNORECASE)
 HEADED = re.compile(r"\s*(?:\S{1,3}\s+)?(MM|IN|INCH)\s+(\S.*?)\s+-\s+(\S.*?)\s*", re.IGNORECASE)
 MEASURED = ("MEAS", "MEASURED")
+NOMINALS = {"NOMINAL", "NOM"}
 PROBE = re.compile(r"\s*(TIP|LOADPROBE)\s*/\s*([^,\s]+).*", re.IGNORECASE)
 BEGINNING = re.compile(
-    r"^[ \t]*(?:DIM(?:ENSION)?[ \t]+[^\s=]+[ \t]*=|AX[ \t]+(?:NOM|MEAS|\+TOL))|\bPC-?DMIS\b",
+    r"^[ \t]*(?:DIM(?:ENSION)?[ \t][^=\n]*=|AX[ \t]+(?:NOM|MEAS|\+TOL))|\bPC-?DMIS\b",
     re.MULTILINE | re.IGNORECASE,
 )
 AXES = "XYZ"
@@ -38,13 +42,15 @@ AGREEMENT = Fraction(2)
 
 @dataclass
 class _Dimension:
-    """The location of a feature that is being read, its unit, and the names of its columns."""
+    """The location of a feature that is being read, its unit, and its columns: what each is called
+    and where it ends.
+    """
 
     name: str
     title: str
     kind: str
     unit: Fraction | None
-    columns: list[str] = field(default_factory=list)
+    columns: list[tuple[str, int]] = field(default_factory=list)
 
 
 @dataclass
@@ -105,43 +111,42 @@ class _Reader:
         if not words:
             return
         first = words[0].upper()
-        if line.strip().upper().startswith("END OF DIMENSION"):
+        if line.strip().upper().startswith(("END OF DIMENSION", "DIM ", "DIMENSION ")):
             self.dimension = None
         elif self.dimension is None:
             return
         elif first == "AX":
-            self.dimension.columns = [word.upper() for word in words[1:]]
+            headings = list(re.finditer(r"\S+", line))[1:]
+            self.dimension.columns = [(word[0].upper(), word.end()) for word in headings]
         elif first in AXES and len(first) == 1:
-            self._row(first, words[1:], mark, number == len(self.text.lines))
+            self._row(first, line, mark, number == len(self.text.lines))
 
     def _start(self, title: str, words: str, unit: str | None, mark: Mark) -> None:
         located = LOCATION.match(words)
-        if located is None:
+        if located is None or located[1].lower() not in (SPHERE, CIRCLE):
             self.dimension = None
-            kind = re.split(r"\s+(?:OF|FROM|BETWEEN)\b", words, maxsplit=1)[0]
-            self.others[f"dimension ({shorten(kind.lower(), 30)})"] += 1
+            kind = WHAT.match(words)
+            self.others[f"dimension ({shorten(kind[0].lower() if kind else words, 30)})"] += 1
             return
         if unit is not None and unit.upper() not in UNITS:
             self.problems.add(mark, f'unknown unit "{shorten(unit)}"; PC-DMIS has MM and IN')
         own = UNITS.get(unit.upper(), self.unit) if unit is not None else self.unit
         self.dimension = _Dimension(located[2].rstrip(","), title, located[1].lower(), own)
 
-    def _row(self, axis: str, cells: list[str], mark: Mark, is_last: bool) -> None:
+    def _row(self, axis: str, line: str, mark: Mark, is_last: bool) -> None:
         assert self.dimension is not None
-        columns = self.dimension.columns
-        place = next((columns.index(name) for name in MEASURED if name in columns), None)
-        if place is None:
+        names = [name for name, _ in self.dimension.columns]
+        measured = next((name for name in MEASURED if name in names), None)
+        if measured is None:
             told = "no column MEAS; report measured values, and head the columns AX NOMINAL MEAS …"
             self.problems.add(mark, told)
             return
-        count = len(columns)
-        numbers = [cell for cell in cells[:count] if is_number(cell)]
-        # Behind the numbers may stand a bar of characters.
-        if len(numbers) != count or (len(cells) > count and is_number(cells[count])):
-            told = f"{len(numbers)} numbers below {count} headings; was the line cut off?"
+        row = _by_column(line, self.dimension.columns)
+        if row is None or measured not in row:
+            told = f"its numbers are not below the {len(names)} headings; was the line cut off?"
             self.problems.add(mark, told)
             return
-        if is_last and self.text.is_cut and place == count - 1:
+        if is_last and self.text.is_cut and line.rstrip().endswith(row[measured]):
             told = "the file ends within this line; end it, or take a whole copy"
             self.problems.add(mark, told)
             return
@@ -149,11 +154,11 @@ class _Reader:
             told = "no UNITS= of this dimension; state the unit with --unit mm or --unit in"
             self.problems.add(mark, told)
             self.dimension.unit = LENGTH_UNITS["mm"]
-        if not _agrees(columns, numbers):
+        if not _agrees(row):
             told = f"{axis}: the deviation is not measured minus nominal; is the line damaged?"
             self.problems.add(mark, told)
             return
-        value = self.problems.length(with_point(numbers[place]), self.dimension.unit, mark)
+        value = self.problems.length(with_point(row[measured]), self.dimension.unit, mark)
         self._locate(axis, value, mark)
 
     def _locate(self, axis: str, value: float, mark: Mark) -> None:
@@ -168,15 +173,31 @@ class _Reader:
         one.axes[axis] = value
 
 
-def _agrees(columns: list[str], numbers: list[str]) -> bool:
+def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | None:
+    """The numbers of a row by their columns; None where it is not clear which is which.
+
+    Where some are blank, the others end where their headings do.
+    """
+    found = list(re.finditer(r"\S+", line))[1:]
+    # Behind the numbers may stand a bar of characters.
+    numbers = list(takewhile(lambda word: is_number(word[0]), found))
+    if len(numbers) == len(columns):
+        return {name: word[0] for (name, _), word in zip(columns, numbers, strict=True)}
+    ends = {end: name for name, end in columns}
+    row = {ends[word.end()]: word[0] for word in numbers if word.end() in ends}
+    # The deviation then checks it.
+    is_clear = len(row) == len(numbers) < len(columns) and "DEV" in row and row.keys() & NOMINALS
+    return row if is_clear else None
+
+
+def _agrees(row: dict[str, str]) -> bool:
     """Whether a row's deviation is what it measured less the nominal, as far as it tells them.
 
     Its sign may be turned round, by a setting, where the nominal is negative.
     """
-    by_name = dict(zip(columns, numbers, strict=True))
-    nominal = by_name.get("NOMINAL", by_name.get("NOM"))
-    measured = by_name.get("MEAS", by_name.get("MEASURED"))
-    deviation = by_name.get("DEV")
+    nominal = row.get("NOMINAL", row.get("NOM"))
+    measured = row.get("MEAS", row.get("MEASURED"))
+    deviation = row.get("DEV")
     if nominal is None or measured is None or deviation is None:
         return True
     values = [Fraction(with_point(text)) for text in (measured, nominal, deviation)]

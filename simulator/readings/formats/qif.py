@@ -19,7 +19,7 @@ from ...inputs.quantities import QuantityError, exact_number
 from ...inputs.settings import shorten
 from ...inputs.xmltree import Element, parse_xml
 from ...machines.protocol import Array
-from .report import SPHERE, Feature, Format, Report, ReportProblems, System
+from .report import LOCATED, SPHERE, Feature, Format, Report, ReportProblems, System
 
 NAMESPACE = re.compile(r"http://qifstandards\.org/xsd/qif[0-9]*")
 MEASURED = ("FeatureMeasurement", "FeatureActual")
@@ -90,7 +90,7 @@ def _feature(document: _Document, one: Element, kind: str) -> Feature:
     name = one.text_at("FeatureName") or (item.text_at("FeatureName") if item else "")
     location, points, lacks = one.first("Location"), None, ""
     centre = None
-    if kind == SPHERE and location is not None:
+    if kind in LOCATED and location is not None:
         numbers = document.numbers(location)
         if len(numbers) != 3:
             told = f"{len(numbers)} co-ordinates instead of 3"

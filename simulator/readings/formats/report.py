@@ -17,6 +17,8 @@ Place = tuple[float, float, float]
 System = Literal["machine", "part", "unstated"]
 
 SPHERE, CIRCLE, POINT = "sphere", "circle", "point"
+# Features of which the centre may be a reading, or a point on a ball.
+LOCATED = (SPHERE, CIRCLE, POINT)
 # Of a feature whose report tells no kind, but three co-ordinates.
 UNSTATED = "feature"
 
