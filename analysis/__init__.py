@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         repair,
         reproduce,
         run,
+        sheet,
         simulate,
         spline,
     )
@@ -61,6 +62,7 @@ __all__ = [
     "repair",
     "reproduce",
     "run",
+    "sheet",
     "simulate",
     "spline",
     "stored",
