@@ -46,6 +46,15 @@ LEFT_OUT = (
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 
+# Keys that files did not have at first, by their settings: where they are left out, all is as it
+# was without them.
+LATER_KEYS = {
+    "KinematicSettings": ("functions", "squareness"),
+    "EmpiricalSettings": ("rotation_functions",),
+    "RadialSettings": ("function",),
+    "TrueMachineFileSettings": ("level",),
+}
+
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)
 
@@ -135,8 +144,10 @@ def _text(digest: _Digest, text: str) -> None:
 
 def _settings(digest: _Digest, value: BaseModel) -> None:
     _text(digest, f"settings {type(value).__name__}")
-    for name in type(value).model_fields:
-        if name not in TOLD_LATER:
+    later = LATER_KEYS.get(type(value).__name__, ())
+    for name, field in type(value).model_fields.items():
+        left_out = name in later and getattr(value, name) == field.default
+        if name not in TOLD_LATER and not left_out:
             _text(digest, EARLIER_NAMES.get(name, name))
             _add(digest, getattr(value, name))
     for name, item in sorted((value.__pydantic_private__ or {}).items()):

@@ -1,4 +1,5 @@
-"""The kinematic error model: 18 functions of one variable on a chain of axes.
+"""The kinematic error model: 18 functions of one variable on a chain of axes, and perhaps three
+squareness errors.
 
 Sources: NPL Report CISE 15/98, section 2.2; Park, Burdekin and Peggs, Appendix A. Rotations are
 right-handed about the machine's axes (ISO 230-1: EAX, EBX, ECX about X, Y, Z as the X axis moves),
@@ -7,18 +8,15 @@ of opposite sign to those of the NPL report.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from .arrangement import AXES, Arrangement
-from .bases import Basis, Polynomial
+from .bases import Basis, Polynomial, Quoted
+from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
 from .protocol import Array, Line, Parameter, Reported, Unit
-
-# Translations along x, y, z and rotations about them, by the letters of ISO 230-1.
-TRANSLATIONS = ("X", "Y", "Z")
-ROTATIONS = ("A", "B", "C")
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
@@ -26,36 +24,68 @@ ROTATIONS = ("A", "B", "C")
 HELD_AT_FAR_END = ("EYX", "EZX", "EZY")
 
 
-def describe(function: str) -> str:
-    """Words for an ISO 230-1 name.
+@dataclass(frozen=True)
+class Slope:
+    """The one function `rise` t: the straight part of a straightness error, by its angle."""
 
-    >>> describe("EXX"), describe("EYX"), describe("ECZ")
-    ('positioning error of X', 'straightness of X in Y', 'yaw of Z about Z')
-    """
-    kind, axis = function[1], function[2]
-    if kind in TRANSLATIONS:
-        return (
-            f"positioning error of {axis}" if kind == axis else f"straightness of {axis} in {kind}"
-        )
-    about = TRANSLATIONS[ROTATIONS.index(kind)]
-    if about == axis:
-        word = "roll" if axis != "Z" else "yaw"
-    elif axis == "Z":
-        word = "tilt"
-    else:
-        word = "yaw" if about == "Z" else "pitch"
-    return f"{word} of {axis} about {about}"
+    rise: float
+
+    @property
+    def zero_at_one(self) -> bool:
+        return False
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def values(self, t: Array) -> Array:
+        """The line at t (m,), as (m, 1)."""
+        return self.rise * t[:, None]
+
+    def interior(self) -> Basis:
+        raise TypeError("a slope has no part that vanishes at both ends")
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """The angle as it is."""
+        return Quoted(("",), np.eye(1))
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        raise TypeError("a slope is a single function")
 
 
 @dataclass(frozen=True)
 class ErrorFunction:
-    """One of the 18 functions: `axis` moves, `component` (0 to 2) is displaced or turned about."""
+    """One of the 18 functions, or a squareness error, with the functions it is made of."""
 
-    name: str
-    axis: int
-    component: int
-    rotation: bool
+    error: AxisError | SquarenessError
     basis: Basis
+
+    @property
+    def name(self) -> str:
+        return self.error.name
+
+    @property
+    def axis(self) -> int:
+        """The axis (0 to 2) that moves."""
+        return self.error.axis
+
+    @property
+    def component(self) -> int:
+        """Along what (0 to 2) it displaces, or about what it turns."""
+        error = self.error
+        return error.to if isinstance(error, SquarenessError) else error.component
+
+    @property
+    def rotation(self) -> bool:
+        """Whether it turns what the axis carries."""
+        return isinstance(self.error, AxisError) and self.error.is_rotation
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of its coefficients; a squareness error is its own only one."""
+        if isinstance(self.error, SquarenessError):
+            return (self.name,)
+        return tuple(f"{self.name}[{k + 1}]" for k in range(self.basis.size))
 
 
 @dataclass(frozen=True)
@@ -86,17 +116,11 @@ class KinematicModel:
             grid = np.linspace(0.0, 1.0, 65)
             peaks = np.abs(function.basis.values(grid)).max(axis=0, initial=0.0)
             arm = float(span.max()) if function.rotation else 1.0
-            unit: Unit = "rad" if function.rotation else "m"
-            for k, peak in enumerate(peaks):
-                found.append(
-                    Parameter(
-                        f"{function.name}[{k + 1}]",
-                        unit,
-                        function.name,
-                        describe(function.name),
-                        arm * peak,
-                    )
-                )
+            error = function.error
+            found += [
+                Parameter(name, error.unit, error.name, error.meaning, arm * peak)
+                for name, peak in zip(function.parameter_names, peaks, strict=True)
+            ]
         return tuple(found)
 
     @cached_property
@@ -169,8 +193,15 @@ class KinematicModel:
         return result
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function along its axis."""
-        return tuple(Line("", f.basis.values(t)) for f in self.functions if f.name == function)
+        """The function along its axis; a squareness error is the same everywhere."""
+        return tuple(
+            Line(
+                "",
+                np.ones((len(t), 1)) if isinstance(f.error, SquarenessError) else f.basis.values(t),
+            )
+            for f in self.functions
+            if f.name == function
+        )
 
     def reported(self) -> Reported:
         """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or
@@ -186,22 +217,19 @@ class KinematicModel:
         matrix = np.zeros((sum(len(q.names) for q in quoted), len(self.parameters)))
         for f, q in zip(self.functions, quoted, strict=True):
             matrix[len(names) : len(names) + len(q.names), self.slices[f.name]] = q.matrix
-            names += [f"{f.name} {name}" for name in q.names]
-            units += ["rad" if f.rotation else "m"] * len(q.names)
+            names += [f"{f.name} {name}".rstrip() for name in q.names]
+            units += [f.error.unit] * len(q.names)
         return Reported(tuple(names), tuple(units), matrix)
 
 
 def error_function(name: str, basis: Basis) -> ErrorFunction:
     """One of the 18 functions by its ISO 230-1 name.
 
-    >>> from .bases import Polynomial
     >>> found = error_function("ECX", Polynomial(3))
     >>> found.axis, found.component, found.rotation
     (0, 2, True)
     """
-    rotation = name[1] in ROTATIONS
-    component = (ROTATIONS if rotation else TRANSLATIONS).index(name[1])
-    return ErrorFunction(name, TRANSLATIONS.index(name[2]), component, rotation, basis)
+    return ErrorFunction(AXIS_ERRORS[name], basis)
 
 
 def kinematic_model(
@@ -232,21 +260,37 @@ def kinematic_model_of(
     lower: tuple[float, ...],
     upper: tuple[float, ...],
     full_rotations: bool = False,
+    own: tuple[tuple[str, Basis | None], ...] = (),
+    squareness: bool = False,
 ) -> KinematicModel:
     """The model with functions of the two families for its positional and its rotational errors.
 
-    All 18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and
-    EZY at the far end too.
+    `own` has families of single functions by ISO 230-1 name, None for one that there is not. All
+    18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and EZY
+    at the far end too. With `squareness` all six straightness functions do, and the three
+    squareness errors are parameters besides: the 21-parameter form, which can do the same where
+    the families contain t.
     """
+    families = dict(own)
     functions = []
-    for letters, basis in ((TRANSLATIONS, position), (ROTATIONS, rotation)):
-        for axis in TRANSLATIONS:
-            for letter in letters:
-                name = f"E{letter}{axis}"
-                functions.append(
-                    error_function(name, basis.interior() if name in HELD_AT_FAR_END else basis)
-                )
+    for is_rotation, family in ((False, position), (True, rotation)):
+        for error in AXIS_ERRORS.values():
+            basis = families.get(error.name, family)
+            if error.is_rotation == is_rotation and basis is not None:
+                is_held = error.is_straightness if squareness else error.name in HELD_AT_FAR_END
+                functions.append(ErrorFunction(error, basis.interior() if is_held else basis))
+    span = np.subtract(upper, lower)
+    if squareness:
+        functions += [
+            ErrorFunction(error, Slope(error.sign * float(span[error.axis])))
+            for error in SQUARENESS_ERRORS.values()
+        ]
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
+
+
+def in_plane(model: KinematicModel) -> KinematicModel:
+    """The model with those errors only that move points of the plane of x and y within it."""
+    return replace(model, functions=tuple(f for f in model.functions if f.error.in_plane))
 
 
 def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[float, Array]]:

@@ -9,8 +9,9 @@ import numpy as np
 from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import Settings, hint
 from .framing import in_frame_of
+from .kinds import Corner
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
-from .settings import Corner, build_error_model
+from .settings import build_error_model
 from .true_machine_settings import (
     CoefficientSettings,
     CurvesSettings,
@@ -53,7 +54,7 @@ def true_machine(
         curves = settings.model(lower, upper)
         return TrueMachine(curves, np.ones(len(curves.parameters)))
     if isinstance(settings, TrueMachineFileSettings):
-        return in_frame_of(fitted, settings.machine(), lower, upper)
+        return in_frame_of(fitted, settings.machine(len(lower)), lower, upper)
     other = getattr(settings, "error_model", None)
     model = fitted if other is None else build_error_model(other, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))
