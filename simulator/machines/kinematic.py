@@ -149,7 +149,8 @@ class KinematicModel:
         translation, rotation = np.zeros((m, 3, 3), a.dtype), np.zeros((m, 3, 3), a.dtype)
         for f in self.functions:
             target = rotation if f.rotation else translation
-            target[:, f.axis, f.component] = bases[f.axis, f.basis] @ a[self.slices[f.name]]
+            # A straightness error and a squareness error displace alike.
+            target[:, f.axis, f.component] += bases[f.axis, f.basis] @ a[self.slices[f.name]]
         return translation, rotation
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
