@@ -240,3 +240,5 @@ for _symbol, _kind in QUANTITIES.items():
 RECORDED = tuple(
     symbol for symbol, kind in QUANTITIES.items() if kind.is_recorded and " " not in symbol
 )
+# Those that it records if told.
+RECORDED_IF_TOLD = tuple(symbol for symbol, kind in QUANTITIES.items() if not kind.is_recorded)
