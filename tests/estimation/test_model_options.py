@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import re
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.results.prediction import Prediction
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.machines.description import true_volumetric
 
 from tests.reference.model_options import (
     Column,
@@ -285,3 +290,151 @@ def test_no_guideway_is_turned_where_the_workpiece_moves() -> None:
     fitted = bp.fit(design, bp.simulate(design, exact=True))
     assert fitted.adjustments == ()
     assert "squareness" in fitted.quantities
+
+
+MACHINE = """title: bridge with errors
+arrangement: MB1
+volume: {x: [0 mm, 600 mm], y: [0 mm, 420 mm], z: [0 mm, 300 mm]}
+errors:
+  EXX: {polynomial: [0 um, 9 um, -3 um]}
+  EYX: {polynomial: [0 um, 8 um, -13 um, 5 um]}
+  EBX: {polynomial: [0 urad, 14 urad, -4 urad]}
+  ECX: {polynomial: [0 urad, 6 urad, 5 urad]}
+  EYY: {polynomial: [0 um, -8 um, 4 um]}
+  EXY: {polynomial: [0 um, 7 um, -7 um]}
+  EAY: {polynomial: [0 urad, -9 urad]}
+  ECY: {polynomial: [0 urad, 5 urad, 8 urad]}
+  EZZ: {polynomial: [0 um, 3 um]}
+squareness: {EC0Y: 14 urad, EB0Z: -18 urad, EA0Z: 9 urad}
+"""
+
+
+@pytest.mark.parametrize("level", [None, "180 mm"])
+def test_a_machine_file_is_a_true_machine_in_a_plane(tmp_path: Path, level: str | None) -> None:
+    """What is estimated from its exact readings corrects lengths as the machine in space has them
+    at that level.
+    """
+    (tmp_path / "machine.yaml").write_text(MACHINE, encoding="utf-8")
+    model = {"kind": "kinematic", "arrangement": "MB1", "position_coefficients": 5,
+             "rotation_coefficients": 4, "squareness": "parameters"}  # fmt: skip
+    truth = {"kind": "machine", "file": "machine.yaml", **({"level": level} if level else {})}
+    given = plane(model) | {"true_machine": truth, "seed": 1}
+    design = bp.experiment(given, folder=tmp_path)
+    fitted = bp.fit(design, bp.simulate(design, exact=True))
+    # The model is linear in its parameters, the poses are not.
+    assert fitted.solution.factor.sum_of_squares < 1e-6
+    x = np.random.default_rng(1).uniform([0.05, 0.05], [0.55, 0.38], (12, 2))
+    first, second = np.triu_indices(12, 1)
+    machine = true_volumetric(load_machine(tmp_path / "machine.yaml"))
+    there = np.column_stack([x, np.full(12, 0.18 if level else 0.0)])
+    # Offsets are told in the frame of each of the two, so that lengths are between points with one.
+    for probe in ((0.0, 0.0), (-0.03, 0.0), (0.005, 0.04)):
+        p = np.tile(probe, (12, 1))
+        corrected = x + fitted.design.model.error(x, fitted.solution.state.a, p)
+        in_space = np.column_stack([p, np.zeros(12)])
+        true = (there + machine.model.error(there, machine.a, in_space))[:, :2]
+        nominal, found, expected = (
+            np.linalg.norm(one[first] - one[second], axis=1) for one in (x, corrected, true)
+        )
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9)
+        assert np.abs(expected - nominal).max() > 2e-6
+
+
+def test_a_machine_file_is_an_error_model_in_a_plane(tmp_path: Path) -> None:
+    (tmp_path / "machine.yaml").write_text(MACHINE, encoding="utf-8")
+    design = bp.experiment(plane({"kind": "machine", "file": "machine.yaml"}), folder=tmp_path)
+    planned = bp.run(design)
+    functions = {one.function for one in planned.design.model.parameters}
+    assert functions == {"EXX", "EYX", "ECX", "EYY", "EXY", "ECY", "EC0Y"}
+    columns = kinematic_y_first(planned.design.machine.volume)
+    assert planned.verdict.deficiency == 0 == estimate(planned.design, columns).deficiency
+    expected = estimate(planned.design, columns).lengths
+    assert planned.quantities["U6"].maximum == pytest.approx(expected.max(), rel=1e-7)
+
+
+def kinematic_y_first(volume: Any) -> list[Column]:
+    """The errors that the file states in the plane, y carrying x, with X turned for squareness."""
+    width, depth = volume.upper - volume.lower
+
+    def along(axis: int, component: int, functions: list[Any], arm: bool = False) -> list[Column]:
+        def column(x: Any, p: Any, f: Any) -> Any:
+            value = f(x[:, axis] / (width if axis == 0 else depth))
+            if not arm:
+                return value[:, None] * np.eye(3)[component]
+            carried = p + (x * [1.0, 0.0, 0.0] if axis == 1 else 0.0)
+            turned = np.stack([-carried[:, 1], carried[:, 0], 0.0 * value], axis=1)
+            return value[:, None] * turned
+
+        return [lambda x, p, f=f: column(x, p, f) for f in functions]  # type: ignore[misc]
+
+    bowed = [lambda t: t - t**2, lambda t: t - t**3]
+    return [
+        *along(0, 0, powers(3)),
+        *along(0, 1, bowed),
+        *along(0, 2, powers(3), arm=True),
+        *along(1, 1, powers(3)),
+        *along(1, 0, bowed[:1]),
+        *along(1, 2, powers(3), arm=True),
+        *along(0, 1, powers(2)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"error_model": {"kind": "kinematic", "functions": {"EZX": 3}}},
+            "functions.EZX: moves no point within the plane of x and y; remove it",
+        ),
+        ({"error_model": {"kind": "empirical"}}, 'kind "empirical" has 3 dimensions'),
+        (
+            {"true_machine": {"kind": "machine", "file": "machine.yaml", "level": "400 mm"}},
+            "level: is outside the file's volume, which goes from 0 mm to 300 mm in z",
+        ),
+        (
+            {"true_machine": {"kind": "curves", "files": ["x.csv", "z.csv"]}},
+            "files[1]: has no error that moves points within the plane of x and y; leave it out",
+        ),
+        (
+            {"error_model": {"kind": "machine", "file": "across.yaml"}},
+            "across.yaml states no error that could be estimated in the plane of x and y",
+        ),
+    ],
+)
+def test_what_no_plane_shows_is_refused(
+    tmp_path: Path, changes: dict[str, Any], message: str
+) -> None:
+    (tmp_path / "machine.yaml").write_text(MACHINE, encoding="utf-8")
+    head, _, _ = MACHINE.partition("errors:")
+    (tmp_path / "across.yaml").write_text(
+        head + "errors: {EZX: {polynomial: [0 um, 1 um, -1 um]}}\n", encoding="utf-8"
+    )
+    for axis, end in (("x", 600), ("z", 300)):
+        text = f"position_mm,E{axis.upper()}{axis.upper()}_um\n0,0\n{end},3\n"
+        (tmp_path / f"{axis}.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(bp.ExperimentError, match=re.escape(message)):
+        bp.experiment(plane({"kind": "kinematic"}) | changes, folder=tmp_path)
+
+
+def test_a_level_is_for_planes(tmp_path: Path) -> None:
+    (tmp_path / "machine.yaml").write_text(MACHINE, encoding="utf-8")
+    truth = {"kind": "machine", "file": "machine.yaml", "level": "100 mm"}
+    given = spatial({"kind": "kinematic"}) | {"true_machine": truth}
+    given["machine"] = {"volume": ["1 m", "0.9 m", "1.1 m"], "repeatability": "0.5 um"}
+    with pytest.raises(bp.ExperimentError, match="level: is for two dimensions; remove it"):
+        bp.experiment(given, folder=tmp_path)
+
+
+def test_a_sweep_keeps_squareness_if_told(tmp_path: Path) -> None:
+    design = plane(OPTIONS["plane with squareness"][0])
+    (tmp_path / "base.yaml").write_text(json.dumps(design), encoding="utf-8")
+    (tmp_path / "sweep.yaml").write_text(
+        "title: squareness\nbase: base.yaml\naxes:\n"
+        "  coefficients: {path: error_model.functions.EXX, values: [3, 5]}\n"
+        "record: [U6, squareness]\n",
+        encoding="utf-8",
+    )
+    table = bp.sweep(tmp_path / "sweep.yaml", store=tmp_path / "store.db").to_frame()
+    planned = bp.run(bp.experiment(design))
+    assert table["squareness_maximum_rad"].iloc[1] == planned.quantities["squareness"].maximum
+    assert table["parameters"].diff().iloc[1] == 2
