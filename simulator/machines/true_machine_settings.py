@@ -129,7 +129,7 @@ class TrueMachineFileSettings(Settings):
         """Take the machine that the file describes."""
         self._machine = machine
 
-    def machine(self, dimension: int) -> TrueMachine:
+    def machine(self, dimension: int = 3) -> TrueMachine:
         """The systematic errors of the machine, of two dimensions those at the level."""
         assert self._machine is not None
         found = true_volumetric(self._machine)
