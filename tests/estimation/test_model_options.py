@@ -425,6 +425,29 @@ def test_a_level_is_for_planes(tmp_path: Path) -> None:
         bp.experiment(given, folder=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("function", "advice"),
+    [
+        ("EXY", "let its coefficients add up to zero, and state its slope as EC0Y"),
+        ("EYX", "where it fixes the machine's frame; let its coefficients add up to zero"),
+    ],
+)
+def test_a_slope_is_stated_as_squareness(function: str, advice: str) -> None:
+    truth = {"kind": "coefficients", "values": {f"{function} t": "3 um"}}
+    given = plane(OPTIONS["plane with squareness"][0]) | {"true_machine": truth}
+    with pytest.raises(bp.ExperimentError, match=re.escape(advice)):
+        bp.experiment(given)
+
+
+def test_priors_on_squareness_and_single_functions() -> None:
+    """A prior is one more observation of the parameter that it names."""
+    given = plane(OPTIONS["plane with squareness"][0])
+    before = bp.run(bp.experiment(given)).quantities["squareness"].maximum
+    prior = {"parameter": "EC0Y", "standard_uncertainty": "1 urad"}
+    after = bp.run(bp.experiment(given | {"priors": [prior]})).quantities["squareness"].maximum
+    assert after == pytest.approx((before**-2 + 1e12) ** -0.5, rel=1e-9)
+
+
 def test_a_sweep_keeps_squareness_if_told(tmp_path: Path) -> None:
     design = plane(OPTIONS["plane with squareness"][0])
     (tmp_path / "base.yaml").write_text(json.dumps(design), encoding="utf-8")
