@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from ..geometry.motions import cross_matrices
-from .kinematic import rotation_and_derivatives
 from .protocol import Array, Line, Parameter, Reported, Unit
+from .rigid_chain import rotation_and_derivatives
 from .terms import Terms
 
 FUNCTIONS = {

@@ -17,6 +17,7 @@ from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial, Quoted
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
 from .protocol import Array, Line, Parameter, Reported, Unit
+from .rigid_chain import RigidChain
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
@@ -157,7 +158,7 @@ class KinematicModel:
         translation, rotation = self._motions(self._bases(x), a, len(x))
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
-            return _Chain(self.arrangement, from_origin, translation, rotation, p).error()
+            return RigidChain(self.arrangement, from_origin, translation, rotation, p).error()
         carried = carried_vectors(self.arrangement, from_origin, p)
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
@@ -169,7 +170,7 @@ class KinematicModel:
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
             translation, rotation = self._motions(bases, a, len(x))
-            by_translation, by_rotation = _Chain(
+            by_translation, by_rotation = RigidChain(
                 self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
@@ -316,95 +317,3 @@ def _crossed(v: Array, w: Array) -> Array:
         j, k = (i + 1) % 3, (i + 2) % 3
         found[:, i] = v[:, j] * w[:, k] - v[:, k] * w[:, j]
     return found
-
-
-def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    matrix = np.zeros((len(angle), 3, 3), angle.dtype)
-    i, j = (about + 1) % 3, (about + 2) % 3
-    if derivative:
-        c, s = -s, c
-    else:
-        matrix[:, about, about] = 1.0
-    matrix[:, i, i], matrix[:, i, j], matrix[:, j, i], matrix[:, j, j] = c, -s, s, c
-    return matrix
-
-
-def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
-    """Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
-    plain = [_plane_rotation(angles[:, k], k) for k in range(3)]
-    derivatives = []
-    for k in range(3):
-        factors = list(plain)
-        factors[k] = _plane_rotation(angles[:, k], k, derivative=True)
-        derivatives.append(factors[2] @ factors[1] @ factors[0])
-    return plain[2] @ plain[1] @ plain[0], derivatives
-
-
-@dataclass(frozen=True)
-class _Chain:
-    """Rigid-body product of all axes: where the probe's tip lies in the frame of the workpiece
-    table.
-    """
-
-    arrangement: Arrangement
-    x: Array
-    translation: Array
-    rotation: Array
-    p: Array
-
-    def _walk(self) -> tuple[Array, list[Array], list[Array]]:
-        m = len(self.x)
-        dtype = np.result_type(self.x, self.translation, self.p)
-        by_translation: list[Array] = [np.zeros((0,))] * 3
-        by_rotation: list[Array] = [np.zeros((0,))] * 3
-
-        def step(axis: int) -> Array:
-            displaced = self.translation[:, axis].astype(dtype, copy=True)
-            displaced[:, axis] += self.x[:, axis]
-            return displaced
-
-        def turned(matrix: Array, vector: Array) -> Array:
-            return np.einsum("mij,mj->mi", matrix, vector)
-
-        tip = self.p.astype(dtype, copy=True)
-        on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]
-        for axis in reversed(on_probe_side):
-            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
-            by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
-            tip = step(axis) + turned(matrix, tip)
-        prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
-        for axis in on_probe_side:
-            by_translation[axis] = prefix
-            by_rotation[axis] = prefix @ by_rotation[axis]
-            prefix = prefix @ rotation_and_derivatives(self.rotation[:, axis])[0]
-
-        # The table moves the other way: going outwards, undo each axis's displacement, then its
-        # rotation.
-        passed = list(on_probe_side)
-        for name in self.arrangement.workpiece_side:
-            axis = AXES.index(name)
-            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
-            back = matrix.transpose(0, 2, 1)
-            outside = tip + step(axis)
-            by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
-            by_rotation[axis] = np.zeros((m, 3, 3), dtype)
-            for earlier in [*passed, axis]:
-                by_translation[earlier] = back @ by_translation[earlier]
-                by_rotation[earlier] = back @ by_rotation[earlier]
-            by_rotation[axis] = np.stack(
-                [turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2
-            )
-            tip = turned(back, outside)
-            passed.append(axis)
-        return tip, by_translation, by_rotation
-
-    def error(self) -> Array:
-        return self._walk()[0] - self.x
-
-    def sensitivities(self) -> tuple[list[Array], list[Array]]:
-        """Derivatives of the tip by each axis's translation and rotation, lists by axis of (m, 3,
-        3).
-        """
-        _, by_translation, by_rotation = self._walk()
-        return by_translation, by_rotation
