@@ -12,7 +12,7 @@ from ..inputs.settings import Forms, Settings
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .empirical import FrameError, empirical_model
-from .kinds import Corner, ErrorModelKind
+from .model_kinds import Corner, ErrorModelKind
 from .protocol import ErrorModel
 from .terms import (
     WITH_CONSTANT,

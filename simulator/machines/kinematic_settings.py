@@ -18,8 +18,8 @@ from .arrangement_settings import (
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .error_names import AXIS_ERRORS
-from .kinds import Corner, ErrorModelKind
 from .kinematic import in_plane, kinematic_model_of
+from .model_kinds import Corner, ErrorModelKind
 from .plane import PlaneModel, in_space
 from .protocol import ErrorModel
 

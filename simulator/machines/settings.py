@@ -16,9 +16,9 @@ from ..inputs.settings import Settings, listing
 from .custom import custom_model
 from .description import MachineDescription, fitted_in_plane, fitted_volumetric
 from .empirical_settings import EMPIRICAL
-from .kinds import Corner, ErrorModelKind
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
+from .model_kinds import Corner, ErrorModelKind
 from .plane import PlaneModel, in_space
 from .protocol import ErrorModel
 from .spatial_metric import SpatialMetricModel

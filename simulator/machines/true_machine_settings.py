@@ -17,7 +17,7 @@ from .arrangement_settings import (
 )
 from .curves import Interpolation, Points, curves_model
 from .description import MachineDescription, true_volumetric
-from .kinds import Corner
+from .model_kinds import Corner
 from .plane import PlaneModel
 from .protocol import ErrorModel, TrueMachine
 from .settings import ErrorModelSettings

@@ -12,7 +12,7 @@ from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_
 from ..inputs.settings import Settings, hint
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
 from .framing import in_frame_of
-from .kinds import Corner
+from .model_kinds import Corner
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
 from .settings import build_error_model
 from .true_machine_settings import (
