@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
 from .outputs import UsageError
-from .telling import complain, warn
+from .telling import complain, tell_notes, warn
 
 if TYPE_CHECKING:
     from ..planning.requirements.goals import Goal
@@ -155,6 +155,7 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
     from .excerpts import print_errors
     from .github import annotation_lines
 
+    tell_notes(checked.notes)
     warn(checked.doubts)
     if options.format == "github":
         workspace = os.environ.get("GITHUB_WORKSPACE")

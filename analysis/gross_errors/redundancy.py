@@ -120,9 +120,14 @@ def reliability_of(
         for symbol, groups in changes.items():
             for among in groups:
                 _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
+    joint = [one.word for one in design.observations if one.is_joint]
+    # Of standards' lengths those that share no reading come first, and have a pattern each.
     for kind, rows in places.items():
         own = np.flatnonzero(given.kind == kind)
-        left[own] = redundancy[rows][: len(own)]
+        if kind in ("reading", "length"):
+            left[own] = redundancy[rows][: len(own)]
+        elif kind not in joint:
+            left[own] = redundancy[rows][given.subject[own]]
     repeats = design.readings.repeats[design.plate_readings]
     every = patterns(design, at.state, None, every_start=True)
     tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()

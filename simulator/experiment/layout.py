@@ -24,6 +24,7 @@ from ..design.objects import (
 from ..design.observations.balls import BallObservations
 from ..design.observations.coordinates import CalibratedCoordinates, no_coordinates
 from ..design.observations.distances import CalibratedDistances, no_distances
+from ..design.observations.joint_values import JointValues
 from ..design.observations.priors import Priors
 from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings
@@ -207,11 +208,17 @@ def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallOb
         CalibratedDistances: [no_distances()],
         CalibratedCoordinates: [no_coordinates()],
     }
+    joint = []
     for item in experiment.calibration:
         if experiment.artefacts[item.artefact].role == "plate":
             one = item.observed(int(first_ball[item.artefact]))
-            parts.setdefault(type(one), []).append(one)
-    return [kind.joined(own) for kind, own in parts.items()]
+            root = item.root
+            if root is None:
+                parts.setdefault(type(one), []).append(one)
+            else:
+                joint.append((one, root))
+    found = [kind.joined(own) for kind, own in parts.items()]
+    return [*found, JointValues.of(joint)] if joint else found
 
 
 def _held(
@@ -229,7 +236,7 @@ def _held(
     """
     d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
-    ball, axis = (
+    ball, axis, _ = (
         np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
     )
     for artefact in np.unique(position_artefact):

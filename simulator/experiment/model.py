@@ -186,7 +186,8 @@ class Experiment:
     standard uncertainty is what targets are meant for. ``offset_uncertainties``: standard
     uncertainties (d,) of the offsets that are estimated, by the probe's name, infinite where the
     offset is unknown; other offsets are as stated. ``pool``: what a plan may choose from.
-    ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
+    ``doubts``: what of the file is possible, and unlikely to be meant. ``notes``:
+    what was found in its tables by itself. ``tree``: what was written,
     without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an
     experiment of a tree.
     """
@@ -216,6 +217,7 @@ class Experiment:
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:

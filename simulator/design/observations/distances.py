@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
-from ...inputs.messages import ExperimentError, Steps
-from ...inputs.quantities import LengthFunction, PositiveLength
+from ...inputs.messages import Steps
+from ...inputs.quantities import LengthFunction, PositiveLength, UncertaintyFunction
 from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
-from ...inputs.tables import read_table
-from ...inputs.yamltree import Mark, mark_of
+from ...inputs.yamltree import mark_of
 from ...machines.protocol import Array, Integers
 from ..arrays import Design, Words
 from ..lookup import References
 from .balls import BallObservations
-from .calibration import FAR_FROM_DRAWING, Calibration, far_from_drawing
-
-# Balls tied to one another by distances are estimated together, with memory that grows as the
-# square of their number.
-MOST_TIED_BALLS = 3000
+from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration, far_from_drawing
+from .stated_values import (
+    CertificateSettings,
+    Entry,
+    check_keys,
+    is_digital,
+    read_digital,
+    read_rows,
+    uncertainties_of,
+)
+from .whitening import CovarianceRoot, at_least_exact
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,8 @@ class DistanceCalibration(Calibration):
 
     ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
     ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
-    the function ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability``
+    the function ``standard_uncertainty`` at the nominal distances, None where a file states them.
+    ``form`` and ``repeatability``
     matter for length standards only.
     """
 
@@ -80,11 +86,12 @@ class DistanceCalibration(Calibration):
     dimensions: Literal[2, 3]
     values: Array
     certified: bool
-    standard_uncertainty: LengthFunction
+    standard_uncertainty: LengthFunction | None
     standard_uncertainties: Array
     form: Literal["distance", "projection"]
     repeatability: Literal["included", "ignored"]
     kind: Literal["distances"] = "distances"
+    root: CovarianceRoot | None = None
 
     are_lengths: ClassVar[bool] = True
 
@@ -92,7 +99,11 @@ class DistanceCalibration(Calibration):
         ends = np.asarray(self.pairs + first, np.int64)
         dimensions = np.full(len(ends), self.dimensions)
         return CalibratedDistances(
-            ends[:, 0], ends[:, 1], dimensions, self.values, self.standard_uncertainties
+            ends[:, 0],
+            ends[:, 1],
+            dimensions,
+            self.values,
+            at_least_exact(self.standard_uncertainties),
         )
 
     def names(self, layout: BallLayout) -> list[tuple[str, str]]:
@@ -100,9 +111,11 @@ class DistanceCalibration(Calibration):
 
     def times_as_uncertain(self, factor: float) -> DistanceCalibration:
         old = self.standard_uncertainty
+        new = None if old is None else LengthFunction(factor * old.constant, factor * old.slope)
+        scaled = super().times_as_uncertain(factor) if old is None else self
         return replace(
-            self,
-            standard_uncertainty=LengthFunction(factor * old.constant, factor * old.slope),
+            scaled,
+            standard_uncertainty=new,
             standard_uncertainties=factor * self.standard_uncertainties,
         )
 
@@ -121,7 +134,7 @@ class CertifiedDistance(Settings):
 CertifiedDistances = NonEmpty[CertifiedDistance]
 
 
-class DistancesSettings(Settings):
+class DistancesSettings(CertificateSettings):
     """Calibrated distances between balls of an artefact."""
 
     kind: Literal["distances"] = Field(description="calibrated distances between balls")
@@ -137,12 +150,19 @@ class DistancesSettings(Settings):
     dimensions: Literal[2, 3] | None = Field(
         None, description="3 (default): distances in space; 2: in the artefact's plane"
     )
-    standard_uncertainty: LengthFunction = Field(description="of each distance; may grow with it")
+    standard_uncertainty: UncertaintyFunction | None = Field(
+        None,
+        description=(
+            "of each distance; may grow with it; 0 um where it is exact; left out where values or"
+            " covariance state it"
+        ),
+    )
     values: Forms[Text, CertifiedDistances, CertifiedDistances] | None = Field(
         None,
         description=(
-            "CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
-            "{balls: [a, b], distance: …}; default: nominal distances"
+            "CSV file with columns ball_1, ball_2 and distance_mm, and standard_uncertainty_um, or"
+            " expanded_uncertainty_um and k; a DCC (XML); or a list of"
+            " {balls: [a, b], distance: …}; default: nominal distances"
         ),
     )
     form: Literal["distance", "projection"] = Field(
@@ -194,10 +214,25 @@ def read_distances(
         )
         references.problems.add((*steps, "pairs"), text)
         return None
-    values = _certified_distances(
-        settings, indices, layout, nominal, (*steps, "values"), references
-    )
-    if values is None or not is_right:
+    is_right &= check_keys(settings, steps, references)
+    if not is_right:
+        return None
+    found = _certified_distances(settings, indices, layout, nominal, steps, references)
+    if found is None:
+        return None
+    values, in_file, covariance = found
+    names = [(layout.names[i], layout.names[j]) for i, j in indices]
+    stated = settings.standard_uncertainty
+    of_item = None if stated is None else stated.at(nominal)
+    known = uncertainties_of(settings, names, True, of_item, in_file, covariance, steps, references)
+    if known is None:
+        return None
+    if known.root is not None and references.artefacts[artefact].role == "length_standard":
+        text = (
+            "a length standard's lengths are read as independent; leave the covariance out, or give"
+            f' "{artefact}" the role of a plate'
+        )
+        references.problems.add((*steps, "covariance"), text)
         return None
     indices.setflags(write=False)
     return DistanceCalibration(
@@ -206,10 +241,11 @@ def read_distances(
         dimensions,
         frozen(values),
         settings.values is not None,
-        settings.standard_uncertainty,
-        frozen(settings.standard_uncertainty.at(nominal)),
+        stated if known.root is None else None,
+        known.standard,
         settings.form,
         settings.repeatability,
+        root=known.root,
     )
 
 
@@ -266,31 +302,42 @@ def _certified_distances(
     nominal: Array,
     steps: Steps,
     references: References,
-) -> Array | None:
+) -> tuple[Array, Array, tuple[Array, Array] | None] | None:
+    """Values (m,), standard uncertainties (m,) in their file, NaN without any, and covariance."""
+    none = np.full(len(nominal), np.nan)
     if settings.values is None:
-        return nominal
-    problems = references.problems
-    # Two names, the distance, and where it is written.
-    entries: list[tuple[tuple[str, str], float, Mark, Steps]]
-    if isinstance(settings.values, str):
-        try:
-            rows = read_table(
-                references.folder / settings.values, ["ball_1", "ball_2"], ["distance"]
-            )
-        except ExperimentError as error:
-            problems.take(error, steps)
+        return nominal, none, None
+    problems, steps = references.problems, (*steps, "values")
+    wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
+    covariance = None
+    if is_digital(settings.values):
+        digital = read_digital(settings, wanted, True, steps[:-1], references)
+        if digital is None:
+            return None
+        entries, covariance = digital.entries, digital.covariance
+    elif isinstance(settings.values, str):
+        read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
+        if read is None:
             return None
         entries = [
-            (cast(tuple[str, str], row.texts), row.lengths[0], row.mark, steps) for row in rows
+            Entry((row.texts[0], row.texts[1]), row.lengths[0], float(u[0]), row.mark, steps)
+            for row, u in zip(*read, strict=True)
         ]
     else:
         entries = [
-            (entry.balls, entry.distance, mark_of(problems.root, (*steps, i)), (*steps, i))
+            Entry(
+                entry.balls,
+                entry.distance,
+                np.nan,
+                mark_of(problems.root, (*steps, i)),
+                (*steps, i),
+            )
             for i, entry in enumerate(settings.values)
         ]
     before, known = len(problems.messages), set(layout.names)
-    by_pair: dict[frozenset[str], float] = {}
-    for names, distance, mark, place in entries:
+    by_pair: dict[frozenset[str], Entry] = {}
+    for entry in entries:
+        names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
         for name in names:
             if name not in known:
                 problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
@@ -309,21 +356,25 @@ def _certified_distances(
             problems.add_at(mark, place, text)
         if distance <= 0:
             problems.add_at(mark, place, "a distance must be above zero; correct it")
-        by_pair[pair] = distance
-    wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
+        by_pair[pair] = entry
     missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
     drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
-    for names, distance, mark, place in entries:
-        expected = drawn.get(frozenset(names))
+    for entry in entries:
+        expected, distance = drawn.get(frozenset(entry.names)), entry.value
         if (
             expected is not None
             and distance > 0
             and not abs(distance - expected) <= FAR_FROM_DRAWING * expected
         ):
             text = f"{far_from_drawing(distance, expected)}; correct one of the two"
-            problems.add_at(mark, place, text)
+            problems.add_at(entry.mark, entry.steps, text)
     if missing and len(problems.messages) == before:
         problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
     if len(problems.messages) > before:
         return None
-    return np.array([by_pair[frozenset(pair)] for pair in wanted])
+    chosen = [by_pair[frozenset(pair)] for pair in wanted]
+    return (
+        np.array([one.value for one in chosen]),
+        np.array([one.uncertainty for one in chosen]),
+        covariance,
+    )
