@@ -325,6 +325,12 @@ class Observations(ABC):
         """
         return self.value if self.scales else np.zeros(len(self))
 
+    def loosened(self, least: float) -> Self:
+        """The same with standard uncertainties of `least` at the least, where smaller ones stand
+        for none.
+        """
+        return self
+
     def fixing(self) -> tuple[Integers, Integers, Array]:
         """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter, and
         the co-ordinates (f,).

@@ -230,7 +230,12 @@ def with_artefact(
 def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibration | None:
     if isinstance(item, DistanceCalibration):
         chosen = pair_set(old, item.pairs)
-        if chosen is None or chosen not in (*new.pair_sets, "all") or item.certified or item.standard_uncertainty is None:
+        if (
+            chosen is None
+            or chosen not in (*new.pair_sets, "all")
+            or item.certified
+            or item.standard_uncertainty is None
+        ):
             return None
         return distances(item, new, pairs(new, chosen))
     if isinstance(item, CoordinateCalibration):

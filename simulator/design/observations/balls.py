@@ -33,6 +33,9 @@ class BallObservations(Observations):
         uncertainty = np.where(self.is_exact, 0.0, self.uncertainty)
         return uncertainty * generator.standard_normal((count, len(self)))
 
+    def loosened(self, least: float) -> Self:
+        return self.given(uncertainty=np.maximum(self.uncertainty, least))
+
     @classmethod
     def joined(cls, parts: Sequence[BallObservations]) -> Self:
         """The observations of all parts together."""

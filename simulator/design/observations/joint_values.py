@@ -21,6 +21,10 @@ from .whitening import EXACT, CovarianceRoot
 # The matrix of a block, and its derivatives by all balls, are held as a whole.
 MOST_JOINT_VALUES = 2000
 
+# Standard deviation of a combination, in parts of the standard uncertainties of its values, that
+# counts as none where figures are wanted to a few digits.
+LOOSE_COMBINATION = 1e-4
+
 
 @dataclass(frozen=True)
 class JointValues(BallObservations):
@@ -122,6 +126,18 @@ class JointValues(BallObservations):
             for part in self._parts
         )
         return replace(self, roots=roots, uncertainty=own)
+
+    def loosened(self, least: float) -> JointValues:
+        """Combinations without variance have one that is as small beside that of their values."""
+        roots = tuple(
+            replace(
+                root,
+                own=np.maximum(root.own, least),
+                deviations=np.maximum(root.deviations, LOOSE_COMBINATION),
+            )
+            for root in self.roots
+        )
+        return replace(self, roots=roots, uncertainty=np.maximum(self.uncertainty, least))
 
     def name(self, design: Design, k: int) -> str:
         block, row = self._at(k)
