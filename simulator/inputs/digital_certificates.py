@@ -213,8 +213,8 @@ def _values(block: Element, contexts: tuple[str, ...]) -> Iterator[DigitalValue]
     stated = _uncertainty(block)
     for k, value in enumerate(values[: MOST_NAMES + 1]):
         own = (labels[k],) if len(labels) == len(values) else ()
-        unit = _one_of(units, k, len(values))
-        if unit is None:
+        own_unit = _one_of(units, k, len(values))
+        if own_unit is None:
             yield DigitalValue(
                 block.mark,
                 own,
@@ -232,7 +232,7 @@ def _values(block: Element, contexts: tuple[str, ...]) -> Iterator[DigitalValue]
             mine = _Uncertainty(
                 stated.mark, stated.is_expanded, [amounts or ""], [factors] if factors else []
             )
-        yield _value(block.mark, own, contexts, value, unit, mine)
+        yield _value(block.mark, own, contexts, value, own_unit, mine)
 
 
 def _one_of(texts: list[str], k: int, count: int) -> str | None:
