@@ -1,6 +1,7 @@
 """Planning and evaluation of ball-plate experiments for co-ordinate measuring machines.
 
-`import ballplate as bp` gives the functions of `ballplate.api`, each loaded when it is first used.
+`import ballplate as bp` gives the functions of `ballplate.api` and `ballplate.stores`, each
+loaded when it is first used.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ if TYPE_CHECKING:
         run,
         simulate,
         spline,
-        sweep,
     )
     from .estimators.estimator_choice import ESTIMATORS
     from .simulator.experiment.model import Experiment
+    from .stores import stored, sweep, sweep_report
     from .sweeps.running import OtherSweepError
     from .sweeps.store_file import StoreError
 
@@ -60,7 +61,9 @@ __all__ = [
     "run",
     "simulate",
     "spline",
+    "stored",
     "sweep",
+    "sweep_report",
 ]
 
 _PLACES = {
@@ -69,6 +72,9 @@ _PLACES = {
     "ExperimentError": "ballplate.simulator.inputs.messages",
     "OtherSweepError": "ballplate.sweeps.running",
     "StoreError": "ballplate.sweeps.store_file",
+    "stored": "ballplate.stores",
+    "sweep": "ballplate.stores",
+    "sweep_report": "ballplate.stores",
 }
 
 
