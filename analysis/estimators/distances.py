@@ -221,8 +221,16 @@ def _refuse_many_terms(
 def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
     """Refuse what estimators of distances alone cannot follow.
 
-    :raises ExperimentError: a Bryan gauge, or a length standard without a certificate.
+    :raises ExperimentError: a Bryan gauge, a length standard without a certificate, or correlated
+        values.
     """
+    for k, item in enumerate(experiment.calibration):
+        if item.root is not None:
+            text = (
+                "estimators of distances alone take certified distances as independent; use the"
+                " full estimator for correlated values and functions of your own"
+            )
+            raise refused(experiment.source, text, f"calibration[{k}]")
     gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
     if gauges or unknown:
         what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
