@@ -92,7 +92,10 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-modules",
         action="store_true",
-        help="refuse files with an error model in Python, because loading them runs its code",
+        help=(
+            "refuse files with an error model or a calibration in Python, because loading them runs"
+            " its code"
+        ),
     )
 
 

@@ -342,3 +342,23 @@ def test_a_deficient_design_stays_so(tmp_path: Path) -> None:
         expected = dense.spread(stacked(nominal, lengths, 5e6 * np.eye(len(PAIRS)))).deficiency
         assert found.deficiency == expected > 0
         assert of.parameters == nominal.parameters
+
+
+@pytest.mark.parametrize("kind", ["laser", "exact"])
+def test_a_plan_weighs_them_as_run_does(
+    correlated: tuple[Experiment, Real], tmp_path: Path, kind: str
+) -> None:
+    """What a pool offers at a price is worth what it is worth in the experiment."""
+    item = distances(covariance="c.csv")
+    if kind == "exact":
+        item = {"kind": "coordinates", "balls": "corners", "standard_uncertainty": "0 um"}
+    sides = {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.4 um"}
+    offered = written(
+        tmp_path, sides, pool={"calibration": [item | {"name": kind, "price": "1 h"}]}
+    )
+    found = bp.plan(offered, hours=20).to_dict()
+    assert kind in str(found["chosen"])
+    both = bp.run(written(tmp_path, sides, item)).to_dict()["quantities"]["U6"]["average"]
+    without = bp.run(written(tmp_path, sides)).to_dict()["quantities"]["U6"]["average"]
+    assert found["value"] == pytest.approx(both, rel=1e-6)
+    assert both < 0.99 * without
