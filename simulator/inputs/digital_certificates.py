@@ -309,6 +309,9 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
     region = next((one for one in block.children if one.name.removesuffix(LIST) in REGIONS), None)
     if region is None:
         return None
+    if count > MOST_NAMES:
+        text = f"a covariance of {count} values; at most {MOST_NAMES} are possible"
+        raise ExperimentError([region.mark.message("", text)])
     columns = [one for one in region.walk() if one.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
     marks = []

@@ -27,7 +27,7 @@ METRES = ("metre", "meter")
 RADIANS = ("radian",)
 RATIOS = ("one", "percent", "ppm")
 TEMPERATURES = {"degreecelsius": 0.0, "kelvin": -273.15}
-_TOKEN = re.compile(r"\\([A-Za-z]+)(?:\{([+-]?[0-9]+)\})?")
+_TOKEN = re.compile(r"\\([A-Za-z]+)(?:\{([+-]?[0-9])\})?")
 
 
 def length_factor(unit: str, power: int = 1) -> Fraction:

@@ -380,20 +380,7 @@ class LengthFunction:
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
-        units = f"({'|'.join(_unit_patterns('length'))})"
-        growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
-        stated = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
-        return {
-            "type": "string",
-            "pattern": f"^({growing}|{stated})$",
-            "examples": [
-                "0.2 um",
-                LENGTH_FUNCTION_EXAMPLE,
-                "0.9 um + 2.5 um/m",
-                "(0.9 + L/400) um with L in mm",
-            ],
-        }
+        return _length_function_schema("0.2 um")
 
 
 @dataclass(frozen=True)
@@ -641,6 +628,23 @@ def _pattern(kind: str) -> str:
     return f"^ *{NUMBER} *({'|'.join(_unit_patterns(kind))})$"
 
 
+def _length_function_schema(*examples: str) -> dict[str, Any]:
+    constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
+    units = f"({'|'.join(_unit_patterns('length'))})"
+    growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
+    stated = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
+    return {
+        "type": "string",
+        "pattern": f"^({growing}|{stated})$",
+        "examples": [
+            *examples,
+            LENGTH_FUNCTION_EXAMPLE,
+            "0.9 um + 2.5 um/m",
+            "(0.9 + L/400) um with L in mm",
+        ],
+    }
+
+
 def _schema(kind: str, *examples: str) -> WithJsonSchema:
     return WithJsonSchema({"type": "string", "pattern": _pattern(kind), "examples": list(examples)})
 
@@ -654,7 +658,11 @@ PositiveLength = Annotated[
 LengthUncertainty = Annotated[
     float, PlainValidator(parse_length_uncertainty), _schema("length", "0.2 um", "0 um")
 ]
-UncertaintyFunction = Annotated[LengthFunction, PlainValidator(parse_uncertainty_function)]
+UncertaintyFunction = Annotated[
+    LengthFunction,
+    PlainValidator(parse_uncertainty_function),
+    WithJsonSchema(_length_function_schema("0.2 um", "0 um")),
+]
 Angle = Annotated[
     float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")
 ]

@@ -13,6 +13,7 @@ import yaml
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.sweeps.named_files import named_by
 
 from tests.observations.test_joint_values import BALLS, Real, covariance_file, written
 from tests.reference import certificates as dcc
@@ -255,6 +256,14 @@ WRONG_CERTIFICATES = {
         of_list(covariance=dcc.region([row[:3] for row in MATRIX[:3]], SQUARED)),
         "for 4 values; it must be square",
     ),
+    "an uncertainty missing": (
+        SPELLINGS["a list"].replace(dcc.expanded(IN_MM[1]), "", 1),
+        "states no uncertainty of r3c1–r3c3, and of others it does",
+    ),
+    "a unit to a high power": (
+        SPACED.replace("\\milli\\metre", "\\metre\\tothe{99999999}"),
+        "is none of a length",
+    ),
     "a covariance in lengths": (
         of_list(covariance=dcc.region(MATRIX, "\\micro\\metre")),
         "is none of the square of a length",
@@ -465,3 +474,12 @@ def standards(folder: Path, plate: dict[str, Any], uncertainty: str, repeatabili
         },
     ]
     return written(folder, *calibration, artefacts={"plate": plate, "bar": bar}, positions=places)
+
+
+def test_a_sweep_takes_all_files_of_a_certificate_along(tmp_path: Path) -> None:
+    (tmp_path / "v.csv").write_text(table(HEADER, *LINES), encoding="utf-8")
+    (tmp_path / "m.csv").write_text(MATRIX_FILE, encoding="utf-8")
+    (tmp_path / "c.xml").write_text(SPACED, encoding="utf-8")
+    written(tmp_path, item(values="v.csv", covariance="m.csv"), item(values="c.xml"))
+    files = {path.name for path in named_by(tmp_path / "e.yaml")}
+    assert files == {"v.csv", "m.csv", "c.xml"}

@@ -393,6 +393,13 @@ def uncertainties_of(
         where = settings.values if in_file or not settings.covariance else settings.covariance
         problems.add(own, f"{where} states uncertainties; remove one of the two", of_key=True)
         return None
+    of_values = np.diag(matrix[0]) if states and matrix is not None else found
+    without = np.flatnonzero(np.isnan(of_values))
+    if 0 < len(without) < len(of_values):
+        told = listing(_named(names[k], is_pair) for k in without.tolist())
+        text = f"states no uncertainty of {told}, and of others it does; leave these out"
+        problems.add((*steps, "values"), text)
+        return None
     if stated is None and not states:
         text = 'missing; add "standard_uncertainty", or values with their uncertainties'
         problems.add(own, text)
