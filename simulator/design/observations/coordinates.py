@@ -19,14 +19,9 @@ from ..arrays import Design
 from ..lookup import References
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration
-from .stated_values import (
-    CertificateSettings,
-    check_keys,
-    is_digital,
-    read_digital,
-    read_rows,
-    uncertainties_of,
-)
+from .certificate_tables import read_rows
+from .digital_values import read_digital
+from .stated_values import CertificateSettings, check_keys, is_digital, uncertainties_of
 from .whitening import CovarianceRoot, at_least_exact
 
 # What balls may be off a plane that they are drawn in, in metres.

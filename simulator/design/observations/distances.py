@@ -19,13 +19,14 @@ from ..arrays import Design, Words
 from ..lookup import References
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration, far_from_drawing
+from .certificate_tables import read_rows
+from .digital_values import read_digital
 from .stated_values import (
+    CertificateEntry,
     CertificateSettings,
-    Entry,
+    FileValues,
     check_keys,
     is_digital,
-    read_digital,
-    read_rows,
     uncertainties_of,
 )
 from .whitening import CovarianceRoot, at_least_exact
@@ -180,16 +181,10 @@ class DistancesSettings(CertificateSettings):
 def read_distances(
     settings: DistancesSettings, artefact: str, steps: Steps, references: References
 ) -> DistanceCalibration | None:
-    layout, is_right = references.layouts[artefact], True
-    if references.artefacts[artefact].role != "length_standard":
-        for key in ("form", "repeatability"):
-            if key in settings.model_fields_set:
-                text = (
-                    "is only for artefacts with role: length_standard; remove it, or give"
-                    f' "{artefact}" that role'
-                )
-                references.problems.add((*steps, key), text, of_key=True)
-                is_right = False
+    layout, is_right = (
+        references.layouts[artefact],
+        _suits_role(settings, artefact, steps, references),
+    )
     if references.dimension == 2 and settings.dimensions == 3:
         text = "a two-dimensional experiment has distances in 2 dimensions; remove it"
         references.problems.add((*steps, "dimensions"), text)
@@ -202,17 +197,8 @@ def read_distances(
         return None
     if not _can_be_tied(len(np.unique(indices)), (*steps, "pairs"), references):
         return None
-    difference = (layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]])[
-        :, :dimensions
-    ]
-    nominal = np.linalg.norm(difference, axis=1)
-    if np.any(nominal < COINCIDENT):
-        i, j = indices[int(np.argmin(nominal))]
-        text = (
-            f'balls "{layout.names[i]}" and "{layout.names[j]}" have no distance in the plane; use'
-            " dimensions: 3"
-        )
-        references.problems.add((*steps, "pairs"), text)
+    nominal = _nominal(indices, layout, dimensions, (*steps, "pairs"), references)
+    if nominal is None:
         return None
     is_right &= check_keys(settings, steps, references)
     if not is_right:
@@ -247,6 +233,44 @@ def read_distances(
         settings.repeatability,
         root=known.root,
     )
+
+
+def _nominal(
+    indices: NDArray[np.intp],
+    layout: BallLayout,
+    dimensions: Literal[2, 3],
+    steps: Steps,
+    references: References,
+) -> Array | None:
+    """Distances (m,) as drawn, None after saying that one is none."""
+    difference = layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]]
+    nominal = np.linalg.norm(difference[:, :dimensions], axis=1)
+    if np.any(nominal < COINCIDENT):
+        i, j = indices[int(np.argmin(nominal))]
+        text = (
+            f'balls "{layout.names[i]}" and "{layout.names[j]}" have no distance in the plane; use'
+            " dimensions: 3"
+        )
+        references.problems.add(steps, text)
+        return None
+    return np.asarray(nominal)
+
+
+def _suits_role(
+    settings: DistancesSettings, artefact: str, steps: Steps, references: References
+) -> bool:
+    """Whether keys that are for length standards only are of one, after saying which are not."""
+    is_right = True
+    if references.artefacts[artefact].role != "length_standard":
+        for key in ("form", "repeatability"):
+            if key in settings.model_fields_set:
+                text = (
+                    "is only for artefacts with role: length_standard; remove it, or give"
+                    f' "{artefact}" that role'
+                )
+                references.problems.add((*steps, key), text, of_key=True)
+                is_right = False
+    return is_right
 
 
 def _can_be_tied(balls: int, steps: Steps, references: References) -> bool:
@@ -304,62 +328,18 @@ def _certified_distances(
     references: References,
 ) -> tuple[Array, Array, tuple[Array, Array] | None] | None:
     """Values (m,), standard uncertainties (m,) in their file, NaN without any, and covariance."""
-    none = np.full(len(nominal), np.nan)
     if settings.values is None:
-        return nominal, none, None
-    problems, steps = references.problems, (*steps, "values")
+        return nominal, np.full(len(nominal), np.nan), None
+    problems, place = references.problems, (*steps, "values")
     wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
-    covariance = None
-    if is_digital(settings.values):
-        digital = read_digital(settings, wanted, True, steps[:-1], references)
-        if digital is None:
-            return None
-        entries, covariance = digital.entries, digital.covariance
-    elif isinstance(settings.values, str):
-        read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
-        if read is None:
-            return None
-        entries = [
-            Entry((row.texts[0], row.texts[1]), row.lengths[0], float(u[0]), row.mark, steps)
-            for row, u in zip(*read, strict=True)
-        ]
-    else:
-        entries = [
-            Entry(
-                entry.balls,
-                entry.distance,
-                np.nan,
-                mark_of(problems.root, (*steps, i)),
-                (*steps, i),
-            )
-            for i, entry in enumerate(settings.values)
-        ]
-    before, known = len(problems.messages), set(layout.names)
-    by_pair: dict[frozenset[str], Entry] = {}
-    for entry in entries:
-        names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
-        for name in names:
-            if name not in known:
-                problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
-        pair = frozenset(names)
-        if len(pair) == 1:
-            problems.add_at(
-                mark,
-                place,
-                f'a ball has no distance from itself; name two balls, not "{names[0]}" twice',
-            )
-        if pair in by_pair:
-            text = (
-                f'the distance of "{names[0]}" and "{names[1]}" is given twice; remove one of'
-                " the two"
-            )
-            problems.add_at(mark, place, text)
-        if distance <= 0:
-            problems.add_at(mark, place, "a distance must be above zero; correct it")
-        by_pair[pair] = entry
+    read = _entries(settings, wanted, place, references)
+    if read is None:
+        return None
+    before = len(problems.messages)
+    by_pair = _by_pair(read.entries, layout, references)
     missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
     drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
-    for entry in entries:
+    for entry in read.entries:
         expected, distance = drawn.get(frozenset(entry.names)), entry.value
         if (
             expected is not None
@@ -369,12 +349,72 @@ def _certified_distances(
             text = f"{far_from_drawing(distance, expected)}; correct one of the two"
             problems.add_at(entry.mark, entry.steps, text)
     if missing and len(problems.messages) == before:
-        problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
+        problems.add(place, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
     if len(problems.messages) > before:
         return None
     chosen = [by_pair[frozenset(pair)] for pair in wanted]
     return (
         np.array([one.value for one in chosen]),
         np.array([one.uncertainty for one in chosen]),
-        covariance,
+        read.covariance,
     )
+
+
+def _entries(
+    settings: DistancesSettings,
+    wanted: list[tuple[str, str]],
+    steps: Steps,
+    references: References,
+) -> FileValues | None:
+    """What the file or the list of values states; None after saying what is wrong."""
+    if is_digital(settings.values):
+        return read_digital(settings, wanted, True, steps[:-1], references)
+    if isinstance(settings.values, str):
+        read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
+        if read is None:
+            return None
+        found = [
+            CertificateEntry(
+                (row.texts[0], row.texts[1]), row.lengths[0], float(u[0]), row.mark, steps
+            )
+            for row, u in zip(*read, strict=True)
+        ]
+        return FileValues(found)
+    listed = [
+        CertificateEntry(
+            entry.balls,
+            entry.distance,
+            np.nan,
+            mark_of(references.problems.root, (*steps, i)),
+            (*steps, i),
+        )
+        for i, entry in enumerate(settings.values or ())
+    ]
+    return FileValues(listed)
+
+
+def _by_pair(
+    entries: list[CertificateEntry], layout: BallLayout, references: References
+) -> dict[frozenset[str], CertificateEntry]:
+    """Entries by their balls, after saying which are no distances of two of them, each once."""
+    problems, known = references.problems, set(layout.names)
+    by_pair: dict[frozenset[str], CertificateEntry] = {}
+    for entry in entries:
+        names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
+        for name in names:
+            if name not in known:
+                problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
+        pair = frozenset(names)
+        if len(pair) == 1:
+            text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
+            problems.add_at(mark, place, text)
+        if pair in by_pair:
+            text = (
+                f'the distance of "{names[0]}" and "{names[1]}" is given twice; remove one of'
+                " the two"
+            )
+            problems.add_at(mark, place, text)
+        if distance <= 0:
+            problems.add_at(mark, place, "a distance must be above zero; correct it")
+        by_pair[pair] = entry
+    return by_pair

@@ -26,15 +26,10 @@ from ..arrays import Design
 from ..lookup import References
 from .balls import BallObservations
 from .calibration import MOST_TIED_BALLS, Calibration
+from .certificate_tables import read_rows
 from .coordinates import CalibratedBalls
-from .stated_values import (
-    CertificateSettings,
-    check_keys,
-    is_digital,
-    read_digital,
-    read_rows,
-    uncertainties_of,
-)
+from .digital_values import read_digital
+from .stated_values import CertificateSettings, check_keys, is_digital, uncertainties_of
 from .whitening import CovarianceRoot, at_least_exact, covariance_root
 
 GROUP = "ballplate.calibrations"
