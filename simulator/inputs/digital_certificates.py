@@ -162,11 +162,17 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
 def _blocks(
     element: Element, contexts: tuple[str, ...]
 ) -> Iterator[tuple[Element, tuple[str, ...]]]:
-    """Values and lists of values below an element, with what those above them are called."""
+    """Values and lists of values below an element, with what those above them are called.
+
+    :raises ExperimentError: a quantity has a relative uncertainty.
+    """
     for one in element.children:
         if one.name in REALS:
             yield one, contexts
         elif one.name in ("quantity", "list", "hybrid"):
+            if one.first("relativeUncertainty") is not None:
+                text = "a relative uncertainty is not read; state values in a CSV file instead"
+                raise ExperimentError([one.mark.message("", text)])
             inner = list(_blocks(one, (*contexts, *_names(one))))
             # All parts of a hybrid are one quantity in several units.
             in_metres = [each for each in inner if _is_length(each[0])]

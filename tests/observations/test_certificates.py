@@ -264,6 +264,12 @@ WRONG_CERTIFICATES = {
         SPACED.replace("\\milli\\metre", "\\metre\\tothe{99999999}"),
         "is none of a length",
     ),
+    "a relative uncertainty": (
+        SPACED.replace(
+            "</si:realListXMLList>", "</si:realListXMLList><dcc:relativeUncertainty/>", 1
+        ),
+        "a relative uncertainty is not read",
+    ),
     "a covariance in lengths": (
         of_list(covariance=dcc.region(MATRIX, "\\micro\\metre")),
         "is none of the square of a length",
