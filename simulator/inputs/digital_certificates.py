@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -141,8 +141,10 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
     lengths: list[DigitalValue] = []
     matrices: list[tuple[tuple[int, ...], NamedMatrix]] = []
     data = element.first("data")
-    for block, contexts in _blocks(data, ()) if data is not None else ():
+    for block, contexts, problem in _blocks(data, ()) if data is not None else ():
         found = list(_values(block, contexts))
+        if problem:
+            found = [replace(one, problem=problem) for one in found]
         start = len(lengths)
         lengths += found
         matrix = _matrix(block, len(found)) if _is_length(block) else None
@@ -161,25 +163,24 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
 
 def _blocks(
     element: Element, contexts: tuple[str, ...]
-) -> Iterator[tuple[Element, tuple[str, ...]]]:
-    """Values and lists of values below an element, with what those above them are called.
-
-    :raises ExperimentError: a quantity has a relative uncertainty.
+) -> Iterator[tuple[Element, tuple[str, ...], str]]:
+    """Values and lists of values below an element, with what those above them are called, and what
+    is wrong with their quantity.
     """
     for one in element.children:
         if one.name in REALS:
-            yield one, contexts
+            yield one, contexts, ""
         elif one.name in ("quantity", "list", "hybrid"):
-            if one.first("relativeUncertainty") is not None:
-                text = "a relative uncertainty is not read; state values in a CSV file instead"
-                raise ExperimentError([one.mark.message("", text)])
             inner = list(_blocks(one, (*contexts, *_names(one))))
+            if one.first("relativeUncertainty") is not None:
+                inner = [(block, above, RELATIVE) for block, above, _ in inner]
             # All parts of a hybrid are one quantity in several units.
             in_metres = [each for each in inner if _is_length(each[0])]
             yield from (in_metres or inner)[:1] if one.name == "hybrid" else inner
 
 
 NO_LENGTH = "is no length"
+RELATIVE = "has a relative uncertainty, which is not read; state it in a CSV file"
 
 
 def _units(block: Element) -> list[str]:

@@ -268,7 +268,7 @@ WRONG_CERTIFICATES = {
         SPACED.replace(
             "</si:realListXMLList>", "</si:realListXMLList><dcc:relativeUncertainty/>", 1
         ),
-        "a relative uncertainty is not read",
+        "r1c1–r1c3 has a relative uncertainty, which is not read",
     ),
     "a covariance in lengths": (
         of_list(covariance=dcc.region(MATRIX, "\\micro\\metre")),
