@@ -239,6 +239,7 @@ def _build(
         stars=stars,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
+        notes=tuple(str(note) for note in problems.notes),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

@@ -215,8 +215,9 @@ class Experiment:
     artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency`` are None where
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
     meant for. ``pool``: what a plan may choose from. ``doubts``: what of the file is possible, and
-    unlikely to be meant. ``tree``: what was written, without variants, ``mark``: where the
-    experiment itself stands, and ``builder``: what makes an experiment of a tree.
+    unlikely to be meant. ``notes``: what was found in its tables by itself. ``tree``: what was
+    written, without variants, ``mark``: where the experiment itself stands, and ``builder``: what
+    makes an experiment of a tree.
     """
 
     title: str
@@ -245,6 +246,7 @@ class Experiment:
     stars: tuple[Star, ...] = ()
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
