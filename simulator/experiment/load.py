@@ -34,6 +34,8 @@ from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
+from .readings_checks import check_readings
+from .readings_section import ReadingsSettings
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
@@ -207,6 +209,7 @@ def _build(
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
+    check_readings(sections, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
     experiment = Experiment(
@@ -235,6 +238,7 @@ def _build(
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
+        readings=sections.get("readings") or ReadingsSettings(),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

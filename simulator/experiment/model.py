@@ -21,6 +21,7 @@ from ..inputs.messages import Message, Steps, format_path
 from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, written
 from .changes import changed_tree
+from .readings_section import ReadingsSettings
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
@@ -186,7 +187,8 @@ class Experiment:
     standard uncertainty is what targets are meant for. ``offset_uncertainties``: standard
     uncertainties (d,) of the offsets that are estimated, by the probe's name, infinite where the
     offset is unknown; other offsets are as stated. ``pool``: what a plan may choose from.
-    ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
+    ``doubts``: what of the file is possible, and unlikely to be meant. ``readings``: where tables
+    of readings are and how they are written. ``tree``: what was written,
     without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an
     experiment of a tree.
     """
@@ -216,6 +218,7 @@ class Experiment:
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
+    readings: ReadingsSettings = field(default_factory=ReadingsSettings)
 
     @property
     def dimension(self) -> int:

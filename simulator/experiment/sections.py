@@ -17,6 +17,7 @@ from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from .pool_sections import PoolSettings
 from .position_sections import Edges, LengthPerAxis, PositionSettings
+from .readings_section import ReadingsSettings
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
@@ -179,6 +180,9 @@ class ExperimentSettings(Settings):
     )
     priors: NonEmpty[PriorSettings] | None = Field(
         None, description="prior knowledge of machine errors and poses"
+    )
+    readings: ReadingsSettings | None = Field(
+        None, description="the laboratory's readings: where they are and how they are written"
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"
