@@ -35,7 +35,7 @@ from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .readings_checks import check_readings
-from .readings_section import ReadingsSettings
+from .readings_section import no_settings
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
@@ -238,7 +238,7 @@ def _build(
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
-        readings=sections.get("readings") or ReadingsSettings(),
+        readings=sections.get("readings") or no_settings(),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

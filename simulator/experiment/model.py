@@ -19,9 +19,9 @@ from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
 from ..inputs.quantities import Target
-from ..inputs.yamltree import Mark, Node, mark_of, written
+from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
 from .changes import changed_tree
-from .readings_section import ReadingsSettings
+from .readings_section import ReadingsSettings, no_settings
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
@@ -218,7 +218,7 @@ class Experiment:
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
-    readings: ReadingsSettings = field(default_factory=ReadingsSettings)
+    readings: ReadingsSettings = field(default_factory=no_settings)
 
     @property
     def dimension(self) -> int:
@@ -292,6 +292,21 @@ class Experiment:
         return self.builder(
             changed_tree(self.tree, str(self.source), {**(changes or {}), **sections})
         )
+
+    def with_readings(self, said: Mapping[str, Any]) -> Experiment:
+        """The experiment with other keys of `readings`; None leaves one as it is, and columns are
+        added to those stated.
+
+        :raises ExperimentError: they are wrong.
+        """
+        given = {key: value for key, value in said.items() if value is not None}
+        if not given:
+            return self
+        old = written(self.tree, "readings")
+        known = {} if old is None else to_python(old)
+        columns = {**known.get("columns", {}), **given.get("columns", {})}
+        both = {**known, **given, **({"columns": columns} if columns else {})}
+        return self.with_(readings=both)
 
 
 def _words_of(position: Position) -> str:

@@ -110,3 +110,7 @@ class ReadingsSettings(Settings):
             return ()
         return (self.files,) if isinstance(self.files, str) else tuple(self.files)
 
+
+def no_settings() -> ReadingsSettings:
+    """The settings of an experiment that says nothing of its readings."""
+    return ReadingsSettings.model_validate({})

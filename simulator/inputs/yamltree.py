@@ -132,6 +132,23 @@ def read_text(path: Path | GivenText) -> str:
     """
     if isinstance(path, GivenText):
         return path.text
+    content = read_bytes(path)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = content[: error.start].decode("utf-8", errors="replace")
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        text = (
+            f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
+        )
+        raise ExperimentError([Message(str(path), line, column, "", text)]) from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a file of moderate size.
+
+    :raises ExperimentError: the file is missing, is a directory or a device, or cannot be read.
+    """
     file = str(path)
     try:
         kind = path.stat().st_mode
@@ -151,15 +168,7 @@ def read_text(path: Path | GivenText) -> str:
         raise refused(file, f"cannot be read ({reason}); check its name and permissions") from None
     if len(content) > MOST_BYTES:
         raise refused(file, f"has more than {MOST_BYTES // 10**6} MB; leave some of it out")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = content[: error.start].decode("utf-8", errors="replace")
-        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-        text = (
-            f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
-        )
-        raise ExperimentError([Message(file, line, column, "", text)]) from None
+    return content
 
 
 def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node:

@@ -1,0 +1,164 @@
+"""Whether co-ordinates are scale readings or ball centres, as far as the readings tell.
+
+The offsets of two probes that read in one position differ; readings of both can be of one artefact
+only as what they are. A shift of all readings of a position is one of its pose: with one probe in
+each position, the two cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..design.arrays import Design, Readings
+from ..estimation.initial import initial_state
+from ..experiment.readings_section import CompensationSettings, ReadingsSettings
+from ..inputs.messages import ExperimentError
+from ..inputs.quantities import format_length
+from ..inputs.yamltree import Mark
+from ..machines.protocol import Array
+from .coordinate_kinds import controller_offsets
+
+# One hypothesis is right and another wrong if the readings scatter so many times more with the
+# latter, and by so many repeatabilities.
+CLEARLY = 5.0
+REPEATABILITIES = 5.0
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What co-ordinates may be: places of balls once so many times the offsets are added."""
+
+    name: str
+    times: float
+
+
+HYPOTHESES = (
+    Hypothesis("scale readings", 1.0),
+    Hypothesis("ball centres", 0.0),
+    Hypothesis("scale readings with offsets of the other sign", -1.0),
+)
+
+REMEDIES = {
+    "ball centres": (
+        "if the measuring program has applied the offsets of probes, write readings: {coordinates:"
+        ' ball centres} in the experiment file, or give --coordinates "ball centres"; otherwise'
+        " correct the offsets under probes"
+    ),
+    "scale readings": "write coordinates: scale readings, or correct offsets_in_controller",
+    "scale readings with offsets of the other sign": (
+        "correct the signs of the offsets under probes, or the names of probes that are exchanged"
+    ),
+}
+UNTOLD = (
+    "these readings do not tell whether the offsets of probes have been applied to them, since they"
+    " would agree either way; they are taken for scale readings: write readings: {coordinates:"
+    " scale readings} in the experiment file, or ball centres"
+)
+
+
+@dataclass(frozen=True)
+class OffsetVerdict:
+    """How far readings of a ball are from one another (metres, the median) by hypothesis, and the
+    one that clearly is right; None where that cannot be told.
+    """
+
+    scatter: dict[str, float]
+    right: str | None
+
+
+def judge_offsets(
+    design: Design, readings: Readings, x: Array, applied: Array | None = None
+) -> OffsetVerdict:
+    """What co-ordinates (m, d) of readings of plates are; nothing is told where no position was
+    read with different offsets.
+
+    `applied` (l, d) are the offsets that are in ball centres, where they are not those of the
+    design.
+    """
+    plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
+    own, offsets = readings.select(plate), design.probes.offsets[readings.probe[plate]]
+    if not len(plate) or not _differ(own, offsets):
+        return OffsetVerdict({}, None)
+    left = offsets if applied is None else applied[own.probe]
+    scatter = {}
+    for one in HYPOTHESES:
+        added = one.times * offsets if one.times else offsets - left
+        scatter[one.name] = _scatter(design, own, x[plate] + added)
+    first, second = sorted(scatter.values())[:2]
+    noise = float(np.max(design.machine.repeatability))
+    if second < max(CLEARLY * first, REPEATABILITIES * noise):
+        return OffsetVerdict(scatter, None)
+    return OffsetVerdict(scatter, min(scatter, key=lambda name: scatter[name]))
+
+
+def _differ(readings: Readings, offsets: Array) -> bool:
+    """Whether any position was read with offsets that differ."""
+    for k in np.unique(readings.position):
+        own = offsets[readings.position == k]
+        if (own != own[0]).any():
+            return True
+    return False
+
+
+def _scatter(design: Design, readings: Readings, seen: Array) -> float:
+    """The median distance of places seen (m, d) from those of their balls in the plates that they
+    are assembled to.
+    """
+    # Places seen are readings of a probe without an offset.
+    probes = replace(design.probes, offsets=np.zeros_like(design.probes.offsets))
+    state = initial_state(replace(design, readings=readings, probes=probes), seen)
+    places = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    apart = seen - places - state.origins[readings.position]
+    return float(np.median(np.sqrt((apart**2).sum(axis=1))))
+
+
+def doubt_about_offsets(
+    design: Design, readings: Readings, x: Array, settings: ReadingsSettings, mark: Mark
+) -> tuple[str, ...]:
+    """What is doubtful about co-ordinates x (m, d) as the table has them: whether they are scale
+    readings, where nothing states it and the readings do not tell.
+
+    :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
+    """
+    stated = settings.coordinates
+    if stated == "part" or not design.probes.offsets.any():
+        return ()
+    verdict = judge_offsets(design, readings, x, controller_offsets(design, settings))
+    taken = stated or HYPOTHESES[0].name
+    if verdict.right is None:
+        return () if stated else (UNTOLD,)
+    if verdict.right == taken:
+        return ()
+    shown = {
+        name: format_length(float(f"{scatter:.2g}")) for name, scatter in verdict.scatter.items()
+    }
+    said = "as the file says" if stated else "as is taken for granted"
+    text = (
+        f"as {verdict.right}, readings of different probes agree to {shown[verdict.right]} in the"
+        f" middle, as {taken}, {said}, to {shown[taken]} only; {REMEDIES[verdict.right]}"
+    )
+    raise ExperimentError([mark.message("", text)])
+
+
+def said_of(settings: ReadingsSettings) -> tuple[str, ...]:
+    """What is to be known of estimates where co-ordinates are not scale readings of a machine
+    without correction.
+    """
+    said = []
+    if settings.coordinates == "part":
+        said.append(
+            "part co-ordinates were placed by the nominal poses: errors are estimated where the"
+            " artefact was planned to stand"
+        )
+    if settings.compensation == "on":
+        said.append(
+            "the machine's own correction was on: what is estimated are the errors that it leaves"
+        )
+    if isinstance(settings.compensation, CompensationSettings):
+        said.append(
+            f"the correction of {settings.compensation.file} was taken off: what is estimated are"
+            " all errors of the machine"
+        )
+    return tuple(said)
