@@ -773,16 +773,12 @@ def _table(name: str, given: PathLike | pandas.DataFrame) -> Path | GivenText:
 
 def _tables(given: Tables, experiment: Experiment) -> list[Path | GivenText]:
     """Tables of readings, or those that the experiment names."""
-    import pandas
-
     if given is None:
         named = experiment.readings.named_files
         if not named:
             raise ValueError("readings: the experiment names no files; give a table")
         return [experiment.source.parent / name for name in named]
-    if isinstance(given, str | os.PathLike | pandas.DataFrame) or not isinstance(
-        given, list | tuple
-    ):
+    if not isinstance(given, list | tuple):
         return [_table("readings", given)]
     if not given:
         raise ValueError("readings: no table; give one at least")

@@ -95,7 +95,9 @@ def read_any_table(
         if not re.fullmatch(r"[\s;,|]*", text)
     ]
     if not lines:
-        raise refused(source, "the table is empty")
+        columns = ["position", "ball", "probe", *(f"{axis}_mm" for axis in words.axes)]
+        text = f"the file is empty; its first line should be {','.join(columns)}"
+        raise ExperimentError([Message(str(source), 1, 1, "", text)])
     if len(lines) > MOST_ROWS:
         raise refused(source, f"more than {MOST_ROWS} rows; leave some out")
     try:

@@ -200,9 +200,9 @@ def numbered_columns(words: Vocabulary, count: int) -> Headings:
             " 2, x: 3, y: 4, z: 5}}"
         )
     roles = {
-        role: _stated_column(getattr(words.stated, role, None), cells)
+        role: _stated_column(name, cells)
         for role in (*TEXTS, "u", "diameter")
-        if getattr(words.stated, role, None) is not None
+        if (name := getattr(words.stated, role, None)) is not None
     }
     return Headings(roles, groups, ())
 

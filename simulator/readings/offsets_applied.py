@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..design.arrays import Design, Readings
+from ..estimation.consensus import consensus_motion
 from ..estimation.initial import initial_state
 from ..experiment.readings_section import CompensationSettings, ReadingsSettings
 from ..inputs.messages import ExperimentError
@@ -19,6 +20,7 @@ from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from .coordinate_kinds import controller_offsets
+from .gross_errors import AGAINST_DRAWING, ball_pitches
 
 # One hypothesis is right and another wrong if the readings scatter so many times more with the
 # latter, and by so many repeatabilities.
@@ -81,16 +83,21 @@ def judge_offsets(
     own, offsets = readings.select(plate), design.probes.offsets[readings.probe[plate]]
     if not len(plate) or not _differ(own, offsets):
         return OffsetVerdict({}, None)
+    pitch = ball_pitches(design)[own.ball]
     left = offsets if applied is None else applied[own.probe]
-    scatter = {}
-    for one in HYPOTHESES:
-        added = one.times * offsets if one.times else offsets - left
-        scatter[one.name] = _scatter(design, own, x[plate] + added)
+    seen = {
+        one.name: x[plate] + (one.times * offsets if one.times else offsets - left)
+        for one in HYPOTHESES
+    }
+    scatter = {name: _scatter(design, own, places) for name, places in seen.items()}
     first, second = sorted(scatter.values())[:2]
     noise = float(np.max(design.machine.repeatability))
     if second < max(CLEARLY * first, REPEATABILITIES * noise):
         return OffsetVerdict(scatter, None)
-    return OffsetVerdict(scatter, min(scatter, key=lambda name: scatter[name]))
+    right = min(scatter, key=lambda name: scatter[name])
+    return OffsetVerdict(
+        scatter, right if _is_of_drawing(design, own, seen[right], pitch) else None
+    )
 
 
 def _differ(readings: Readings, offsets: Array) -> bool:
@@ -100,6 +107,19 @@ def _differ(readings: Readings, offsets: Array) -> bool:
         if (own != own[0]).any():
             return True
     return False
+
+
+def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array) -> bool:
+    """Whether most places seen (m, d) are those of the artefact as drawn, position by position."""
+    for k in np.unique(readings.position):
+        rows = np.flatnonzero(readings.position == k)
+        nominal = design.balls.places[readings.ball[rows]]
+        if len(np.unique(readings.ball[rows])) < 2:
+            continue
+        _, _, agreeing = consensus_motion(nominal, seen[rows], AGAINST_DRAWING * pitch[rows])
+        if 2 * agreeing.sum() <= len(rows):
+            return False
+    return True
 
 
 def _scatter(design: Design, readings: Readings, seen: Array) -> float:
