@@ -52,6 +52,18 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="report error functions by the coefficients of t, t^2, ... on [0, 1]",
     )
+    _add_estimators(parser)
+    add_picture(
+        parser,
+        "--plot",
+        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
+    )
+    add_force(parser)
+    add_json(parser)
+
+
+def _add_estimators(parser: ArgumentParser) -> None:
+    """Add the choice of an estimator, and what goes with only some of them."""
     parser.add_argument(
         "--estimator",
         choices=ESTIMATORS,
@@ -77,13 +89,6 @@ def add_options(parser: ArgumentParser) -> None:
             " of five"
         ),
     )
-    add_picture(
-        parser,
-        "--plot",
-        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
-    )
-    add_force(parser)
-    add_json(parser)
 
 
 def run(options: Namespace) -> int:

@@ -45,6 +45,8 @@ ABOVE = {
     "probe": r"probe|stylus|tip|taster|taststift",
     "unit": r"units?|einheit(?:en)?|all values in|alle (?:werte|angaben) in|lengths? in",
 }
+# Characters of such a line.
+LONGEST_LINE = 300
 NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f]")
 
 
@@ -159,7 +161,7 @@ class _Reader:
         :raises ExperimentError: they say two things.
         """
         found: dict[str, str] = {}
-        for text in self.form.above:
+        for text in (text[:LONGEST_LINE] for text in self.form.above):
             for role, pattern in ABOVE.items():
                 match = re.match(
                     rf'[\s#"]*(?:{pattern})["\s]*[:=;,\t|]\s*"?(.*?)["\s;,|]*$', text, re.IGNORECASE
@@ -248,14 +250,14 @@ class _Reader:
         found: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
 
-        def number(cells: Sequence[str], i: int | None, mark: Mark) -> float:
-            if i is None or i >= len(cells) or cells[i].casefold() in NOTHING:
-                return math.nan
+        def number(cells: Sequence[str], i: int, mark: Mark) -> float:
             factor, power = factors[i]
             cell = cells[i].replace(sign, ".")
             value = plain_number(cell, power)
             if value is not None:
                 return value
+            if cell.casefold() in NOTHING:
+                return math.nan
             try:
                 return metres_or_radians(cell, factor)
             except QuantityError as error:
@@ -277,8 +279,10 @@ class _Reader:
                     if not own:
                         messages.append(mark.message("", f"no {role}; write its name"))
                 names.append(own)
-            lengths = (*(number(cells, i, mark) for i in axes), number(cells, u, mark))
-            found.append((FileRow(mark, tuple(names), lengths), number(cells, diameter, mark)))
+            x = [number(cells, i, mark) for i in axes]
+            x.append(math.nan if u is None else number(cells, u, mark))
+            size = math.nan if diameter is None else number(cells, diameter, mark)
+            found.append((FileRow(mark, tuple(names), tuple(x)), size))
         if messages:
             raise ExperimentError(messages)
         return found

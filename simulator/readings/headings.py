@@ -16,6 +16,9 @@ AXES = ("x", "y", "z")
 # Roles of columns of text.
 TEXTS = ("position", "ball", "probe")
 
+# Characters of what may be a heading.
+LONGEST = 100
+
 # How headings write units that `LENGTH_UNITS` has under another name.
 UNITS: Mapping[str, str] = {
     **{unit: unit for unit in ("m", "dm", "cm", "mm", "um", "nm", "in")},
@@ -75,6 +78,8 @@ def heading(cell: str) -> tuple[str, str | None]:
     >>> [heading(cell) for cell in ("x_mm", "X [µm]", "Y/mm", "z in inch", "x in", "x")]
     [('x', 'mm'), ('x', 'um'), ('y', 'mm'), ('z', 'in'), ('x', 'in'), ('x', None)]
     """
+    if len(cell) > LONGEST:
+        return "", None
     match = _HEADING.fullmatch(plain_unit(cell).casefold())
     if match is None or not match["name"].strip():
         return folded(cell), None
@@ -95,7 +100,7 @@ class HeadingError(ValueError):
 
 
 @dataclass(frozen=True)
-class Column:
+class HeadedColumn:
     """A column by its place, with the unit in its heading; or the `constant` that all rows have."""
 
     place: int
@@ -107,7 +112,7 @@ class Column:
 class Group:
     """Columns of the co-ordinates of one reading: `axes` and what their headings say of them."""
 
-    axes: tuple[Column, ...]
+    axes: tuple[HeadedColumn, ...]
     texts: Mapping[str, str]
 
 
@@ -119,7 +124,7 @@ class Headings:
     taken from.
     """
 
-    roles: Mapping[str, Column]
+    roles: Mapping[str, HeadedColumn]
     groups: tuple[Group, ...]
     cells: tuple[str, ...]
 
@@ -168,7 +173,7 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
     if groups is None:
         return None
     taken = {axis.place for group in groups for axis in group.axes}
-    roles: dict[str, Column] = {}
+    roles: dict[str, HeadedColumn] = {}
     for role in (*TEXTS, "u", "diameter"):
         name = getattr(stated, role, None)
         if name is not None:
@@ -182,7 +187,7 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             if len(places) > 1:
                 raise HeadingError(_which(role, [cells[i] for i in places]))
             if places:
-                roles[role] = Column(places[0], parsed[places[0]][1])
+                roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
                 taken.add(places[0])
     return Headings(roles, groups, tuple(cells))
 
@@ -215,22 +220,22 @@ def _which(role: str, cells: Sequence[str]) -> str:
     )
 
 
-def _stated_column(name: str, cells: Sequence[str]) -> Column:
+def _stated_column(name: str, cells: Sequence[str]) -> HeadedColumn:
     """The column that the experiment file names, exactly, without its unit, or by its number.
 
     :raises HeadingError: there is none.
     """
     if name.startswith("="):
-        return Column(-1, constant=name[1:].strip())
+        return HeadedColumn(-1, constant=name[1:].strip())
     exact = [i for i, cell in enumerate(cells) if cell == name]
     alike = [i for i, cell in enumerate(cells) if name and heading(cell)[0] == folded(name)]
     for places in (exact, alike):
         if len(places) > 1:
             raise HeadingError(f'{len(places)} columns are called "{name}"; give the number of one')
         if places:
-            return Column(places[0], heading(cells[places[0]])[1])
+            return HeadedColumn(places[0], heading(cells[places[0]])[1])
     if name.isdigit() and 1 <= int(name) <= len(cells):
-        return Column(int(name) - 1, heading(cells[int(name) - 1])[1])
+        return HeadedColumn(int(name) - 1, heading(cells[int(name) - 1])[1])
     raise HeadingError(f'there is no column "{shorten(name)}"')
 
 
@@ -255,7 +260,7 @@ def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...]
             name = named[probe] if isinstance(named, dict) else named
             places = [i for i, (word, _) in enumerate(parsed) if word == axis]
             if axis not in given and len(places) == 1:
-                axes.append(Column(places[0], parsed[places[0]][1]))
+                axes.append(HeadedColumn(places[0], parsed[places[0]][1]))
             elif name.startswith("="):
                 raise HeadingError(f"{axis} is a co-ordinate of each reading; name its column")
             else:
@@ -299,7 +304,7 @@ def _found_groups(
         raise HeadingError(f"not all of {listing(words.axes)} are there of {names}")
     return tuple(
         Group(
-            tuple(Column(axes[axis][0], parsed[axes[axis][0]][1]) for axis in words.axes),
+            tuple(HeadedColumn(axes[axis][0], parsed[axes[axis][0]][1]) for axis in words.axes),
             words.beside_axes[beside],
         )
         for beside, axes in groups.items()

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..design.arrays import Design, Readings
 from ..estimation.consensus import consensus_motion
@@ -19,6 +20,7 @@ from ..inputs.messages import ExperimentError
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
+from .common_causes import TURNED, poses_found
 from .coordinate_kinds import controller_offsets
 from .gross_errors import AGAINST_DRAWING, ball_pitches
 
@@ -62,8 +64,8 @@ UNTOLD = (
 
 @dataclass(frozen=True)
 class OffsetVerdict:
-    """How far readings of a ball are from one another (metres, the median) by hypothesis, and the
-    one that clearly is right; None where that cannot be told.
+    """How far readings of positions that tell are from their balls (metres, the median), by
+    hypothesis, and the one that clearly is right; None where that cannot be told.
     """
 
     scatter: dict[str, float]
@@ -81,7 +83,8 @@ def judge_offsets(
     """
     plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
     own, offsets = readings.select(plate), design.probes.offsets[readings.probe[plate]]
-    if not len(plate) or not _differ(own, offsets):
+    telling = _of_several_offsets(own, offsets)
+    if not telling.any():
         return OffsetVerdict({}, None)
     pitch = ball_pitches(design)[own.ball]
     left = offsets if applied is None else applied[own.probe]
@@ -89,7 +92,10 @@ def judge_offsets(
         one.name: x[plate] + (one.times * offsets if one.times else offsets - left)
         for one in HYPOTHESES
     }
-    scatter = {name: _scatter(design, own, places) for name, places in seen.items()}
+    scatter = {
+        name: float(np.median(_apart(design, own, places)[telling]))
+        for name, places in seen.items()
+    }
     first, second = sorted(scatter.values())[:2]
     noise = float(np.max(design.machine.repeatability))
     if second < max(CLEARLY * first, REPEATABILITIES * noise):
@@ -100,13 +106,13 @@ def judge_offsets(
     )
 
 
-def _differ(readings: Readings, offsets: Array) -> bool:
-    """Whether any position was read with offsets that differ."""
+def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]:
+    """Which readings are of positions that were read with offsets that differ: only these tell."""
+    telling = np.zeros(len(readings), bool)
     for k in np.unique(readings.position):
-        own = offsets[readings.position == k]
-        if (own != own[0]).any():
-            return True
-    return False
+        own = readings.position == k
+        telling[own] = (offsets[own] != offsets[own][0]).any()
+    return telling
 
 
 def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array) -> bool:
@@ -122,16 +128,16 @@ def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array
     return True
 
 
-def _scatter(design: Design, readings: Readings, seen: Array) -> float:
-    """The median distance of places seen (m, d) from those of their balls in the plates that they
-    are assembled to.
+def _apart(design: Design, readings: Readings, seen: Array) -> Array:
+    """Distances (m,) of places seen (m, d) from those of their balls in the plates that they are
+    assembled to.
     """
     # Places seen are readings of a probe without an offset.
     probes = replace(design.probes, offsets=np.zeros_like(design.probes.offsets))
     state = initial_state(replace(design, readings=readings, probes=probes), seen)
     places = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
     apart = seen - places - state.origins[readings.position]
-    return float(np.median(np.sqrt((apart**2).sum(axis=1))))
+    return np.asarray(np.sqrt((apart**2).sum(axis=1)))
 
 
 def doubt_about_offsets(
@@ -143,10 +149,10 @@ def doubt_about_offsets(
     :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
     """
     stated = settings.coordinates
-    if stated == "part" or not design.probes.offsets.any():
+    if not design.probes.offsets.any():
         return ()
     verdict = judge_offsets(design, readings, x, controller_offsets(design, settings))
-    taken = stated or HYPOTHESES[0].name
+    taken = "ball centres" if stated == "part" else stated or HYPOTHESES[0].name
     if verdict.right is None:
         return () if stated else (UNTOLD,)
     if verdict.right == taken:
@@ -159,6 +165,12 @@ def doubt_about_offsets(
         f"as {verdict.right}, readings of different probes agree to {shown[verdict.right]} in the"
         f" middle, as {taken}, {said}, to {shown[taken]} only; {REMEDIES[verdict.right]}"
     )
+    if verdict.right == "ball centres":
+        found = poses_found(design, readings, x) or {}
+        if any(angle > TURNED for angle, _ in found.values()):
+            text += (
+                "; or, since the artefact stands otherwise than planned in them, coordinates: part"
+            )
     raise ExperimentError([mark.message("", text)])
 
 

@@ -24,6 +24,7 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
+from .common_causes import doubts_about_poses
 from .coordinate_kinds import as_scale_readings
 from .gross_error_messages import (
     doubts_about_lengths,
@@ -71,7 +72,13 @@ class ObservedReadings:
     def doubts(self) -> tuple[str, ...]:
         """What of them is possible, and unlikely to be meant: lengths and places."""
         of_volume = doubts_about_volume(self.design, self.x, self.marks)
-        return (*self.of_offsets, *doubts_about_lengths(self.design, self.x), *of_volume)
+        of_poses = doubts_about_poses(self.design, self.x)
+        return (
+            *self.of_offsets,
+            *of_poses,
+            *doubts_about_lengths(self.design, self.x),
+            *of_volume,
+        )
 
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
@@ -229,8 +236,8 @@ def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> 
             messages.append(rows[i].mark.message("", MORE_ERRORS))
             break
         text = (
-            f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the"
-            " column's name"
+            f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit, and"
+            " that it is a co-ordinate of the machine, not of a part (readings: coordinates)"
         )
         messages.append(rows[i].mark.message("", text))
     if messages:

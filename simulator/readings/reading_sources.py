@@ -101,9 +101,8 @@ def read_source(
     stated = (settings.columns, settings.separator, settings.decimal, settings.header)
     wrong: list[Message] = []
     rows: tuple[FileRow, ...] = ()
-    plain = {"position", "ball", "probe", *axes, "u"}
-    looks_plain = plain & header_names(text) and encoding in ("", "UTF-8")
-    if all(one is None for one in stated) and looks_plain:
+    looks_plain = encoding in ("", "UTF-8") and header_names(text) & set(axes)
+    if looks_plain and all(one is None for one in stated):
         # One probe need not be named.
         defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
         texts = ["position", "ball", "probe"]

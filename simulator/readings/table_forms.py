@@ -13,9 +13,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ..experiment.readings_section import ReadingsSettings
+from ..inputs.messages import MOST_MESSAGES
 from ..inputs.settings import shorten
 from ..inputs.tables import MOST_COLUMNS
-from .headings import HeadingError, Headings, Vocabulary, numbered_columns, read_headings, unit_of
+from .headings import (
+    LONGEST,
+    HeadingError,
+    Headings,
+    Vocabulary,
+    numbered_columns,
+    read_headings,
+    unit_of,
+)
 
 # What separates columns → how it is told. Blanks by themselves, and two or more where names have
 # single ones.
@@ -30,7 +39,7 @@ SEPARATORS = {
 DECIMALS = {"point": ".", "comma": ","}
 # Lines that headings are looked for in.
 MOST_ABOVE = 200
-_DIGITS = r"[+-]?(?:[0-9]+{0}?[0-9]*|{0}[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_DIGITS = r"[+-]?(?:[0-9]+(?:{0}[0-9]*)?|{0}[0-9]+)(?:[eE][+-]?[0-9]+)?"
 NUMBERS = {name: re.compile(_DIGITS.format(re.escape(sign))) for name, sign in DECIMALS.items()}
 # Numbers with signs between thousands: with decimals behind them, or several of them.
 _BETWEEN = r"'\u2019\s\u00a0\u202f"
@@ -161,7 +170,7 @@ def _find_headings(
         number, text = lines[i]
         if settings.header is not None and number != settings.header:
             continue
-        cells = _split_headings(text, sign)
+        cells = _split_headings(text, sign) if len(text) <= LONGEST * MOST_COLUMNS else None
         if not cells or len(cells) > MOST_COLUMNS:
             continue
         try:
@@ -197,6 +206,8 @@ def _form(
     wrong: list[tuple[int, str]] = []
     ball = headings.roles["ball"].place if "ball" in headings.roles else 0
     for at, text in _below(lines, header):
+        if len(wrong) > MOST_MESSAGES:
+            break
         cells = split(text, sign)
         if cells is None:
             wrong.append((at, "a quotation mark too many; write one line per row"))
@@ -205,7 +216,7 @@ def _form(
             units = found
             continue
         cells = _padded(cells, width, needed, sign)
-        if len(cells) != width and headings.cells:
+        if len(cells) < width or (headings.cells and len(cells) > width):
             if _holds_no_number(cells, places, number):
                 remarks.append(at)
             else:
@@ -281,7 +292,7 @@ def wrong_number(cell: str, name: str, decimal: str) -> str:
     """What is wrong with a cell that should be a number."""
     if cell.casefold() in NOTHING:
         return f"no {name}; write a number, or remove the line"
-    if THOUSANDS.fullmatch(cell):
+    if THOUSANDS.fullmatch(cell[:LONGEST]):
         return f'"{shorten(cell)}" has signs between thousands; write it without them'
     other = "comma" if decimal == "point" else "point"
     if NUMBERS[other].fullmatch(cell):
