@@ -160,16 +160,16 @@ def doubt_about_offsets(
     shown = {
         name: format_length(float(f"{scatter:.2g}")) for name, scatter in verdict.scatter.items()
     }
-    said = "as the file says" if stated else "as is taken for granted"
+    why = "which is stated" if stated else "the default"
     text = (
-        f"as {verdict.right}, readings of different probes agree to {shown[verdict.right]} in the"
-        f" middle, as {taken}, {said}, to {shown[taken]} only; {REMEDIES[verdict.right]}"
+        f"readings with different probes agree to {shown[verdict.right]} (the median) as"
+        f" {verdict.right}, but only to {shown[taken]} as {taken}, {why}; {REMEDIES[verdict.right]}"
     )
     if verdict.right == "ball centres":
         found = poses_found(design, readings, x) or {}
         if any(angle > TURNED for angle, _ in found.values()):
             text += (
-                "; or, since the artefact stands otherwise than planned in them, coordinates: part"
+                "; or write part instead, since the artefact stands turned against the plan in them"
             )
     raise ExperimentError([mark.message("", text)])
 
