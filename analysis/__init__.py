@@ -1,6 +1,7 @@
 """Planning and evaluation of ball-plate experiments for co-ordinate measuring machines.
 
-`import ballplate as bp` gives the functions of `ballplate.api`, each loaded when it is first used.
+`import ballplate as bp` gives the functions of `ballplate.api` and `ballplate.stores`, each
+loaded when it is first used.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ if TYPE_CHECKING:
         repair,
         reproduce,
         run,
+        sheet,
         simulate,
         spline,
-        sweep,
     )
     from .estimators.estimator_choice import ESTIMATORS
     from .simulator.experiment.model import Experiment
+    from .stores import stored, sweep, sweep_report
     from .sweeps.running import OtherSweepError
     from .sweeps.store_file import StoreError
 
@@ -58,9 +60,12 @@ __all__ = [
     "repair",
     "reproduce",
     "run",
+    "sheet",
     "simulate",
     "spline",
+    "stored",
     "sweep",
+    "sweep_report",
 ]
 
 _PLACES = {
@@ -69,6 +74,9 @@ _PLACES = {
     "ExperimentError": "ballplate.simulator.inputs.messages",
     "OtherSweepError": "ballplate.sweeps.running",
     "StoreError": "ballplate.sweeps.store_file",
+    "stored": "ballplate.stores",
+    "sweep": "ballplate.stores",
+    "sweep_report": "ballplate.stores",
 }
 
 

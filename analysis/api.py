@@ -52,12 +52,12 @@ if TYPE_CHECKING:
     from .planning.requirements.answers import Reach
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
+    from .planning.sheet import Sheet
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
     from .results.fit import Fit
     from .results.prediction import Prediction
-    from .sweeps.running import SweepResult
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -155,7 +155,7 @@ def check(
     >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
     ('goal not met: average U6 at most 0.1 µm; average U6 0.1426 µm',)
     """
-    from .cli.check_files import Wanted, checked_design
+    from .planning.repair.checked_files import Wanted, checked_design
     from .planning.requirements.goals import parse_goal
     from .simulator.experiment.load import with_pool
 
@@ -489,6 +489,23 @@ def plan(
     return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)
 
 
+def sheet(experiment: Experiment | PathLike) -> Sheet:
+    """What goes to the laboratory with an experiment: a run sheet, a table to fill in, and points
+    for a program.
+
+    `text()` is the run sheet, `template()` the CSV file of readings with empty cells, and
+    `points()` the nominal centres of the balls; that of a plan is its `to_print`.
+
+    >>> sheet(quickstart())
+    <Sheet of quickstart: 6 positions, 250 readings>
+    >>> sheet(quickstart()).template().splitlines()[:2]
+    ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
+    """
+    from .planning.sheet import sheet_of
+
+    return sheet_of(_experiment(experiment))
+
+
 def reliability(
     experiment: Experiment | PathLike,
     false_alarm: float = 0.001,
@@ -699,54 +716,6 @@ def reproduce(
         return reproduce_npl(chosen, trials, folder, report)
     answers = None if results is None else Path(results)
     return score_certified(chosen, answers, folder, report)
-
-
-def sweep(
-    path: PathLike,
-    store: PathLike | None = None,
-    workers: int = 1,
-    retry_failed: bool = False,
-    beside: bool = False,
-    fail_fast: bool = False,
-    folders: Sequence[PathLike] = (),
-    report: Report = unreported,
-) -> SweepResult:
-    """A family of experiments, computed into a store, which continues where it stopped.
-
-    The store is the sweep file's name with .sqlite, unless another is named. A sweep other than the
-    one that it holds is refused, or entered `beside` that. `folders` are those, besides those of
-    the sweep file and of its base, whose files the sweep may name; with `fail_fast` it ends when a
-    cell fails.
-
-    :raises StoreError: the store cannot be used.
-    :raises OtherSweepError: it holds another sweep.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     sweep("designs/sweeps/plate-size.yaml", f"{folder}/plates.sqlite")
-    <SweepResult of plate-size: 12 cells, 12 done, 0 failed>
-    """
-    from contextlib import nullcontext
-
-    from .sweeps.bundle import bundle_of
-    from .sweeps.load import load_sweep
-    from .sweeps.local import local_runner
-    from .sweeps.running import compute_sweep, enter, result_of, writable_store
-
-    ensure_path("path", path)
-    ensure_whole(1, workers=workers)
-    ensure_type(bool, "True or False", retry_failed=retry_failed, beside=beside)
-    ensure_type(bool, "True or False", fail_fast=fail_fast)
-    ensure_report(report)
-    given = load_sweep(path, folders=tuple(Path(os.path.abspath(one)) for one in folders))
-    bundle = bundle_of(given)
-    with writable_store(
-        Path(path).with_suffix(".sqlite") if store is None else Path(store)
-    ) as opened:
-        entered = enter(opened, given, bundle, beside)
-        runner = nullcontext(local_runner(given, bundle, workers))
-        summary = compute_sweep(opened, given, entered, runner, retry_failed, fail_fast, report)
-        return result_of(opened, given, entered, summary)
 
 
 def _several(name: str, given: Any) -> tuple[int, ...]:

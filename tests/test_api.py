@@ -205,16 +205,26 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     assert again.summary.before == 2 and again.remarks == ()
     with closing(sqlite3.connect(store)) as connection, connection:
         connection.execute("UPDATE result SET figures = '{}' WHERE rowid = 1")
+    damaged = bp.stored(store)
+    assert damaged.summary.done == 1 and damaged.summary.left == 1
+    assert "1 of 2 cells could not be read" in damaged.remarks[0]
     mended = bp.sweep(file)
     assert mended.summary.before == 1 and mended.summary.done == 2
     assert "computed anew" in mended.remarks[0] and mended.remarks[0] in str(mended)
     assert main(["export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
     exported = read_table(tmp_path / "table.csv")
     assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()
+    assert bp.stored(store).to_frame().equals(mended.to_frame())
+    assert main(["report", str(store), "--format", "csv", "-o", str(tmp_path / "r.csv")]) == 0
+    assert (tmp_path / "r.csv").read_text("utf-8") == bp.sweep_report(store, form="csv")
     file.write_text(text.replace("0.2 um", "0.3 um"), "utf-8")
     with pytest.raises(bp.OtherSweepError, match="holds another sweep; what has changed"):
         bp.sweep(file)
     assert bp.sweep(file, beside=True).summary.before == 1
+    assert len({bp.stored(store, k).to_frame()["U6_average_m"][1] for k in (1, 2)}) == 2
+    with pytest.raises(bp.StoreError, match="no such sweep; it has 1, 2"):
+        bp.stored(store, 3)
     store.write_text("no store", "utf-8")
-    with pytest.raises(bp.StoreError, match="is no store of ballplate sweep"):
-        bp.sweep(file)
+    for use in (lambda: bp.sweep(file), lambda: bp.stored(store), lambda: bp.sweep_report(store)):
+        with pytest.raises(bp.StoreError, match="is no store of ballplate sweep"):
+            use()

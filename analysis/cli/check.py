@@ -14,8 +14,8 @@ from .outputs import UsageError
 from .telling import complain, warn
 
 if TYPE_CHECKING:
+    from ..planning.repair.checked_files import CheckedFile
     from ..planning.requirements.goals import Goal
-    from .check_files import CheckedFile
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
@@ -98,7 +98,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from .check_files import Wanted, check_files
+    from ..planning.repair.checked_files import Wanted, check_files
     from .common import print_json
     from .file_patterns import matching_files
     from .progress import progress

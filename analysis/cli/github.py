@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
+from ..planning.repair.checked_files import CheckedDesign, CheckedFile
 from ..results.parts import scale_lines, target_lines, verdict_lines
-from .check_files import CheckedDesign, CheckedFile
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:

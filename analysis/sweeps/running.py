@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -16,11 +17,13 @@ from filelock import FileLock, Timeout
 from ..presentation.result import Result
 from .bundle import Bundle, changes, definition
 from .execute import Runner, Summary, run_sweep
-from .frame import frame
+from .frame import frame, frame_of
 from .model import Sweep
 from .store import (
     Store,
     add_sweep,
+    chosen_sweep,
+    definition_of,
     definitions,
     ensure_in_place,
     keys,
@@ -38,6 +41,9 @@ if TYPE_CHECKING:
 
 # Changes between two sweeps that are listed.
 MOST_CHANGES = 20
+
+# How columns end that stand for a cell where a table is printed; the others are in the data frame.
+AVERAGE = re.compile(r"U\d+(_lengths)?_average_\w+")
 
 # Reasons of failures that are told.
 MOST_REASONS = 10
@@ -84,7 +90,11 @@ class SweepResult(Result):
         return f"{one.cells} cells, {one.done} done, {one.failed} failed{left}"
 
     def lines(self) -> list[str]:
-        table = self.table.to_string(index=False).splitlines()
+        names = list(self.table.columns)
+        averages = [name for name in names if AVERAGE.fullmatch(name)]
+        axes = names[: names.index("status") + 1]
+        shown = [*axes, *(name for name in ("rank_deficiency",) if name in names), *averages]
+        table = self.table[shown].to_string(index=False).splitlines()
         return [f"{self.label}: {self.title}", self.headline(), *self.remarks, "", *table]
 
     def to_dict(self) -> dict[str, Any]:
@@ -225,4 +235,29 @@ def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) ->
         table,
         entered.remarks,
         shortcomings(store, entered.number, summary.cells),
+    )
+
+
+def stored_result(store: Store, sweep: int | None = None) -> SweepResult:
+    """A sweep of a store, by default the newest, as far as it is computed.
+
+    :raises StoreError: there is no such sweep, or its definition cannot be read.
+    """
+    number = chosen_sweep(store, sweep)
+    defined = definition_of(store, number)
+    cells = len(defined["cells"])
+    found = results(store, number, cells)
+    status = [row.status for row in found.rows]
+    summary = Summary(cells, len(status), status.count("done"), status.count("failed"))
+    damage = unread(
+        store.path, found.unreadable, found.strays, cells, found.damage, "their cells are left out"
+    )
+    return SweepResult(
+        Path(store.path).stem,
+        str(defined["title"]),
+        Path(store.path),
+        summary,
+        frame_of(found, defined),
+        (damage,) if damage else (),
+        shortcomings(store, number, cells),
     )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ..design.influences.protocol import InfluenceSettings
 from ..design.lookup import Floats, Indices
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
@@ -50,12 +51,16 @@ class ReadingGroup:
 
 @dataclass(frozen=True, eq=False)
 class Position:
-    """A position of an artefact, its nominal pose in the machine and what is read in it."""
+    """A position of an artefact, its nominal pose in the machine and what is read in it.
+
+    ``description`` says in words what a short name does not, empty where nothing is said.
+    """
 
     name: str
     artefact: str
     pose: Pose
     readings: tuple[ReadingGroup, ...]
+    description: str = ""
 
     @property
     def count(self) -> int:
@@ -215,6 +220,7 @@ class Experiment:
     builder: Callable[[Node], Experiment]
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
+    influences: tuple[InfluenceSettings, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
+from ..design.influences.kinds import AnyInfluence
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
@@ -183,6 +184,9 @@ class ExperimentSettings(Settings):
     )
     readings: ReadingsSettings | None = Field(
         None, description="the laboratory's readings: where they are and how they are written"
+    )
+    influences: NonEmpty[AnyInfluence] | None = Field(
+        None, description="what disturbs readings: temperature"
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"

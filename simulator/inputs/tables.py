@@ -65,14 +65,16 @@ def read_table(
     problems: list[Message] | None = None,
     defaults: Mapping[str, str] = MappingProxyType({}),
     absent: float = 0.0,
+    units: Mapping[str, Mapping[str, Fraction]] = MappingProxyType({}),
 ) -> tuple[FileRow, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
     unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are
-    ``absent``; ``defaults`` tell what required columns of text say where they are missing. Empty
-    lines and lines that begin with # are skipped. Messages about rows are added to ``problems`` if
-    it is given, so that the caller can say more at once; a length that is wrong is then NaN.
+    ``absent``; those of ``units`` are no lengths and have units of their own; ``defaults`` tell
+    what required columns of text say where they are missing. Empty lines and lines that begin with
+    # are skipped. Messages about rows are added to ``problems`` if it is given, so that the caller
+    can say more at once; a length that is wrong is then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
         a number, there are no rows; all problems of the file at once.
@@ -86,8 +88,9 @@ def read_table(
             [Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")]
         )
     places, factors = _columns(
-        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example
+        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
     )
+    _refuse_unfilled(file, places, lengths, lines)
     count = len(places)
     places += [name for name in defaults if name not in places]
     constants = [defaults[name] for name in places[count:]]
@@ -126,6 +129,25 @@ def read_table(
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
+
+
+def _refuse_unfilled(
+    file: str, places: Sequence[str], lengths: Sequence[str], lines: Sequence[tuple[int, str]]
+) -> None:
+    """Refuse a table in which no length is filled in, in one message instead of one for each cell.
+
+    :raises ExperimentError: all required lengths are empty, in all rows.
+    """
+    columns = [places.index(name) for name in lengths]
+    rows = (split_cells(line) for _, line in lines[1:])
+    is_empty = len(lines) > 1 and bool(columns)
+    if is_empty and all(
+        cells is not None and len(cells) == len(places) and not any(cells[k][1] for k in columns)
+        for cells in rows
+    ):
+        text = f"nothing is filled in: {listing(lengths)} are empty in all {len(lines) - 1} rows"
+        text += "; write in what was read, and remove the lines of what was not"
+        raise ExperimentError([Message(file, lines[1][0], 1, "", text)])
 
 
 def _lengths_of(
@@ -295,29 +317,34 @@ def _columns(
     optional: Sequence[str],
     defaults: Mapping[str, str],
     example: str,
+    units: Mapping[str, Mapping[str, Fraction]],
 ) -> tuple[list[str], dict[str, Fraction]]:
     """Return the names of the columns without their units, and the factor of each unit."""
     messages: list[Message] = []
     names: list[str] = []
     factors: dict[str, Fraction] = {}
     for place, cell, name, unit in header_cells(mark, header, example):
+        of_name = units.get(name, LENGTH_UNITS)
         if cell in texts:
             name = cell
-        elif name in (*lengths, *optional) and unit in LENGTH_UNITS:
-            factors[name] = LENGTH_UNITS[unit]
+        elif name in (*lengths, *optional) and unit in of_name:
+            factors[name] = of_name[unit]
         elif name in (*lengths, *optional):
             messages.append(
-                place.message(
-                    "", f'unknown unit in the column "{cell}"; {hint(unit, LENGTH_UNITS)}'
-                )
+                place.message("", f'unknown unit in the column "{cell}"; {hint(unit, of_name)}')
             )
         elif cell in (*lengths, *optional):
-            name = cell
-            messages.append(
-                place.message("", f'the column "{cell}" has no unit; write for example {cell}_mm')
-            )
+            name, example = cell, next(iter(units.get(cell, {"mm": 1})))
+            text = f'the column "{cell}" has no unit; write for example {cell}_{example}'
+            messages.append(place.message("", text))
         else:
-            known = [*texts, *(f"{length}_mm" for length in (*lengths, *optional))]
+            known = [
+                *texts,
+                *(
+                    f"{one}_{next(iter(units.get(one, {'mm': 1})))}"
+                    for one in (*lengths, *optional)
+                ),
+            ]
             messages.append(
                 place.message("", f'unknown column "{shorten(cell)}"; {hint(cell, known)}')
             )

@@ -53,7 +53,7 @@ NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f]")
 @dataclass(frozen=True)
 class TableRows:
     """Rows of tables of readings: the names of position, ball and probe, and lengths in metres, x,
-    y, z and u; NaN for a standard uncertainty that is not stated.
+    y, z and u, and what further columns hold; NaN for what is not stated.
 
     `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
     """
@@ -138,6 +138,8 @@ class _Reader:
         texts, told = self._texts(above)
         units = self._units(above)
         found = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
+        # In the order that they were read in, also where several stand side by side.
+        found.sort(key=lambda one: one[0].mark.line)
         rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
         self._refuse_doubtful(rows, is_possible)
         return TableRows(tuple(rows), (self._told(units, told),), diameters)
@@ -246,6 +248,11 @@ class _Reader:
         sign = DECIMALS[self.form.decimal]
         axes = [axis.place for axis in group.axes]
         factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
+        further = [roles.get(name) for name in self.words.further]
+        for name, known in self.words.further.items():
+            if name in roles:
+                factor = known[roles[name].unit or ""]
+                factors[roles[name].place] = factor, power_of_ten(factor)
         places = {role: roles[role].place for role in TEXTS if role in roles}
         found: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
@@ -281,6 +288,7 @@ class _Reader:
                 names.append(own)
             x = [number(cells, i, mark) for i in axes]
             x.append(math.nan if u is None else number(cells, u, mark))
+            x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
             size = math.nan if diameter is None else number(cells, diameter, mark)
             found.append((FileRow(mark, tuple(names), tuple(x)), size))
         if messages:
@@ -298,7 +306,7 @@ class _Reader:
         if self.settings.decimal is not None or self.form.separator == "comma":
             return
         cell = doubtful_decimals(self.form)
-        x = np.array([row.lengths[:-1] for row in rows])
+        x = np.array([row.lengths[: len(self.words.axes)] for row in rows])
         if cell and is_possible(1e3 * x):
             other = cell.replace(".", "").replace(",", "")
             raise self.error(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property, lru_cache
 
 from ..experiment.readings_section import ColumnsSettings
@@ -141,12 +142,15 @@ class Headings:
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """What headings may name: probes and positions, by their names, and columns `stated`."""
+    """What headings may name: probes and positions, by their names, columns `stated`, and `further`
+    ones of numbers, with the units that each may have.
+    """
 
     axes: tuple[str, ...]
     probes: tuple[str, ...]
     positions: tuple[str, ...]
     stated: ColumnsSettings | None = None
+    further: Mapping[str, Mapping[str, Fraction]] = field(default_factory=dict)
 
     @cached_property
     def beside_axes(self) -> dict[str, dict[str, str]]:
@@ -179,6 +183,17 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
         if name is not None:
             roles[role] = _stated_column(name, cells)
             taken.add(roles[role].place)
+    for name, units in words.further.items():
+        found = {
+            i: unit for i, cell in enumerate(cells) if (unit := _unit_of(cell, name)) is not None
+        }
+        if len(found) > 1:
+            raise HeadingError(_which(name, [cells[i] for i in found]))
+        for i, unit in found.items():
+            if unit not in units:
+                raise HeadingError(f'the unit in the column "{cells[i]}" is not {listing(units)}')
+            roles[name] = HeadedColumn(i, unit)
+            taken.add(i)
     for words_of in (WORDS, LESS_CLEAR):
         for role, known in words_of.items():
             if role in roles:
@@ -190,6 +205,22 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
                 roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
                 taken.add(places[0])
     return Headings(roles, groups, tuple(cells))
+
+
+def _unit_of(cell: str, name: str) -> str | None:
+    """The unit of a heading that names a further column, empty without one; None if it does not.
+
+    >>> _unit_of("t_scales_degC", "t_scales"), _unit_of("T scales [°C]", "t_scales")
+    ('degC', 'degC')
+    """
+    if folded(cell[:LONGEST]) == folded(name):
+        return ""
+    match = re.fullmatch(
+        r"(.+?)(?:[\s_]+|\s*(?=[\[(/]))[\[(/]?\s*([^\s_\[\]()/]+)\s*[\])]?", cell[:LONGEST]
+    )
+    if match is None or folded(match[1]) != folded(name):
+        return None
+    return match[2].replace("°", "deg")
 
 
 def numbered_columns(words: Vocabulary, count: int) -> Headings:

@@ -116,8 +116,9 @@ def read_readings(
     The probe's column may be left out where there is one probe only. An optional column u, with a
     unit as in u_um, states the standard uncertainty of each co-ordinate of a reading; without it a
     reading has the uncertainty that the design plans for it, and one that is not planned the
-    machine's repeatability. A reading stands in the file no more often than the design plans it;
-    one that is not planned, once. Unless `every_ball` has to be read, some may be missing.
+    machine's repeatability. Influence quantities have further columns. A reading stands in the file
+    no more often than the design plans it; one that is not planned, once. Unless `every_ball` has
+    to be read, some may be missing.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
@@ -125,11 +126,12 @@ def read_readings(
     d, settings = design.dimension, settings or no_settings()
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
+    units = {name: one for kind in design.influences for name, one in kind.columns.items()}
 
     def is_possible(x: Array) -> bool:
         return settings.coordinates == "part" or not far_outside(x, design).any()
 
-    found = source_rows(sources, design, settings, messages, is_possible)
+    found = source_rows(sources, design, settings, messages, is_possible, units)
     rows = found.rows
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
@@ -141,6 +143,10 @@ def read_readings(
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     given, stated = lengths[:, :d], lengths[:, d]
+    beside = None
+    if design.influences:
+        order = {"order": np.arange(len(rows), dtype=float)}
+        beside = order | dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     if settings.coordinates != "part":
         _refuse_far_outside(rows, given, design)
@@ -150,7 +156,7 @@ def read_readings(
         if has_uncertainty
         else _planned_uncertainty(design, readings)
     )
-    readings = replace(readings, uncertainty=uncertainty)
+    readings = replace(readings, uncertainty=uncertainty, beside=beside)
     missing, unplanned = _compare(design, readings, [row.mark for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from .headings import Vocabulary
 from .name_matching import with_known_names
 
 Source = Path | GivenText
+Units = Mapping[str, Mapping[str, Fraction]]
 
 # A diameter is told that is further from others of its ball than so many times their usual
 # distance, and than this (m).
@@ -48,6 +50,7 @@ def source_rows(
     settings: ReadingsSettings,
     messages: list[Message],
     is_possible: Callable[[Array], bool],
+    units: Units,
 ) -> SourceRows:
     """Rows of tables of readings, with the names of the design as far as they can be matched.
 
@@ -61,7 +64,7 @@ def source_rows(
         "probe": design.probes.names,
     }
     tables = [
-        read_source(source, names, settings, messages, is_possible, design.dimension)
+        read_source(source, names, settings, messages, is_possible, design.dimension, units)
         for source in sources
     ]
     rows = [row for table in tables for row in table.rows]
@@ -90,8 +93,9 @@ def read_source(
     messages: list[Message],
     is_possible: Callable[[Array], bool],
     dimension: int,
+    units: Units,
 ) -> TableRows:
-    """Rows of one table: of a plain CSV file where it is one.
+    """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns.
 
     :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
         `messages`.
@@ -107,12 +111,16 @@ def read_source(
         defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
         texts = ["position", "ball", "probe"]
         try:
-            rows = read_table(text, texts, axes, ["u"], wrong, defaults, absent=np.nan)
+            rows = read_table(
+                text, texts, axes, ["u", *units], wrong, defaults, absent=np.nan, units=units
+            )
         except ExperimentError as error:
             wrong = list(error.messages)
         if not wrong:
             return TableRows(rows)
-    words = Vocabulary(axes, tuple(names["probe"]), tuple(names["position"]), settings.columns)
+    words = Vocabulary(
+        axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units
+    )
     try:
         return read_any_table(text, encoding, words, settings, is_possible)
     except ExperimentError:

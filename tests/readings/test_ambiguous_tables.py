@@ -48,7 +48,7 @@ def read(
     def is_possible(x: np.ndarray) -> bool:
         return not far_outside(x, design).any()
 
-    found = read_source(source, names, stated, wrong, is_possible, 3)  # type: ignore[arg-type]
+    found = read_source(source, names, stated, wrong, is_possible, 3, {})  # type: ignore[arg-type]
     if wrong:
         raise ExperimentError(wrong)  # type: ignore[arg-type]
     return found

@@ -16,19 +16,19 @@ from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.yamltree import Mark
 
-from ..planning.repair.repair_tables import (
+from ...results.prediction import Advice, Prediction
+from ...results.study import check, planned_uncertainty
+from ..requirements.goals import Goal, GoalError, check_goal, judge
+from .repair_tables import (
     certificate_data,
     certificate_lines,
     repair_data,
     repair_lines,
 )
-from ..planning.requirements.goals import Goal, GoalError, check_goal, judge
-from ..results.prediction import Advice, Prediction
-from ..results.study import check, planned_uncertainty
 
 if TYPE_CHECKING:
-    from ..planning.repair.repair_search import Repairs
-    from ..planning.repair.scale import ScaleCertificate
+    from .repair_search import Repairs
+    from .scale import ScaleCertificate
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ def checked_design(
     prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
-        from ..planning.repair.repair_search import repairs
-        from ..planning.repair.scale import scale_certificate
+        from .repair_search import repairs
+        from .scale import scale_certificate
 
         found = repairs(with_pool, report=report)
         certificate = scale_certificate(with_pool, prediction.scale)
