@@ -22,13 +22,16 @@ DESCRIPTION = (
 
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
-    parser.add_argument(
+    readings = parser.add_argument(
         "readings",
         metavar="READINGS",
-        nargs="*",
+        nargs="+",
         type=Path,
+        default=[],
         help="readings: one table or several; default: readings.files of the experiment file",
     )
+    # With nargs="*" none would be looked for behind the first option.
+    readings.required = False
     add_tables(parser)
     parser.add_argument(
         "--certificate",
