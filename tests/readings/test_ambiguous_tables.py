@@ -4,10 +4,12 @@ meaning.
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
@@ -23,17 +25,22 @@ DESIGN = Path("designs/quickstart.yaml")
 HEAD = "position;ball;probe;x_mm;y_mm;z_mm\n"
 
 
-@pytest.fixture(scope="module")
-def experiment() -> Experiment:
+@cache
+def quickstart() -> tuple[Experiment, Design]:
     (found,) = load(DESIGN)
-    return found
+    return found, lay_out(found)
+
+
+@pytest.fixture
+def experiment() -> Experiment:
+    return quickstart()[0]
 
 
 def read(
     text: str | bytes, experiment: Experiment, path: Path | None = None, **said: object
 ) -> TableRows:
     """The rows of a table, without a look at its names."""
-    design = lay_out(experiment)
+    design = quickstart()[1]
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
@@ -229,7 +236,7 @@ def test_whatever_is_read_is_what_was_written(
     """A table that the reader takes has the numbers and names that were written, whatever its
     form.
     """
-    (experiment,) = load(DESIGN)
+    experiment, _ = quickstart()
     separator, sign = form
 
     def quoted(name: str) -> str:
@@ -271,7 +278,7 @@ def test_whatever_is_read_is_what_was_written(
     )
 )
 def test_no_table_makes_it_fail(content: bytes) -> None:
-    (experiment,) = load(DESIGN)
+    experiment, _ = quickstart()
     try:
         found = read(content, experiment, Path(TMP) / "t.csv")
     except ExperimentError as error:
