@@ -15,7 +15,7 @@ import numpy as np
 
 from ..design.arrays import Design, Readings
 from ..estimation.consensus import consensus_motion
-from ..geometry.motions import AXIS_NAMES
+from ..geometry.motions import AXIS_NAMES, fixes_pose
 from ..inputs.settings import listing
 from ..machines.protocol import Array
 from .gross_errors import AGAINST_DRAWING, ball_pitches
@@ -47,11 +47,8 @@ def poses_found(
     for k in np.unique(readings.position):
         rows = np.flatnonzero(readings.position == k)
         nominal = design.balls.places[readings.ball[rows]]
-        extent = np.linalg.svd(nominal - nominal.mean(axis=0), compute_uv=False)
-        if (
-            not design.artefacts.is_plate[design.positions.artefact[k]]
-            or extent[design.dimension - 2] <= 1e-6 * extent[0]
-        ):
+        is_plate = design.artefacts.is_plate[design.positions.artefact[k]]
+        if not is_plate or not fixes_pose(nominal):
             continue
         reach = AGAINST_DRAWING * pitch[readings.ball[rows]]
         rotation, _, agreeing = consensus_motion(nominal, seen[rows], reach)

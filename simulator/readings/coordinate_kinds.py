@@ -9,6 +9,7 @@ import numpy as np
 from ..design.arrays import Design, Readings
 from ..estimation.consensus import consensus_motion
 from ..experiment.readings_section import CompensationSettings, ReadingsSettings
+from ..geometry.motions import fixes_pose
 from ..inputs.messages import refused
 from ..inputs.settings import listing
 from ..machines.protocol import Array
@@ -61,8 +62,7 @@ def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> A
         rows = np.flatnonzero(readings.position == k)
         nominal = design.balls.places[readings.ball[rows]]
         there = nominal @ design.positions.rotations[k].T + design.positions.origins[k]
-        extent = np.linalg.svd(nominal - nominal.mean(axis=0), compute_uv=False)
-        if extent[design.dimension - 2] <= 1e-6 * max(extent[0], 1e-9):
+        if not fixes_pose(nominal):
             poor.append(design.positions.names[k])
             continue
         reach = AGAINST_DRAWING * pitch[readings.ball[rows]]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..design.arrays import Design
-from ..geometry.motions import fit_motion
+from ..geometry.motions import fit_motion, fixes_pose
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing, shorten
 from ..inputs.tables import FileRow
@@ -304,7 +304,7 @@ def _by_number(
             own = [row for row in rows if row.texts[0] == name and row.texts[2] == probe]
             places = design.balls.places[[order[numbers[row.texts[1]]] for row in own]]
             seen = np.array([row.lengths[: design.dimension] for row in own])
-            if len(own) <= design.dimension:
+            if not fixes_pose(places):
                 continue
             rotation, origin = fit_motion(places, seen)
             apart = np.sqrt(((places @ rotation.T + origin - seen) ** 2).sum(axis=1))

@@ -261,3 +261,15 @@ def test_readers_agree_on_several_tables(readings: pandas.DataFrame, tmp_path: P
     named = bp.load(DESIGN).with_(readings={"files": [str(path) for path in paths]})
     assert bp.fit(named).sigma == one.sigma
     assert len(read_readings(paths, design).marks) == len(readings)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_too_few_balls_do_not_place_part_co_ordinates(
+    readings: pandas.DataFrame, count: int
+) -> None:
+    """Nor do they tell how the plate stood; the other positions still are fitted."""
+    own = readings["position"] == "z high"
+    few = pandas.concat([readings[~own], readings[own].iloc[:count]])
+    assert bp.fit(DESIGN, few).warnings == ()
+    with pytest.raises(bp.ExperimentError, match="too few balls were read in z high"):
+        bp.fit(DESIGN, centres(few), coordinates="part")
