@@ -39,8 +39,12 @@ SEPARATORS = {
 DECIMALS = {"point": ".", "comma": ","}
 # Lines that headings are looked for in.
 MOST_ABOVE = 200
-_DIGITS = r"[+-]?(?:[0-9]+(?:{0}[0-9]*)?|{0}[0-9]+)(?:[eE][+-]?[0-9]+)?"
-NUMBERS = {name: re.compile(_DIGITS.format(re.escape(sign))) for name, sign in DECIMALS.items()}
+_DIGITS = r"[+-]?(?:[0-9]+(?:{0})?|{1}[0-9]+)(?:[eE][+-]?[0-9]+)?"
+# A comma at the end of a number separates it from the next.
+NUMBERS = {
+    "point": re.compile(_DIGITS.format(r"\.[0-9]*", r"\.")),
+    "comma": re.compile(_DIGITS.format(",[0-9]+", ",")),
+}
 # Numbers with signs between thousands: with decimals behind them, or several of them.
 _BETWEEN = r"'\u2019\s\u00a0\u202f"
 THOUSANDS = re.compile(

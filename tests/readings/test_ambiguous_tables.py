@@ -124,6 +124,13 @@ def test_commas_that_separate_columns_and_decimals(experiment: Experiment) -> No
     assert "9 columns instead of 6" in asked(short, experiment)
 
 
+def test_commas_with_blanks_behind_them(experiment: Experiment) -> None:
+    """They separate columns, also of whole numbers."""
+    text = "unit: mm\nposition, ball, probe, x, y, z\nhigh, 17, down, 612, 345, 100\n"
+    (row,) = read(text, experiment).rows
+    assert row.texts == ("high", "17", "down") and row.lengths[:3] == (0.612, 0.345, 0.1)
+
+
 def test_two_columns_of_one_name(experiment: Experiment) -> None:
     text = "position;ball;probe;x_mm;x actual [mm];y_mm;z_mm\nz low;r1c1;down;1,5;1,6;2;3\n"
     assert "could all be x; say which" in asked(text, experiment)
