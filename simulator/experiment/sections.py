@@ -199,7 +199,7 @@ class ExperimentSettings(Settings):
             " in mm"
         ),
     )
-    coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
+    coverage_factor: Annotated[float, Field(ge=1, le=10, strict=True)] = Field(
         1.0,
         description=(
             "k of the expanded uncertainty U = k u that is compared with"
