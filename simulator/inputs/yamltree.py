@@ -125,30 +125,13 @@ class GivenText:
         return self.name
 
 
-def read_text(path: Path | GivenText) -> str:
-    """Read a UTF-8 text file.
+def read_bytes(path: Path | GivenText) -> bytes:
+    """Read a file as it is.
 
-    :raises ExperimentError: the file is missing, is a directory, cannot be read or is not UTF-8.
+    :raises ExperimentError: the file is missing, is a directory, is too large or cannot be read.
     """
     if isinstance(path, GivenText):
-        return path.text
-    content = read_bytes(path)
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = content[: error.start].decode("utf-8", errors="replace")
-        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-        text = (
-            f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
-        )
-        raise ExperimentError([Message(str(path), line, column, "", text)]) from None
-
-
-def read_bytes(path: Path) -> bytes:
-    """Read a file of moderate size.
-
-    :raises ExperimentError: the file is missing, is a directory or a device, or cannot be read.
-    """
+        return path.text.encode("utf-8", errors="surrogatepass")
     file = str(path)
     try:
         kind = path.stat().st_mode
@@ -169,6 +152,25 @@ def read_bytes(path: Path) -> bytes:
     if len(content) > MOST_BYTES:
         raise refused(file, f"has more than {MOST_BYTES // 10**6} MB; leave some of it out")
     return content
+
+
+def read_text(path: Path | GivenText) -> str:
+    """Read a UTF-8 text file.
+
+    :raises ExperimentError: the file is missing, is a directory, cannot be read or is not UTF-8.
+    """
+    if isinstance(path, GivenText):
+        return path.text
+    file, content = str(path), read_bytes(path)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = content[: error.start].decode("utf-8", errors="replace")
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        text = (
+            f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
+        )
+        raise ExperimentError([Message(file, line, column, "", text)]) from None
 
 
 def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node:
