@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 
 from ..experiment.readings_section import ColumnsSettings
 from ..inputs.quantities import plain_unit
-from ..inputs.settings import listing, shorten
+from ..inputs.settings import hint, listing, shorten
 
 AXES = ("x", "y", "z")
 # Roles of columns of text.
@@ -191,7 +191,8 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             raise HeadingError(_which(name, [cells[i] for i in found]))
         for i, unit in found.items():
             if unit not in units:
-                raise HeadingError(f'the unit in the column "{cells[i]}" is not {listing(units)}')
+                text = f'the unit in the column "{shorten(cells[i])}" is not known'
+                raise HeadingError(f"{text}; write {listing(units)}")
             roles[name] = HeadedColumn(i, unit)
             taken.add(i)
     for words_of in (WORDS, LESS_CLEAR):
@@ -265,9 +266,10 @@ def _stated_column(name: str, cells: Sequence[str]) -> HeadedColumn:
             raise HeadingError(f'{len(places)} columns are called "{name}"; give the number of one')
         if places:
             return HeadedColumn(places[0], heading(cells[places[0]])[1])
-    if name.isdigit() and 1 <= int(name) <= len(cells):
+    if re.fullmatch("[0-9]{1,9}", name) and 1 <= int(name) <= len(cells):
         return HeadedColumn(int(name) - 1, heading(cells[int(name) - 1])[1])
-    raise HeadingError(f'there is no column "{shorten(name)}"')
+    there = hint(name, filter(None, cells))
+    raise HeadingError(f'there is no column "{shorten(name)}"; {there}')
 
 
 def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
@@ -281,7 +283,7 @@ def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...]
         return None
     of_probes = [set(columns) if isinstance(columns, dict) else {""} for columns in given.values()]
     if any(probes != of_probes[0] for probes in of_probes):
-        raise HeadingError("name columns of x, y and z for the same probes")
+        raise HeadingError("columns of x, y and z are of different probes; name the same")
     parsed = [heading(cell) for cell in cells]
     groups = []
     for probe in sorted(of_probes[0]):
@@ -332,7 +334,8 @@ def _found_groups(
         )
     if "" not in groups and len(groups) < len(found):
         names = listing(beside or "the others" for beside in found if beside not in groups)
-        raise HeadingError(f"not all of {listing(words.axes)} are there of {names}")
+        text = f"not all of {listing(words.axes)} are there of {names}"
+        raise HeadingError(f"{text}; add the others, or name those meant under readings: columns")
     return tuple(
         Group(
             tuple(HeadedColumn(axes[axis][0], parsed[axes[axis][0]][1]) for axis in words.axes),

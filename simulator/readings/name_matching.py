@@ -111,8 +111,8 @@ def _numbers(names: Sequence[str], most: int) -> dict[str, int] | None:
     """Which of those in order each name is the number of, from 0; None unless all are numbers."""
     numbers = {}
     for name in names:
-        plain = _KINDS.sub("", folded(name), count=1) if not name.isdigit() else folded(name)
-        if not plain.isdigit() or not 1 <= int(plain) <= most:
+        plain = _KINDS.sub("", folded(name), count=1) if not name.isdecimal() else folded(name)
+        if not re.fullmatch("[0-9]{1,9}", plain) or not 1 <= int(plain) <= most:
             return None
         numbers[name] = int(plain) - 1
     return numbers if len(set(numbers.values())) == len(numbers) else None

@@ -224,7 +224,8 @@ def _form(
             if _holds_no_number(cells, places, number):
                 remarks.append(at)
             else:
-                wrong.append((at, f"{len(cells)} columns instead of {width}"))
+                text = f"{len(cells)} columns instead of {width}; write one line per row"
+                wrong.append((at, text))
             continue
         if all(i >= len(cells) or cells[i].casefold() in NOTHING for i in places):
             (empty if cells[ball] else remarks).append(at)
@@ -301,7 +302,7 @@ def wrong_number(cell: str, name: str, decimal: str) -> str:
     other = "comma" if decimal == "point" else "point"
     if NUMBERS[other].fullmatch(cell):
         return f'"{cell}" has a decimal {other}, and others have decimal {decimal}s; write one kind'
-    return f'"{shorten(cell)}" is not a number'
+    return f'"{shorten(cell)}" is not a number; write for example "500{DECIMALS[decimal]}0003"'
 
 
 def chosen_form(forms: Sequence[Form]) -> Form:
