@@ -4,7 +4,7 @@ co-ordinates that the design has.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -51,6 +51,7 @@ def source_rows(
     messages: list[Message],
     is_possible: Callable[[Array], bool],
     units: Units,
+    empty: Collection[str] = (),
 ) -> SourceRows:
     """Rows of tables of readings, with the names of the design as far as they can be matched.
 
@@ -64,7 +65,7 @@ def source_rows(
         "probe": design.probes.names,
     }
     tables = [
-        read_source(source, names, settings, messages, is_possible, design.dimension, units)
+        read_source(source, names, settings, messages, is_possible, design.dimension, units, empty)
         for source in sources
     ]
     rows = [row for table in tables for row in table.rows]
@@ -94,8 +95,10 @@ def read_source(
     is_possible: Callable[[Array], bool],
     dimension: int,
     units: Units,
+    empty: Collection[str] = (),
 ) -> TableRows:
-    """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns.
+    """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns,
+    and cells of the columns `empty` may be so in plain files.
 
     :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
         `messages`.
@@ -112,7 +115,7 @@ def read_source(
         texts = ["position", "ball", "probe"]
         try:
             rows = read_table(
-                text, texts, axes, ["u", *units], wrong, defaults, absent=np.nan, units=units
+                text, texts, axes, ["u", *units], wrong, defaults, np.nan, units, empty
             )
         except ExperimentError as error:
             wrong = list(error.messages)

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Union
 from pydantic import Field
 
 from .protocol import InfluenceSettings
+from .reindexing import ReindexingSettings
 from .temperature import TemperaturesSettings
 
 INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     # In the order of the documentation.
     TemperaturesSettings,
+    ReindexingSettings,
 )
 """Settings class of every kind of influence quantity."""
 
