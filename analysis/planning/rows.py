@@ -21,6 +21,7 @@ from ballplate.simulator.design.observations.lengths import (
     length_whitening,
 )
 from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.observations.whitening import EXACT
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
@@ -261,8 +262,8 @@ def calibration_rows(
         raise refused(experiment.source, text, "pool.calibration")
     stated = next(item.certified_values(experiment.layouts[item.artefact]))
     row = np.zeros((1, drawn.shared))
-    row[0, drawn.layout.lengths.start - drawn.layout.model.start + named[0]] = (
-        1.0 / stated.standard_uncertainty
+    row[0, drawn.layout.lengths.start - drawn.layout.model.start + named[0]] = 1.0 / max(
+        stated.standard_uncertainty, EXACT
     )
     return [_of_shared(drawn, row * drawn.scale)]
 

@@ -243,6 +243,7 @@ def _build(
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
         readings=sections.get("readings") or no_settings(),
+        notes=tuple(str(note) for note in problems.notes),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

@@ -216,7 +216,8 @@ class Experiment:
     artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency`` are None where
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
     meant for. ``pool``: what a plan may choose from. ``doubts``: what of the file is possible, and
-    unlikely to be meant. ``readings``: where tables of readings are and how they
+    unlikely to be meant. ``notes``: what was found in its tables
+    by itself. ``readings``: where tables of readings are and how they
     are written. ``tree``: what was written, without variants, ``mark``: where the
     experiment itself stands, and ``builder``: what makes an experiment of a tree.
     """
@@ -248,6 +249,7 @@ class Experiment:
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
     readings: ReadingsSettings = field(default_factory=no_settings)
+    notes: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
