@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import codecs
+import re
 
-from .messages import refused
+from .messages import ExperimentError, Message, refused
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig", "UTF-8"),
@@ -16,7 +17,11 @@ MARKS = (
 # Without a mark, in this order; the last of them has a letter for every byte.
 UNMARKED = (("utf-8", "UTF-8"), ("cp1252", "cp1252"), ("latin-1", "latin-1"))
 # What begins files that hold no text: workbooks, archives, documents.
-NO_TEXT = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF", b"\x1f\x8b")
+OTHERS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF", b"\x1f\x8b")
+CONTROL = re.compile("[\x00-\x08\x0b\x0e-\x1f\x7f]")
+LINE_END = re.compile("\r\n|\r|\n")
+# What DOS writes at the end of a text.
+END_OF_FILE = "\x1a"
 
 
 def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[str, str]:
@@ -25,14 +30,14 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
     A file without a mark of its encoding is in UTF-8 if it can be, in UTF-16 if every other byte of
     it is zero, and otherwise in the encoding of western European systems.
 
-    :raises ExperimentError: it is no text, or not in the encoding stated.
+    :raises ExperimentError: it is no text, is damaged, or is not in the encoding stated.
 
     >>> decoded("Lage;1,5 µm".encode("cp1252"), "a.csv")
     ('Lage;1,5 µm', 'cp1252')
     >>> decoded("Lage".encode("utf-16"), "a.csv")
     ('Lage', 'UTF-16')
     """
-    if content.startswith(NO_TEXT):
+    if content.startswith(OTHERS):
         text = "is a workbook, an archive or a document, and no text; save its table as CSV"
         raise refused(file, text)
     if encoding is not None:
@@ -40,7 +45,7 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
         # With its mark, which is no letter of the text.
         used = marked if marked[:6] == codecs.lookup(encoding).name[:6] else encoding
         try:
-            return content.decode(used), encoding
+            return content.decode(used).rstrip(END_OF_FILE), encoding
         except UnicodeError:
             text = f"is not in the encoding {encoding}; correct readings.encoding, or leave it out"
             raise refused(file, text) from None
@@ -52,8 +57,24 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
         except UnicodeError:
             continue
         if "\0" not in text:
-            return text, told
-    raise refused(file, "is no text in any encoding known; save the table as CSV in UTF-8")
+            return text.rstrip(END_OF_FILE), told
+    raise refused(
+        file, "is no text in any encoding known; take a whole copy of it, or save it as UTF-8"
+    )
+
+
+def refuse_controls(text: str, file: object) -> None:
+    """Refuse what has characters that no table or report has, as what is no text or is damaged.
+
+    :raises ExperimentError: it has a control character that parts neither words, lines nor pages.
+    """
+    control = CONTROL.search(text)
+    if control is not None:
+        line = len(LINE_END.findall(text, 0, control.start())) + 1
+        told = f"the control character U+{ord(control[0]):04X} is no part of a text"
+        raise ExperimentError(
+            [Message(str(file), line, 1, "", f"{told}; take a whole copy of the file")]
+        )
 
 
 def _by_zeros(content: bytes) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..experiment.readings_section import ReadingsSettings
-from ..inputs.decoding import decoded
+from ..inputs.decoding import LINE_END, decoded, refuse_controls
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import (
     LENGTH_UNITS,
@@ -47,7 +47,6 @@ ABOVE = {
 }
 # Characters of such a line.
 LONGEST_LINE = 300
-NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f]")
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,8 @@ def read_any_table(
 
     :raises ExperimentError: the table is ambiguous, lacks columns or units, or has wrong cells.
     """
-    if NO_TEXT.search(source.text):
-        raise refused(source, "has control characters, and is no table; save it as CSV")
-    texts = re.split("\r\n|\r|\n", source.text)
+    refuse_controls(source.text, source)
+    texts = LINE_END.split(source.text)
     lines = [
         (number, text)
         for number, text in enumerate(texts, start=1)

@@ -189,9 +189,9 @@ def test_rows_that_were_cut_off(experiment: Experiment) -> None:
     ("content", "told"),
     [
         (b"PK\x03\x04\x14\x00", "is a workbook"),
-        (b"\x00\x01\x02\x03", "control characters"),
+        (b"\x00\x01\x02\x03", "the control character"),
         (b"\x00a\x01", "is no text"),
-        ((HEAD + "z low;r1c1;down;\x07;1;2\n").encode(), "control characters"),
+        ((HEAD + "z low;r1c1;down;\x07;1;2\n").encode(), "the control character"),
         (HEAD.encode(), "no rows below"),
         (b"\xff\xfe", "the file is empty"),
         (b"", "the file is empty"),

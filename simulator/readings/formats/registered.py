@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+from ...inputs.decoding import decoded
 from ...inputs.messages import refused
 from ...inputs.settings import hint, listing
 from ...inputs.yamltree import GivenText, read_bytes
@@ -17,7 +18,7 @@ from .report import Format, Report
 # Asked in this order: the first that recognises a file reads it.
 FORMATS: tuple[Format, ...] = (QIF, DMIS, PCDMIS, CALYPSO)
 
-# Bytes at the beginning of a file by which it is recognised.
+# Characters at the beginning of a file by which it is recognised.
 BEGINNING = 100_000
 
 
@@ -36,9 +37,7 @@ def read_report(
         if name not in chosen:
             raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
         return chosen[name].read(content, file, unit)
-    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8"
-    beginning = content[:BEGINNING].decode(encoding, errors="replace").removeprefix("\ufeff")
-    beginning = "\n".join(beginning.splitlines())
+    beginning = "\n".join(decoded(content, file)[0][:BEGINNING].splitlines())
     for one in FORMATS:
         if one.recognises(beginning):
             return one.read(content, file, unit)

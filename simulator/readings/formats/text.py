@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from ...inputs.messages import ExperimentError, Message, refused
+from ...inputs.decoding import decoded, refuse_controls
 from ...inputs.yamltree import Mark
 
-BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
-# Form feeds part pages; DOS ends a file with Ctrl-Z.
-CONTROL = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
+# Form feeds part pages.
 LINE_END = re.compile("\r\n|\r|\n|\x0c")
 
 
@@ -31,39 +29,14 @@ class Text:
         return Mark(self.file, number, column)
 
 
-def decode(content: bytes, file: str) -> tuple[str, tuple[str, ...]]:
-    """Characters of a text file, and a remark where its encoding was guessed.
-
-    :raises ExperimentError: it holds what is no text.
-    """
-    remarks: tuple[str, ...] = ()
-    encoding = next(
-        (name for mark, name in BYTE_ORDER_MARKS.items() if content.startswith(mark)), "utf-8"
-    )
-    try:
-        text = content.decode(encoding)
-    except UnicodeDecodeError:
-        if encoding != "utf-8":
-            raise refused(file, "is damaged: not all of it is text; take a whole copy") from None
-        try:
-            text = content.decode("cp1252")
-        except UnicodeDecodeError:
-            text = content.decode("latin-1")
-        remarks = (f"{file}: not UTF-8; read as Windows-1252",)
-    control = CONTROL.search(text)
-    if control is not None:
-        line = len(LINE_END.findall(text, 0, control.start())) + 1
-        told = f"the character U+{ord(control[0]):04X} is no part of a text; take a whole copy"
-        raise ExperimentError([Message(file, line, 1, "", told)])
-    return text.rstrip("\x1a"), remarks
-
-
 def read_lines(content: bytes, file: str) -> Text:
     """Lines of a text file.
 
     :raises ExperimentError: it holds what is no text.
     """
-    text, remarks = decode(content, file)
+    text, encoding = decoded(content, file)
+    refuse_controls(text, file)
     lines = LINE_END.split(text)
-    is_cut = bool(lines[-1].strip())
-    return Text(file, tuple(lines), remarks, is_cut)
+    is_guess = not encoding.startswith("UTF")
+    remarks = (f"{file}: not UTF-8; read as {encoding}",) if is_guess else ()
+    return Text(file, tuple(lines), remarks, is_cut=bool(lines[-1].strip()))
