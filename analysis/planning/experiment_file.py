@@ -29,7 +29,7 @@ from ballplate.simulator.inputs.yamltree import (
 from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
 from ballplate.simulator.machines.custom import module_file
 
-from .short_names import renamed_keys
+from .short_names import renamed_keys, renamed_of_all
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 SCHEMA_LINE = "# yaml-language-server:"
@@ -164,6 +164,12 @@ def _content(
         left = {name: at for name, at in one.get("positions", {}).items() if name not in others}
         one.pop("positions", None)
         one |= {"positions": renamed_keys(left, short)} if left else {}
+    if "readings" in said:
+        said["readings"] = _with(
+            said["readings"],
+            "columns",
+            lambda columns: _with(columns, "position", lambda one: renamed_of_all(one, short)),
+        )
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
     order = (
@@ -191,6 +197,9 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
             # On Windows nothing leads from one drive to another.
             return target.as_posix()
 
+    def all_there(names: Any) -> Any:
+        return [there(name) for name in names] if isinstance(names, list) else there(names)
+
     def model(settings: Any) -> Any:
         settings = _with(settings, "file", there)
         if settings.get("kind") != "python":
@@ -203,14 +212,18 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
     found = dict(content)
     found["error_model"] = model(found["error_model"])
     truth = _with(found.get("true_machine"), "file", there)
-    truth = _with(truth, "files", lambda names: [there(name) for name in names])
+    truth = _with(truth, "files", all_there)
     truth = _with(truth, "error_model", model)
     found |= {"true_machine": truth} if truth is not None else {}
     found["artefacts"] = {
         name: _with(one, "file", there) for name, one in found["artefacts"].items()
     }
-    if "calibration" in found:
-        found["calibration"] = [_with(one, "values", there) for one in found["calibration"]]
+    for key in {"calibration", "stars"} & found.keys():
+        items = [model(_with(one, "values", there)) for one in found[key]]
+        found[key] = [_with(one, "covariance", there) for one in items]
+    if "readings" in found:
+        readings = _with(found["readings"], "files", all_there)
+        found["readings"] = _with(readings, "compensation", lambda on: _with(on, "file", there))
     if "evaluation" in found:
         found["evaluation"] = _with(
             found["evaluation"], "points", lambda points: _with(points, "file", there)

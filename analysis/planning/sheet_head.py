@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
-from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.model import Experiment, Position, Probe
 from ballplate.simulator.machines.protocol import Array
 
 from .schedule import RunSheet
@@ -23,13 +23,15 @@ class Stylus:
     direction.
 
     `from_down` is the angle from straight down, -z; `around` that of its level part from +x towards
-    +y. Both are NaN where there is no such direction.
+    +y. Both are NaN where there is no such direction. `angles` are A and B of an articulating head
+    (rad), None where the offset is stated itself.
     """
 
     name: str
     offset: Array
     from_down: float
     around: float
+    angles: tuple[float, float] | None
 
 
 def known_fields(experiment: Experiment) -> dict[str, str]:
@@ -54,7 +56,7 @@ def styli(sheet: RunSheet, experiment: Experiment) -> list[Stylus]:
         if isinstance(step.candidate.item, Position)
         for probe in step.probes
     }
-    return [_stylus(name, offset) for name, offset in offsets(experiment).items() if name in used]
+    return [_stylus(probe) for name, probe in experiment.probes.items() if name in used]
 
 
 def offsets(experiment: Experiment) -> Mapping[str, Array]:
@@ -62,14 +64,15 @@ def offsets(experiment: Experiment) -> Mapping[str, Array]:
     return {name: probe.offset for name, probe in experiment.probes.items()}
 
 
-def _stylus(name: str, offset: Array) -> Stylus:
+def _stylus(probe: Probe) -> Stylus:
+    offset = probe.offset
     length, level = float(np.linalg.norm(offset)), float(np.hypot(*offset[:2]))
     from_down, around = np.nan, np.nan
     if len(offset) == 3 and length > 0.0:
         from_down = float(np.arctan2(level, -offset[2]))
     if level > 1e-9 * length:
         around = float(np.arctan2(offset[1], offset[0])) % (2.0 * np.pi)
-    return Stylus(name, offset, from_down, around)
+    return Stylus(probe.name, offset, from_down, around, probe.angles)
 
 
 def degrees(angle: float) -> str:
@@ -78,12 +81,18 @@ def degrees(angle: float) -> str:
 
 
 def stylus_rows(sheet: RunSheet, experiment: Experiment) -> list[list[str]]:
-    """A table of the styli with a line of headings; offsets in millimetres."""
+    """A table of the styli with a line of headings; offsets in millimetres, and the angles of an
+    articulating head if any probe has some.
+    """
+    found = styli(sheet, experiment)
+    has_head = any(one.angles is not None for one in found)
     axes = [f"{axis}, mm" for axis in "xyz"[: experiment.dimension]]
     has_angles = experiment.dimension == 3
-    rows = [["probe", *axes, *(["from -z", "from +x"] if has_angles else [])]]
-    for one in styli(sheet, experiment):
+    heads = [*(["A", "B"] if has_head else []), *(["from -z", "from +x"] if has_angles else [])]
+    rows = [["probe", *axes, *heads]]
+    for one in found:
         lengths = [f"{1e3 * length:.6g}" for length in one.offset]
-        angles = [degrees(one.from_down), degrees(one.around)] if has_angles else []
+        angles = [degrees(angle) for angle in one.angles or (np.nan, np.nan)] if has_head else []
+        angles += [degrees(one.from_down), degrees(one.around)] if has_angles else []
         rows.append([one.name, *lengths, *angles])
     return rows

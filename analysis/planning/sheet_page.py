@@ -161,20 +161,26 @@ def _table(heads: list[str], rows: list[str], numbers: set[int]) -> str:
 
 def _styli(sheet: RunSheet, experiment: Experiment) -> str:
     heads, *styli = stylus_rows(sheet, experiment)
+    blanks = ["diameter of the tip"]
+    mounting = ""
+    if "A" not in heads:
+        blanks = ["A, B of the head", *blanks]
+        mounting = " The head's own angles depend on how it is mounted."
+    numbers = set(range(1, len(heads)))
     rows = [
         f'<tr><td class="name">{escaped(row[0])}</td>'
         + "".join(f'<td class="number">{text}</td>' for text in row[1:])
-        + "<td></td><td></td></tr>"
+        + "<td></td>" * len(blanks)
+        + "</tr>"
         for row in styli
     ]
-    heads = [*heads, "A, B of the head", "diameter of the tip"]
+    table = f"<h2>Styli</h2>{_table([*heads, *blanks], rows, numbers)}"
     of_axes = "the offset of the tip from the reference point, the angle of its direction from"
     if experiment.dimension == 2:
-        return f"<h2>Styli</h2>{_table(heads, rows, set(range(1, len(heads) - 2)))}"
+        return table
     return (
-        f"<h2>Styli</h2>{_table(heads, rows, set(range(1, len(heads) - 2)))}"
-        f"<p><small>For each probe {of_axes} straight down, and from +x towards +y seen from"
-        " above. The head's own angles depend on how it is mounted.</small></p>"
+        f"{table}<p><small>For each probe {of_axes} straight down, and from +x towards +y seen from"
+        f" above.{mounting}</small></p>"
     )
 
 

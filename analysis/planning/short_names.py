@@ -10,6 +10,9 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 
 from .done import base_name
 
+# A column whose name begins so has the rest of it in all rows.
+OF_ALL = "="
+
 
 def short_names(
     order: Iterable[Candidate], known: Mapping[str, str], taken: Collection[str]
@@ -75,7 +78,22 @@ def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
         else one
         for one in experiment.influences
     )
-    return replace(experiment, influences=influences)
+    readings = experiment.readings
+    if readings.columns is not None:
+        stated = renamed_of_all(readings.columns.position, names)
+        columns = readings.columns.model_copy(update={"position": stated})
+        readings = readings.model_copy(update={"columns": columns})
+    return replace(experiment, influences=influences, readings=readings)
+
+
+def renamed_of_all(column: str | None, names: Mapping[str, str]) -> str | None:
+    """A table's column of positions, or where it is =NAME, the position of all rows, by its short
+    name.
+    """
+    if column is None or not column.startswith(OF_ALL):
+        return column
+    name = column.removeprefix(OF_ALL)
+    return OF_ALL + names.get(name, name)
 
 
 def renamed_keys(stated: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:

@@ -34,12 +34,14 @@ class Probe:
     """A probe: the ``offset`` (d,) of its tip from the machine's reference point, in metres.
 
     ``standard_uncertainty``: (d,) of the offset where it is estimated, infinite where nothing is
-    known of it, None where the offset is as stated.
+    known of it, None where the offset is as stated. ``angles``: A and B of an articulating head, in
+    radians, where these state the offset.
     """
 
     name: str
     offset: Floats
     standard_uncertainty: Floats | None = None
+    angles: tuple[float, float] | None = None
 
     @property
     def is_estimated(self) -> bool:

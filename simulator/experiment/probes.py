@@ -43,9 +43,10 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
     probes = {}
     for key, settings in sections.entries("probes").items():
         name, steps = str(key), ("probes", str(key))
-        offset, uncertainty = settings, None
+        offset, uncertainty, angles = settings, None, None
         if isinstance(settings, ProbeSettings):
             offset = _offset(settings, sections.get("head"), steps, references)
+            angles = None if settings.a is None else (settings.a, settings.b or 0.0)
             uncertainty = _offset_uncertainty(settings, steps, references)
             if name in members and (settings.unknown or settings.standard_uncertainty):
                 key = "unknown" if settings.unknown else "standard_uncertainty"
@@ -55,7 +56,7 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
             uncertainty = frozen([np.inf] * (dimension or 0))
         if offset is not None and references.has_dimension(offset, steps):
             known = None if name == reference else uncertainty
-            probes[name] = Probe(name, frozen(offset), known)
+            probes[name] = Probe(name, frozen(offset), known, angles)
     return probes
 
 

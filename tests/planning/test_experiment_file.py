@@ -246,6 +246,34 @@ def test_elsewhere_files_are_found_again(source: Path, tmp_path: Path) -> None:
     assert "folder: ../campaign" in text
 
 
+def test_tables_of_readings_and_stars_are_found_again(source: Path, tmp_path: Path) -> None:
+    folder = source.parent
+    (folder / "tables/tips.csv").write_text("probe,x_mm,y_mm,z_mm\ndown,0,0,-50\nup,0,0,60\n")
+    (folder / "tables/covariance.csv").write_text("covariance_um2,a b,a c\na b,2,1\na c,1,2\n")
+    (folder / "tables/lengths.csv").write_text("ball_1,ball_2,distance_mm\na,b,200\na,c,200\n")
+    item = """calibration:
+  - {kind: distances, artefact: plate, pairs: [[a, b], [a, c]], values: tables/lengths.csv,
+     covariance: tables/covariance.csv}"""
+    text = source.read_text("utf-8").replace("calibration:", item)
+    text = text.replace("-50 mm]}", "-50 mm], up: [0 mm, 0 mm, 60 mm]}")
+    for end in ("y: 0 mm}", "y: 100 mm}", "1e2 mm]}"):
+        text = text.replace(f"{end}}}", f"{end}, probes: [down, up]}}")
+    text += """stars: [{standard_uncertainty: 1 um, values: tables/tips.csv}]
+readings:
+  files: [tables/today.csv, tables/tomorrow.csv]
+  compensation: {file: machines/true.yaml}
+"""
+    source.write_text(text, "utf-8")
+    experiment = planned(source, "as is")
+    chosen = by_name(experiment, "two", "one")
+    found = written(experiment, chosen, tmp_path / "out" / "chosen.yaml")
+    assert_same(lay_out(found), lay_out(with_chosen(experiment, chosen)))
+    assert [(tmp_path / "out" / name).resolve() for name in found.readings.named_files] == [
+        folder / "tables/today.csv",
+        folder / "tables/tomorrow.csv",
+    ]
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -184,6 +184,24 @@ def test_the_head_has_what_is_filled_in_by_hand(form: str, sheet: Sheet) -> None
     assert re.search(r"right\s+30\s+0\s+-40\s+36\.87°\s+0°", flat)
 
 
+@pytest.mark.parametrize("form", [".html", ".txt", ".md"])
+def test_angles_of_a_head_are_those_of_the_file(form: str, tmp_path: Path) -> None:
+    path = tmp_path / "design.yaml"
+    # A tip straight down by 30 mm, tilted by 90 deg towards -y and then turned by 90 deg, is at +x.
+    probes = "{down: [0 mm, 0 mm, -40 mm], right: {A: 90 deg, B: 90 deg}}"
+    path.write_text(
+        DESIGN.replace(
+            "probes: {down: [0 mm, 0 mm, -40 mm], right: [30 mm, 0 mm, -40 mm]}",
+            f"head: {{tip: [0 mm, 0 mm, -30 mm]}}\nprobes: {probes}",
+        )
+    )
+    flat = re.sub(r"<[^>]*>|\|", " ", sheet_of(load(path)[0]).text(form))
+    assert re.search(r"z, mm\s+A\s+B\s+from -z", flat)
+    assert re.search(r"down\s+0\s+0\s+-40\s+–\s+–\s+0°", flat)
+    assert re.search(r"right\s+30\s+\S+\s+\S+\s+90°\s+90°\s+90°", flat)
+    assert "A, B of the head" not in flat
+
+
 def test_the_drawing_of_an_artefact_has_its_balls_where_they_are(sheet: Sheet) -> None:
     page = sheet.text(".html")
     drawing = page[page.index('<svg class="artefact"') :]

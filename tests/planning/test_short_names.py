@@ -213,3 +213,15 @@ def _quantities(path: Path) -> dict[str, dict[str, float]]:
 
     found: dict[str, dict[str, float]] = bp.run(path).to_dict()["quantities"]
     return found
+
+
+def test_the_position_of_all_rows_of_a_table_has_its_short_name(pool: Path) -> None:
+    long = "flat z 200 mm at 10, 20 mm"
+    text = pool.read_text().replace("keep: [p2", f'keep: ["{long}", p2')
+    pool.write_text(f'{text}readings: {{columns: {{position: "={long}", ball: "1"}}}}\n')
+    planned(pool, "plan.yaml")
+    (plan,) = load(pool.with_name("plan.yaml"))
+    (name,) = [one.name for one in plan.positions if one.description == long]
+    assert name != long
+    assert plan.readings.columns is not None
+    assert (plan.readings.columns.position, plan.readings.columns.ball) == (f"={name}", "1")
