@@ -169,7 +169,7 @@ class ExperimentSettings(Settings):
         None, description="the laboratory's readings: where they are and how they are written"
     )
     influences: NonEmpty[AnyInfluence] | None = Field(
-        None, description="what disturbs readings: temperature"
+        None, description="what disturbs readings: temperature, re-indexing of a head"
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"

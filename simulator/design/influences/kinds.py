@@ -23,7 +23,5 @@ INFLUENCES: tuple[type[InfluenceSettings], ...] = (
 
 if TYPE_CHECKING:
     AnyInfluence = InfluenceSettings
-elif len(INFLUENCES) == 1:
-    AnyInfluence = INFLUENCES[0]
 else:
     AnyInfluence = Annotated[Union[INFLUENCES], Field(discriminator="kind")]  # noqa: UP007
