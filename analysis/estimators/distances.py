@@ -35,7 +35,7 @@ from ballplate.simulator.readings.generate import (
     noisy_readings,
     on_true_machine,
 )
-from ballplate.simulator.readings.reading_files import ObservedReadings, observe
+from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 
 from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
 from ..presentation.result import FitResult, Result

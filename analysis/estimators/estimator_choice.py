@@ -12,7 +12,7 @@ from ballplate.simulator.inputs.messages import refused
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
-    from ballplate.simulator.readings.reading_files import ObservedReadings
+    from ballplate.simulator.readings.observed_readings import ObservedReadings
 
     from ..presentation.result import FitResult
 

@@ -24,7 +24,7 @@ from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.readings.reading_files import ObservedReadings
+from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import aligned, as_data, number, picked
 from ..presentation.result import FitResult

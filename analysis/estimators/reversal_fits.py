@@ -30,7 +30,7 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.settings import MetricSettings, build_error_model
-from ballplate.simulator.readings.reading_files import ObservedReadings
+from ballplate.simulator.readings.observed_readings import ObservedReadings
 from numpy.typing import NDArray
 
 from ..results.estimates import ParameterEstimate

@@ -11,7 +11,7 @@ from ballplate.simulator.estimation.reversal import Reversal
 from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import ObservedReadings
+from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import SHOWN, aligned, as_data, number, picked, to_uncertainty
 from ..presentation.result import FitResult

@@ -13,7 +13,7 @@ from .table import Block, Entry, Row, Table
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.simulator.readings.reading_files import ObservedReadings
+    from ballplate.simulator.readings.observed_readings import ObservedReadings
     from matplotlib.figure import Figure
 
 # Of a table in a notebook.

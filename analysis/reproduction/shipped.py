@@ -12,7 +12,7 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
-from ballplate.simulator.readings.reading_files import ObservedReadings
+from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..results.fit import Fit
 from ..results.prediction import Prediction

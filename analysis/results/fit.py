@@ -14,7 +14,8 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.arguments import ensure_type
 from ballplate.simulator.inputs.settings import hint, shorten
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.reading_files import far_outside
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines

@@ -25,7 +25,7 @@ from .adjustments import Adjustment, adjustments
 from .prediction import Prediction
 
 if TYPE_CHECKING:
-    from ballplate.simulator.readings.reading_files import ObservedReadings
+    from ballplate.simulator.readings.observed_readings import ObservedReadings
 
     from .fit import Fit
 

@@ -18,7 +18,7 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
-from ballplate.simulator.readings.reading_files import observe
+from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import (

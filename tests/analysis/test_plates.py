@@ -25,7 +25,7 @@ from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_readings, on_true_machine
-from ballplate.simulator.readings.reading_files import ObservedReadings
+from ballplate.simulator.readings.observed_readings import ObservedReadings
 from numpy.typing import NDArray
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")

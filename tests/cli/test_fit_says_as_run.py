@@ -22,7 +22,7 @@ from ballplate.simulator.readings.generate import (
     on_true_machine,
     true_artefacts,
 )
-from ballplate.simulator.readings.reading_files import observe
+from ballplate.simulator.readings.observed_readings import observe
 
 from tests.reference.random_experiments import random_experiment
 

@@ -28,7 +28,8 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import scale_readings
-from ballplate.simulator.readings.reading_files import observe, read_readings, write_readings
+from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray

@@ -29,7 +29,7 @@ from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import TrueMachine, true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
-from ballplate.simulator.readings.reading_files import observe
+from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]

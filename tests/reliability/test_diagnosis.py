@@ -20,7 +20,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
-from ballplate.simulator.readings.reading_files import ObservedReadings, observe, read_readings
+from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.reading_files import read_readings
 from numpy.typing import NDArray
 from scipy.stats import chi2
 

@@ -20,7 +20,7 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
-from ballplate.simulator.readings.reading_files import observe
+from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 
 from tests.reliability.designs import MIXED, PLANE, experiment
