@@ -204,6 +204,8 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
     }
     if "calibration" in found:
         found["calibration"] = [_with(one, "values", there) for one in found["calibration"]]
+    if "influences" in found:
+        found["influences"] = [_with(one, "values", there) for one in found["influences"]]
     if "evaluation" in found:
         found["evaluation"] = _with(
             found["evaluation"], "points", lambda points: _with(points, "file", there)

@@ -194,6 +194,19 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
     return np.asarray(turned + state.origins[readings.position])
 
 
+def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readings:
+    """All readings, in the order in which they are made, with what influence quantities say beside
+    them for that.
+    """
+    if not influences:
+        return readings
+    order = np.arange(len(readings), dtype=float)
+    found = replace(readings, beside={**(readings.beside or {}), "order": order})
+    for one in influences:
+        found = replace(found, beside={**(found.beside or {}), **one.in_sequence(found)})
+    return found
+
+
 def influence_shifts(
     design: Design, state: State, readings: Readings, x: Array
 ) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design
+from ..design.arrays import Design, in_sequence
 from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
@@ -48,17 +48,17 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
     """
     if not experiment.influences:
         return design
-    order = np.arange(len(design.readings), dtype=float)
-    readings = replace(design.readings, beside={"order": order})
     parts = DesignParts(
         design.machine,
         design.probes,
         design.artefacts,
         design.balls,
         design.positions,
-        readings,
+        design.readings,
+        experiment.source.parent,
     )
     influences = tuple(one.influence(parts) for one in experiment.influences)
+    readings = in_sequence(design.readings, influences)
     disturbed = replace(design, readings=readings, influences=influences)
     parameters = disturbed.influence_parameters
     shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)

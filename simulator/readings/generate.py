@@ -10,6 +10,7 @@ from ..design.arrays import (
     Design,
     Readings,
     State,
+    in_sequence,
     influence_shifts,
     locations,
     nominal_state,
@@ -73,7 +74,7 @@ def true_readings(
 
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
-    readings = design.readings.expanded()
+    readings = in_sequence(design.readings.expanded(), design.influences)
     return readings, true_readings(design, truth, readings)
 
 

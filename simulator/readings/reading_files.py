@@ -13,7 +13,7 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Readings, in_sequence
 from ..design.observations.lengths import Lengths
 from ..estimation.spheres import fit_sphere
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
@@ -120,8 +120,7 @@ def read_readings(
     x, stated = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
-        order = {"order": np.arange(len(rows), dtype=float)}
-        beside = order | dict(zip(units, lengths[:, d + 1 :].T, strict=True))
+        beside = dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     _refuse_far_outside(rows, x, design)
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     uncertainty = (
@@ -342,6 +341,7 @@ def _combine_standards(
         combined = replace(
             combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]])
         )
+    combined = in_sequence(combined, design.influences)
     observed = replace(design, readings=combined).observed(lengths)
     chosen_marks = tuple(marks[i] for i in chosen) if marks else ()
     return ObservedReadings(

@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
+from .drift import DriftSettings
 from .protocol import InfluenceSettings
+from .sag import SagSettings
 from .temperature import TemperaturesSettings
 
 INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     # In the order of the documentation.
     TemperaturesSettings,
+    DriftSettings,
+    SagSettings,
 )
 """Settings class of every kind of influence quantity."""
 

@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -43,7 +44,9 @@ class InfluenceParameter:
 
 @dataclass(frozen=True)
 class DesignParts:
-    """What an influence quantity is laid out for; `readings` are those planned."""
+    """What an influence quantity is laid out for; `readings` are those planned. Names of files
+    begin in `folder`.
+    """
 
     machine: Machine
     probes: Probes
@@ -51,6 +54,7 @@ class DesignParts:
     balls: Balls
     positions: Positions
     readings: Readings
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -85,18 +89,17 @@ class Disturbed:
 
 
 class Influence(ABC):
-    """An influence quantity laid out for a design; a frozen dataclass of arrays.
-
-    Where it is `in_order` it depends on when readings are made, which no plan knows.
-    """
-
-    in_order: ClassVar[bool] = False
+    """An influence quantity laid out for a design; a frozen dataclass of arrays."""
 
     @property
     def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
         """Columns of a file of readings that it asks for, with the units that each may have; what
         a reading has there is a `column` of `Disturbed`.
         """
+        return {}
+
+    def in_sequence(self, readings: Readings) -> Mapping[str, Array]:
+        """Further columns (m,) of all readings, in the order in which they are made."""
         return {}
 
     @property
@@ -112,7 +115,12 @@ class Influence(ABC):
 
 
 class InfluenceSettings(Settings):
-    """Settings of one kind of influence quantity, with a `kind` of its own."""
+    """Settings of one kind of influence quantity, with a `kind` of its own.
+
+    Where it is `in_order` it depends on when readings are made: a plan chooses without it.
+    """
+
+    in_order: ClassVar[bool] = False
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
         """Report what is wrong with them where `positions` are names with those of their
