@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
     from .planning.criteria import CriterionName
+    from .planning.orders import OrderName
     from .planning.requirements.answers import Reach
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
@@ -430,6 +431,8 @@ def plan(
     done: PathLike | pandas.DataFrame | None = None,
     moved: bool = False,
     earlier: PathLike | None = None,
+    order: OrderName | None = None,
+    drift: Sequence[str] = (),
     report: Report = unreported,
 ) -> Campaign:
     """Positions and certificates chosen from the experiment's pool for a budget, with the bound of
@@ -438,7 +441,8 @@ def plan(
     Without a budget the choice may cost what the positions of the experiment itself do. Readings
     that are `done` already are kept; where the artefact has `moved` since, a position interrupted
     there can only be set up again. `earlier` is the file of a choice from this pool before, to
-    compare with and go on from.
+    compare with and go on from. An `order`, change-over, mirrored or blocks, or sizes of a `drift`
+    such as ["0.5 um/h", "0.2 ppm/h"] tell what a drift does in each order.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
@@ -450,6 +454,7 @@ def plan(
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
     from .planning.earlier import begun
+    from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
     ensure_one_of(NAMES, criterion=criterion)
@@ -461,7 +466,9 @@ def plan(
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
-    request = Request(criterion, budget, curve, seed)
+    if order is not None:
+        ensure_one_of(tuple(ORDERS), order=order)
+    request = Request(criterion, budget, curve, seed, order, tuple(drift))
     chosen = with_pool(_experiment(experiment))
     taken = None if done is None else _table("done", done)
     before = None if earlier is None else Path(earlier)

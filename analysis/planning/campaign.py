@@ -14,7 +14,6 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 
@@ -23,8 +22,17 @@ from .bound import Bound, bound
 from .choice import CurvePoint, Gain
 from .constraints import Budget, Constraints, constraints
 from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
+from .drift_in_orders import (
+    DriftEffect,
+    DriftSize,
+    drift_effect,
+    in_time,
+    parse_drift_size,
+    without_drift,
+)
 from .information import pool_information
 from .offer import Offer, offer, open_directions
+from .orders import LEAST_CHANGE_OVER, ORDERS, Order, OrderName
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
@@ -45,12 +53,16 @@ CURVE_POINTS = 8
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a plan; `curve` asks for smaller and larger budgets as well."""
+    """What is asked of a plan; `curve` asks for smaller and larger budgets as well, and an `order`,
+    or sizes of a `drift`, for what a drift does in each order.
+    """
 
     criterion: CriterionName = "U6"
     budget: Budget | None = None
     curve: bool = False
     seed: int = 1
+    order: OrderName | None = None
+    drift: tuple[str, ...] = ()
 
 
 def campaign(
@@ -135,7 +147,7 @@ def _campaign(
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
     information = pool_information(
-        experiment, whole, is_about_balls(request.criterion), completed_by, report
+        without_drift(experiment), whole, is_about_balls(request.criterion), completed_by, report
     )
     wanted = criterion(information, experiment, request.criterion)
     own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
@@ -172,7 +184,10 @@ def _campaign(
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
-    in_order = run_sheet(chosen, pool.changes, done, completed, interrupted).chosen
+    order = Order(request.order or LEAST_CHANGE_OVER.name, request.seed)
+    size = parse_drift_size(request.drift, experiment)
+    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order)
+    timed = in_time(experiment, sheet, pool.changes)
     return Campaign(
         experiment,
         pool,
@@ -192,13 +207,40 @@ def _campaign(
         wanted.target,
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
-        predict(
-            replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)
-        ),
+        predict(replace(timed, expected_rank_deficiency=left_open or None)),
+        order,
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
         left_open,
+        drift=size,
+        orders=_drift_effects(experiment, pool, request, offered, chosen, size),
+    )
+
+
+def _drift_effects(
+    experiment: Experiment,
+    pool: Pool,
+    request: Request,
+    offered: Offer,
+    chosen: Sequence[Candidate],
+    size: DriftSize,
+) -> tuple[DriftEffect, ...]:
+    """What a drift does in each order, where that is asked, or a drift stated.
+
+    :raises ExperimentError: an order is asked of a campaign that has begun.
+    """
+    is_stated = len(without_drift(experiment).influences) < len(experiment.influences)
+    if offered.done and (request.order or request.drift):
+        text = "has begun, and its times are unknown; leave --order and --drift out"
+        raise _impossible(experiment, "pool", text)
+    if offered.done or not (request.order or request.drift or is_stated):
+        return ()
+    sheets = [
+        (name, run_sheet(chosen, pool.changes, order=Order(name, request.seed))) for name in ORDERS
+    ]
+    return tuple(
+        drift_effect(experiment, name, sheet, pool.changes, size) for name, sheet in sheets
     )
 
 

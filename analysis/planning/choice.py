@@ -10,6 +10,8 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
+from .drift_in_orders import DriftEffect, DriftSize
+from .orders import Order
 from .schedule import Completion
 
 
@@ -52,7 +54,8 @@ class Selection:
     is infinite where the selection leaves something undetermined; `bound` is what no selection can
     do better than, NaN where there is none. `drawn` is the criterion of the positions of the
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
-    `drawn_words`; None without any. `prediction` judges what is chosen in full.
+    `drawn_words`; None without any. `prediction` judges what is chosen in full, in this `order`.
+    `orders` are what a `drift` does in each order, where that was asked.
     """
 
     experiment: Experiment
@@ -73,11 +76,14 @@ class Selection:
     gains: tuple[Gain, ...]
     left_out: tuple[Gain, ...]
     prediction: Prediction
+    order: Order
     curve: tuple[CurvePoint, ...] = ()
     completed: Completion | None = None
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
+    drift: DriftSize = DriftSize()
+    orders: tuple[DriftEffect, ...] = ()
 
     @property
     def efficiency(self) -> float:

@@ -40,6 +40,7 @@ def experiment_text(
     folder: Path,
     title: str | None = None,
     expected_rank_deficiency: int | None = None,
+    of_influences: Mapping[int, Mapping[str, Any]] | None = None,
 ) -> str:
     """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
     in their order.
@@ -47,7 +48,8 @@ def experiment_text(
     `experiment` is the source, loaded for planning; of one with variants the overrides are applied.
     `header` becomes comments at the top. Names of files lead from `folder` to the same files. A
     stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
-    position places, what is known of them, and priors about other positions.
+    position places, what is known of them, and priors about other positions. `of_influences` are
+    keys of influence quantities that are others, by the places of these in their list.
 
     Of an experiment that was made or changed in Python nothing of a file is kept.
 
@@ -57,6 +59,8 @@ def experiment_text(
     text, root, tree = _source(experiment)
     assert isinstance(root, MappingNode) and isinstance(tree, MappingNode)
     content = _content(tree, experiment, chosen)
+    for k, keys in (of_influences or {}).items():
+        content["influences"][k] |= keys
     if title is not None:
         content["title"] = title
     if expected_rank_deficiency is not None:

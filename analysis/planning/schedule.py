@@ -11,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Visit, cheapest, kind_of
+from .orders import LEAST_CHANGE_OVER, Order, in_order
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ class RunSheet:
 
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
+    changes: ChangeTimes
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -83,6 +85,16 @@ class RunSheet:
         """
         steps = sorted(self.steps, key=lambda step: step.left)
         return (*(step.whole or step.candidate for step in steps), *self.calibration)
+
+    @property
+    def first_readings(self) -> dict[str, float]:
+        """When the first reading of each position begins, in seconds as `Step.start` counts."""
+        found = {}
+        for step in self.steps:
+            probes = (len(step.probes) - 1) * self.changes.probe
+            taken = step.readings * step.candidate.reading_seconds + probes
+            found[step.name] = step.start + step.change_seconds + max(step.seconds - taken, 0.0)
+        return found
 
     @property
     def seconds(self) -> float:
@@ -104,9 +116,10 @@ def run_sheet(
     done: Sequence[Candidate] = (),
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
+    order: Order = LEAST_CHANGE_OVER,
 ) -> RunSheet:
-    """The run sheet of chosen candidates: the order that costs least, what is done already first
-    and as it was.
+    """The run sheet of chosen candidates: the order that costs least, or another one, what is done
+    already first and as it was.
 
     Candidates that are `done` may be among the chosen ones too. They take no time any more, and as
     before any first position nothing is changed before the first that is left. A position that is
@@ -118,7 +131,11 @@ def run_sheet(
     names = {candidate.name for candidate in before} | again
     left = {one.name for one in interrupted} - again
     positions = [one for one in chosen if isinstance(one.item, Position) and one.name not in names]
-    sequence = ordered(positions, changes, before, None if completed is None else completed.rest)
+    first = None if completed is None else completed.rest
+    if order.name == "change-over":
+        sequence = ordered(positions, changes, before, first)
+    else:
+        sequence = (*ordered((), changes, before, first), *in_order(positions, changes, order))
     steps: list[Step] = []
     elapsed = 0.0
     for k, (candidate, probes) in enumerate(sequence):
@@ -151,7 +168,7 @@ def run_sheet(
         )
         elapsed += change + seconds
     return RunSheet(
-        tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position))
+        tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position)), changes
     )
 
 

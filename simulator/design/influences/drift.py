@@ -62,7 +62,10 @@ class DriftTimesSettings(Settings):
 class DriftPositionSettings(Settings):
     """When a position is read."""
 
-    start: Duration = Field(description="when its first reading begins, from any zero on")
+    start: Duration | None = Field(
+        None, description="when its first reading begins, from any zero on"
+    )
+    reading: Duration | None = Field(None, description="how long a reading takes there")
 
 
 class DriftSettings(InfluenceSettings):
@@ -117,12 +120,13 @@ class DriftSettings(InfluenceSettings):
     def influence(self, design: DesignParts) -> Drift:
         """The drift in a design."""
         d, times = design.machine.dimension, self.times or DriftTimesSettings()
-        starts = {name: one.start for name, one in (self.positions or {}).items()}
+        none = DriftPositionSettings()
+        places = [(self.positions or {}).get(name, none) for name in design.positions.names]
         clock = Clock(
             times.set_up,
-            times.reading,
             times.probe_change,
-            tuple(starts.get(name, np.nan) for name in design.positions.names),
+            tuple(times.reading if one.reading is None else one.reading for one in places),
+            tuple(np.nan if one.start is None else one.start for one in places),
         )
         hours = max(float(np.abs(clock.hours(design.readings)).max(initial=0.0)), LEAST_HOURS)
         reach = float(np.abs(design.machine.volume.corners).max())
@@ -150,13 +154,14 @@ class DriftSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class Clock:
-    """When readings are made, in seconds: how long set-ups, readings and changes of probe take, and
-    when positions begin, NaN where that follows from what comes before.
+    """When readings are made, in seconds: how long set-ups and changes of probe take and, by
+    position, what a reading takes and when the first begins, NaN where that follows from what comes
+    before.
     """
 
     set_up: float
-    reading: float
     probe_change: float
+    reading: tuple[float, ...]
     starts: tuple[float, ...]
 
     def hours(self, readings: Readings) -> Array:
@@ -173,7 +178,7 @@ class Clock:
         is_next = np.append(True, position[1:] != position[:-1])
         is_changed = np.append(False, probe[1:] != probe[:-1]) & ~is_next
         before = self.set_up * is_next + self.probe_change * is_changed
-        taken = self.reading * readings.repeats
+        taken = np.array(self.reading)[position] * readings.repeats
         seconds = np.cumsum(before + taken) - 0.5 * taken
         seen: set[int] = set()
         for first in np.flatnonzero(is_next).tolist():
@@ -182,6 +187,11 @@ class Clock:
                 seconds[first:] += start - (seconds[first] - 0.5 * taken[first])
             seen.add(int(position[first]))
         return np.asarray(seconds)
+
+
+def even_clock(positions: int) -> Clock:
+    """A clock by which each reading takes as long as the others."""
+    return Clock(0.0, 0.0, (1.0,) * positions, (np.nan,) * positions)
 
 
 @dataclass(frozen=True)
