@@ -441,8 +441,8 @@ def plan(
     Without a budget the choice may cost what the positions of the experiment itself do. Readings
     that are `done` already are kept; where the artefact has `moved` since, a position interrupted
     there can only be set up again. `earlier` is the file of a choice from this pool before, to
-    compare with and go on from. An `order`, change-over, mirrored or blocks, or sizes of a `drift`
-    such as ["0.5 um/h", "0.2 ppm/h"] tell what a drift does in each order.
+    compare with and go on from. An `order`, change-over, mirrored, blocks or least-drift, or
+    sizes of a `drift` such as ["0.5 um/h", "0.2 ppm/h"] tell what a drift does in each order.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}

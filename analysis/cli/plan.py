@@ -14,7 +14,7 @@ from .telling import note
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
 
-ORDER_NAMES = ("change-over", "mirrored", "blocks")
+ORDER_NAMES = ("change-over", "mirrored", "blocks", "least-drift")
 SHEETS = (".html", ".md", ".csv", ".txt")
 
 
@@ -51,8 +51,9 @@ def add_options(parser: ArgumentParser) -> None:
         "--order",
         choices=ORDER_NAMES,
         help=(
-            "change-over: the least; mirrored: there and back; blocks: random in blocks, by --seed."
-            " Tells what a drift does in each; default: change-over"
+            "change-over: the least; mirrored: there and back; blocks: random in blocks, by --seed;"
+            " least-drift: that in which drift of the scales does least. Tells what a drift does in"
+            " each; default: change-over"
         ),
     )
     order.add_argument(

@@ -23,14 +23,14 @@ from .choice import CurvePoint, Gain
 from .constraints import Budget, Constraints, constraints
 from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
 from .drift_in_orders import (
-    DriftEffect,
-    DriftSize,
     drift_effect,
     in_time,
+    is_of_plates,
     parse_drift_size,
     without_drift,
 )
 from .information import pool_information
+from .least_drift import least_drift
 from .offer import Offer, offer, open_directions
 from .orders import LEAST_CHANGE_OVER, ORDERS, Order, OrderName
 from .schedule import Completion, run_sheet
@@ -184,7 +184,8 @@ def _campaign(
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
-    order = Order(request.order or LEAST_CHANGE_OVER.name, request.seed)
+    offers = _orders(experiment, pool, request, offered, chosen)
+    order = next(one for one in offers if one.name == (request.order or LEAST_CHANGE_OVER.name))
     size = parse_drift_size(request.drift, experiment)
     sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order)
     timed = in_time(experiment, sheet, pool.changes)
@@ -214,34 +215,48 @@ def _campaign(
         interrupted,
         left_open,
         drift=size,
-        orders=_drift_effects(experiment, pool, request, offered, chosen, size),
+        orders=tuple(
+            drift_effect(
+                experiment,
+                one.name,
+                run_sheet(chosen, pool.changes, order=one),
+                pool.changes,
+                size,
+            )
+            for one in offers
+            if len(offers) > 1
+        ),
     )
 
 
-def _drift_effects(
+def _orders(
     experiment: Experiment,
     pool: Pool,
     request: Request,
     offered: Offer,
     chosen: Sequence[Candidate],
-    size: DriftSize,
-) -> tuple[DriftEffect, ...]:
-    """What a drift does in each order, where that is asked, or a drift stated.
+) -> list[Order]:
+    """The orders that are offered: where one is asked or a drift stated, all that there are.
 
-    :raises ExperimentError: an order is asked of a campaign that has begun.
+    :raises ExperimentError: an order is asked of a campaign that has begun, or that of the least
+        effect of drift where there are length standards.
     """
     is_stated = len(without_drift(experiment).influences) < len(experiment.influences)
-    if offered.done and (request.order or request.drift):
+    is_asked = bool(request.order or request.drift)
+    if offered.done and is_asked:
         text = "has begun, and its times are unknown; leave --order and --drift out"
         raise _impossible(experiment, "pool", text)
-    if offered.done or not (request.order or request.drift or is_stated):
-        return ()
-    sheets = [
-        (name, run_sheet(chosen, pool.changes, order=Order(name, request.seed))) for name in ORDERS
-    ]
-    return tuple(
-        drift_effect(experiment, name, sheet, pool.changes, size) for name, sheet in sheets
-    )
+    if offered.done or not (is_asked or is_stated):
+        return [LEAST_CHANGE_OVER]
+    own = [one for one in chosen if isinstance(one.item, Position)]
+    found = [Order(name, request.seed) for name in ORDERS if name != "least-drift"]
+    if is_of_plates(experiment, own):
+        names = least_drift(experiment, chosen, pool.changes, request.seed)
+        return [*found, Order("least-drift", request.seed, names)]
+    if request.order == "least-drift":
+        text = "has length standards, whose drift is not followed; ask for another --order"
+        raise _impossible(experiment, "pool", text)
+    return found
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:

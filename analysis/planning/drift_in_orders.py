@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from ballplate.simulator.design.influences.drift import (
 from ballplate.simulator.estimation.functions import Distances, linear_functions
 from ballplate.simulator.estimation.linearisation import LinearFunctions, linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import ChangeTimes, Experiment
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.quantities import (
     QuantityError,
@@ -26,6 +26,7 @@ from ballplate.simulator.inputs.quantities import (
     parse_length_drift,
     parse_ratio_drift,
 )
+from ballplate.simulator.machines.protocol import Array
 
 from ..uncertainty.quantities import evaluation_points
 from .orders import OrderName
@@ -148,9 +149,9 @@ def in_order_settings(experiment: Experiment) -> dict[int, dict[str, Any]]:
     return found
 
 
-def is_of_plates(experiment: Experiment, sheet: RunSheet) -> bool:
+def is_of_plates(experiment: Experiment, positions: Iterable[Candidate]) -> bool:
     """Whether all positions are of plates."""
-    return all(experiment.artefacts[step.artefact].role == "plate" for step in sheet.steps)
+    return all(experiment.artefacts[one.item.artefact].role == "plate" for one in positions)
 
 
 @single_threaded
@@ -164,21 +165,27 @@ def drift_effect(
     """
     change = sum(step.change_seconds for step in sheet.steps)
     plain = without_drift(experiment)
-    if not is_of_plates(experiment, sheet) or len(experiment.evaluation.points) == 1:
+    if (
+        not is_of_plates(experiment, (step.candidate for step in sheet.steps))
+        or len(experiment.evaluation.points) == 1
+    ):
         return DriftEffect(name, sheet.seconds, change, *[float("nan")] * 4)
     found = {
-        known: _distances(
+        known: effects_on_distances(
             in_time(
                 replace(plain, influences=(*plain.influences, _drift(size if known else None))),
                 sheet,
                 changes,
-            )
+            ),
+            experiment.dimension + 1,
         )
         for known in (True, False)
     }
     uncertainty, bias, posterior = found[True]
     spread = np.sqrt(uncertainty**2 - np.einsum("mi,ij,mj->m", bias, posterior, bias))
-    scaled = np.abs(bias) * np.array([size.point] * (bias.shape[1] - 1) + [size.scale])
+    scaled = np.abs(bias[np.isfinite(uncertainty)]) * np.array(
+        [size.point] * (bias.shape[1] - 1) + [size.scale]
+    )
     return DriftEffect(
         name,
         sheet.seconds,
@@ -202,16 +209,15 @@ def _drift(size: DriftSize | None) -> DriftSettings:
     )
 
 
-def _distances(experiment: Experiment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def effects_on_distances(experiment: Experiment, p: int) -> tuple[Array, Array, Array]:
     """Uncertainties (m,) of distances between evaluation points, what they change by per unit of
-    each drift (m, p), and the covariance (p, p) of the drifts, which come last.
+    each of the last p influence parameters (m, p), and the covariance (p, p) of these.
     """
     design = lay_out(experiment)
     at, every = linearise(design), evaluation_points(design)
     chosen = np.unique(np.linspace(0, len(every.points) - 1, MOST_POINTS).round().astype(int))
     places = replace(every, points=every.points[chosen], probes=every.probes[chosen])
     functions = linear_functions(at, Distances(places))
-    p = design.dimension + 1
     drifts = LinearFunctions(np.eye(len(at.layout))[at.layout.influences][-p:])
     covariance = at.covariance(drifts, drifts)
     bias = np.linalg.lstsq(covariance, at.covariance(drifts, functions), rcond=1e-12)[0].T

@@ -14,20 +14,24 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 
 from .changeover import Setup, cheapest, kind_of
 
-OrderName = Literal["change-over", "mirrored", "blocks"]
+OrderName = Literal["change-over", "mirrored", "blocks", "least-drift"]
 ORDERS: Mapping[OrderName, str] = {
     "change-over": "least change-over",
     "mirrored": "mirrored",
     "blocks": "random in blocks",
+    "least-drift": "least effect of drift",
 }
 
 
 @dataclass(frozen=True)
 class Order:
-    """An order by name; `seed` is that of random ones."""
+    """An order by name; `seed` is that of random ones, and `sequence` are the names of positions of
+    one that was searched for.
+    """
 
     name: OrderName = "change-over"
     seed: int = 1
+    sequence: tuple[str, ...] = ()
 
 
 LEAST_CHANGE_OVER = Order()
@@ -37,12 +41,15 @@ Sequenced = tuple[tuple[Candidate, tuple[str, ...]], ...]
 
 
 def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: Order) -> Sequenced:
-    """Positions mirrored or random in blocks, their probes in the order that costs least.
+    """Positions mirrored, random in blocks or in a stated sequence, their probes in the order that
+    costs least.
 
     A mirrored order goes through the kinds of positions with the least change-over, reads half of
     each, and goes back with the other half; what is single stands in the middle. A block has one
     position of each kind that is left, in random order.
     """
+    if order.sequence:
+        return with_probes(sorted(own, key=lambda one: order.sequence.index(one.name)), changes)
     kinds: dict[Setup, list[Candidate]] = {}
     for candidate in own:
         kinds.setdefault(kind_of(candidate), []).append(candidate)

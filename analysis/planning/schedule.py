@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Visit, cheapest, kind_of
-from .orders import LEAST_CHANGE_OVER, Order, in_order
+from .orders import LEAST_CHANGE_OVER, Order, Sequenced, in_order
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,17 @@ def run_sheet(
     return RunSheet(
         tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position)), changes
     )
+
+
+def reading_times(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
+    """The middle of the readings of each position in a sequence, in seconds."""
+    found, elapsed = [], 0.0
+    for k, (candidate, probes) in enumerate(sequence):
+        elapsed += _change(sequence[k - 1], sequence[k], changes)[0] if k else 0.0
+        elapsed += candidate.seconds
+        taken = (len(probes) - 1) * changes.probe + candidate.readings * candidate.reading_seconds
+        found.append(elapsed - 0.5 * min(taken, candidate.seconds))
+    return found
 
 
 def _change(

@@ -195,7 +195,8 @@ def _order_table(campaign: Campaign) -> list[str]:
                 ", ".join(words),
             ]
         )
-    if not is_of_plates(campaign.experiment, campaign.sheet):
+    places = (step.candidate for step in campaign.sheet.steps)
+    if not is_of_plates(campaign.experiment, places):
         why = "no figures of drift: that of length standards is not followed"
         return [*aligned(rows, [False, *[True] * 6, False]), why]
     return [
