@@ -118,7 +118,7 @@ def in_time(experiment: Experiment, sheet: RunSheet, changes: ChangeTimes) -> Ex
             start=sheet.first_readings[step.name], reading=step.candidate.reading_seconds
         )
         for step in sheet.steps
-        if step.name in placed
+        if step.name in placed and not step.done
     }
     times = DriftTimesSettings.model_construct(probe_change=changes.probe)
     timed = tuple(

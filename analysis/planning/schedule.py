@@ -88,13 +88,13 @@ class RunSheet:
 
     @property
     def first_readings(self) -> dict[str, float]:
-        """When the first reading of each position begins, in seconds as `Step.start` counts."""
-        found = {}
-        for step in self.steps:
-            probes = (len(step.probes) - 1) * self.changes.probe
-            taken = step.readings * step.candidate.reading_seconds + probes
-            found[step.name] = step.start + step.change_seconds + max(step.seconds - taken, 0.0)
-        return found
+        """When the first reading of each position that is to be read begins, in seconds as
+        `Step.start` counts.
+        """
+        todo = [step for step in self.steps if not step.done]
+        sequence = tuple((step.candidate, step.probes) for step in todo)
+        found = first_readings(sequence, self.changes)
+        return {step.name: start for step, start in zip(todo, found, strict=True)}
 
     @property
     def seconds(self) -> float:
@@ -172,14 +172,14 @@ def run_sheet(
     )
 
 
-def reading_times(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
-    """The middle of the readings of each position in a sequence, in seconds."""
+def first_readings(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
+    """When the first reading of each position in a sequence begins, in seconds."""
     found, elapsed = [], 0.0
     for k, (candidate, probes) in enumerate(sequence):
         elapsed += _change(sequence[k - 1], sequence[k], changes)[0] if k else 0.0
         elapsed += candidate.seconds
         taken = (len(probes) - 1) * changes.probe + candidate.readings * candidate.reading_seconds
-        found.append(elapsed - 0.5 * min(taken, candidate.seconds))
+        found.append(elapsed - min(taken, candidate.seconds))
     return found
 
 
