@@ -32,7 +32,7 @@ from .drift_in_orders import (
 from .information import pool_information
 from .least_drift import least_drift
 from .offer import Offer, offer, open_directions
-from .orders import LEAST_CHANGE_OVER, ORDERS, Order, OrderName
+from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
@@ -235,7 +235,7 @@ def _orders(
     request: Request,
     offered: Offer,
     chosen: Sequence[Candidate],
-) -> list[Order]:
+) -> list[ReadingOrder]:
     """The orders that are offered: where one is asked or a drift stated, all that there are.
 
     :raises ExperimentError: an order is asked of a campaign that has begun, or that of the least
@@ -249,10 +249,10 @@ def _orders(
     if offered.done or not (is_asked or is_stated):
         return [LEAST_CHANGE_OVER]
     own = [one for one in chosen if isinstance(one.item, Position)]
-    found = [Order(name, request.seed) for name in ORDERS if name != "least-drift"]
+    found = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
     if is_of_plates(experiment, own):
         names = least_drift(experiment, chosen, pool.changes, request.seed)
-        return [*found, Order("least-drift", request.seed, names)]
+        return [*found, ReadingOrder("least-drift", request.seed, names)]
     if request.order == "least-drift":
         text = "has length standards, whose drift is not followed; ask for another --order"
         raise _impossible(experiment, "pool", text)

@@ -11,7 +11,7 @@ from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
 from .drift_in_orders import DriftEffect, DriftSize
-from .orders import Order
+from .orders import ReadingOrder
 from .schedule import Completion
 
 
@@ -76,7 +76,7 @@ class Selection:
     gains: tuple[Gain, ...]
     left_out: tuple[Gain, ...]
     prediction: Prediction
-    order: Order
+    order: ReadingOrder
     curve: tuple[CurvePoint, ...] = ()
     completed: Completion | None = None
     interrupted: tuple[Candidate, ...] = ()

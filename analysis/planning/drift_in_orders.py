@@ -138,7 +138,7 @@ def in_order_settings(experiment: Experiment) -> dict[int, dict[str, Any]]:
     for k, one in enumerate(experiment.influences):
         if isinstance(one, DriftSettings):
             places = (one.positions or {}).items()
-            times = one.times or DriftTimesSettings()
+            times = one.times or DriftTimesSettings.model_construct()
             found[k] = {
                 "times": {"probe_change": format_duration(times.probe_change)},
                 "positions": {
@@ -221,4 +221,4 @@ def effects_on_distances(experiment: Experiment, p: int) -> tuple[Array, Array, 
     drifts = LinearFunctions(np.eye(len(at.layout))[at.layout.influences][-p:])
     covariance = at.covariance(drifts, drifts)
     bias = np.linalg.lstsq(covariance, at.covariance(drifts, functions), rcond=1e-12)[0].T
-    return at.uncertainty(functions), bias, covariance
+    return at.uncertainty(functions), np.asarray(bias, float), covariance

@@ -24,7 +24,7 @@ ORDERS: Mapping[OrderName, str] = {
 
 
 @dataclass(frozen=True)
-class Order:
+class ReadingOrder:
     """An order by name; `seed` is that of random ones, and `sequence` are the names of positions of
     one that was searched for.
     """
@@ -34,13 +34,13 @@ class Order:
     sequence: tuple[str, ...] = ()
 
 
-LEAST_CHANGE_OVER = Order()
+LEAST_CHANGE_OVER = ReadingOrder()
 
 # Positions with their probes in order.
 Sequenced = tuple[tuple[Candidate, tuple[str, ...]], ...]
 
 
-def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: Order) -> Sequenced:
+def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder) -> Sequenced:
     """Positions mirrored, random in blocks or in a stated sequence, their probes in the order that
     costs least.
 

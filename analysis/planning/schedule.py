@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Visit, cheapest, kind_of
-from .orders import LEAST_CHANGE_OVER, Order, Sequenced, in_order
+from .orders import LEAST_CHANGE_OVER, ReadingOrder, Sequenced, in_order
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def run_sheet(
     done: Sequence[Candidate] = (),
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
-    order: Order = LEAST_CHANGE_OVER,
+    order: ReadingOrder = LEAST_CHANGE_OVER,
 ) -> RunSheet:
     """The run sheet of chosen candidates: the order that costs least, or another one, what is done
     already first and as it was.

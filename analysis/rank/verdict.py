@@ -18,7 +18,6 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
-from ..presentation.formatting import SHOWN
 from .canonical import elementary_mixture, principal_directions
 from .missing_bars import reasons, relative_changes
 
@@ -516,4 +515,6 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    return f"{printable(value * 1e6):.3g} {SHOWN[unit]}"
+    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}
+    shown |= {"m/h": "µm/h", "1/h": "ppm/h"}
+    return f"{printable(value * 1e6):.3g} {shown[unit]}"

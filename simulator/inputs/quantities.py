@@ -74,12 +74,12 @@ DURATION_UNITS: Mapping[str, Fraction] = {
 # Drifts are kept per hour.
 LENGTH_DRIFT_UNITS: Mapping[str, Fraction] = {
     f"{unit}/{time}": LENGTH_UNITS[unit] * 3600 / seconds
-    for time, seconds in reversed(DURATION_UNITS.items())
+    for time, seconds in sorted(DURATION_UNITS.items())
     for unit in ("um", "nm", "mm", "m")
 }
 RATIO_DRIFT_UNITS: Mapping[str, Fraction] = {
     f"{unit}/{time}": RATIO_UNITS[unit] * 3600 / seconds
-    for time, seconds in reversed(DURATION_UNITS.items())
+    for time, seconds in sorted(DURATION_UNITS.items())
     for unit in ("ppm", "um/m", "nm/m", "m/m")
 }
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.

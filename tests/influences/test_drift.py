@@ -324,7 +324,7 @@ def test_balls_read_again_in_a_position_stay_apart(tmp_path: Path) -> None:
 
 def test_declared_drifts_are_covered(drawn: Experiment) -> None:
     design = lay_out(drawn)
-    assert_covered(coverage(design, design, law, SPREAD, 80), 80)
+    assert_covered(coverage(design, design, law, SPREAD, 40), 40)
 
 
 @pytest.mark.long

@@ -208,7 +208,7 @@ def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -
 
 def test_declared_sag_is_covered(drawn: Experiment) -> None:
     design = lay_out(drawn)
-    assert_covered(coverage(design, design, law, SPREAD, 60), 60)
+    assert_covered(coverage(design, design, law, SPREAD, 40), 40)
 
 
 @pytest.mark.long

@@ -119,8 +119,8 @@ class DriftSettings(InfluenceSettings):
 
     def influence(self, design: DesignParts) -> Drift:
         """The drift in a design."""
-        d, times = design.machine.dimension, self.times or DriftTimesSettings()
-        none = DriftPositionSettings()
+        d, times = design.machine.dimension, self.times or DriftTimesSettings.model_construct()
+        none = DriftPositionSettings.model_construct()
         places = [(self.positions or {}).get(name, none) for name in design.positions.names]
         clock = Clock(
             times.set_up,
