@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         repair,
         reproduce,
         run,
+        sheet,
         simulate,
         spline,
     )
@@ -59,6 +60,7 @@ __all__ = [
     "repair",
     "reproduce",
     "run",
+    "sheet",
     "simulate",
     "spline",
     "stored",

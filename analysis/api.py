@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from .planning.requirements.answers import Reach
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
+    from .planning.sheet import Sheet
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
@@ -473,6 +474,23 @@ def plan(
     taken = None if done is None else _table("done", done)
     before = None if earlier is None else Path(earlier)
     return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)
+
+
+def sheet(experiment: Experiment | PathLike) -> Sheet:
+    """What goes to the laboratory with an experiment: a run sheet, a table to fill in, and points
+    for a program.
+
+    `text()` is the run sheet, `template()` the CSV file of readings with empty cells, and
+    `points()` the nominal centres of the balls; that of a plan is its `to_print`.
+
+    >>> sheet(quickstart())
+    <Sheet of quickstart: 6 positions, 250 readings>
+    >>> sheet(quickstart()).template().splitlines()[:2]
+    ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
+    """
+    from .planning.sheet import sheet_of
+
+    return sheet_of(_experiment(experiment))
 
 
 def reliability(

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_json, add_picture, add_workers, count, number, show, single, whole
 from .outputs import Writer, add_force, add_output, text_writer, write
+from .sheet import sheet_name
 from .telling import note
 
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
 
 ORDER_NAMES = ("change-over", "mirrored", "blocks", "least-drift")
-SHEETS = (".html", ".md", ".csv", ".txt")
 
 
 HELP = "choose positions and certificates from a pool, and bound what any choice could achieve"
@@ -103,7 +103,7 @@ def add_options(parser: ArgumentParser) -> None:
         output,
         "--sheet",
         metavar="FILE",
-        type=_sheet,
+        type=sheet_name,
         help="write the run sheet: .html to print, .md, .csv or .txt",
     )
     output.add_argument(
@@ -165,12 +165,6 @@ def _drift(text: str) -> str:
     except QuantityError as error:
         raise ArgumentTypeError(str(error)) from None
     return text
-
-
-def _sheet(text: str) -> Path:
-    if not text.lower().endswith(SHEETS):
-        raise ArgumentTypeError(f'a run sheet\'s name ends in {", ".join(SHEETS)}, unlike "{text}"')
-    return Path(text)
 
 
 def run(options: Namespace) -> int:

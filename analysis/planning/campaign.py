@@ -36,6 +36,7 @@ from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
+from .short_names import short_names
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -187,8 +188,12 @@ def _campaign(
     offers = _orders(experiment, pool, request, offered, chosen)
     order = next(one for one in offers if one.name == (request.order or LEAST_CHANGE_OVER.name))
     size = parse_drift_size(request.drift, experiment)
-    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order)
-    timed = in_time(experiment, sheet, pool.changes)
+    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order=order)
+    names = short_names(
+        (step.position for step in sheet.steps), offered.names, [one.name for one in candidates]
+    )
+    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, names, order)
+    timed = in_time(experiment, sheet, pool.changes, names)
     return Campaign(
         experiment,
         pool,
@@ -226,6 +231,7 @@ def _campaign(
             for one in offers
             if len(offers) > 1
         ),
+        names=names,
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
@@ -10,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
+from .done import REST
 from .drift_in_orders import DriftEffect, DriftSize
 from .orders import ReadingOrder
 from .schedule import Completion
@@ -55,7 +57,8 @@ class Selection:
     do better than, NaN where there is none. `drawn` is the criterion of the positions of the
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
     `drawn_words`; None without any. `prediction` judges what is chosen in full, in this `order`.
-    `orders` are what a `drift` does in each order, where that was asked.
+    `orders` are what a `drift` does in each order, where that was asked. `names` are the short
+    names of positions whose names the pool composed.
     """
 
     experiment: Experiment
@@ -84,6 +87,15 @@ class Selection:
     ignored: tuple[Candidate, ...] = ()
     drift: DriftSize = DriftSize()
     orders: tuple[DriftEffect, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def title_of(self, candidate: Candidate) -> str:
+        """The name of a candidate, after its short name if it has one."""
+        rest, name = "", candidate.name
+        if name.startswith(REST):
+            rest, name = REST, name.removeprefix(REST)
+        short = self.names.get(name, name)
+        return candidate.name if short == name else f"{rest}{short}, {name}"
 
     @property
     def efficiency(self) -> float:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.influences.drift import (
     DriftPositionSettings,
     DriftSettings,
@@ -31,6 +32,7 @@ from ballplate.simulator.machines.protocol import Array
 from ..uncertainty.quantities import evaluation_points
 from .orders import OrderName
 from .schedule import RunSheet
+from .short_names import with_names
 
 # Evaluation points between which distances are looked at, at the most.
 MOST_POINTS = 100
@@ -107,11 +109,16 @@ def without_drift(experiment: Experiment) -> Experiment:
     return replace(experiment, influences=left)
 
 
-def in_time(experiment: Experiment, sheet: RunSheet, changes: ChangeTimes) -> Experiment:
+def in_time(
+    experiment: Experiment,
+    sheet: RunSheet,
+    changes: ChangeTimes,
+    names: Mapping[str, str] | None = None,
+) -> Experiment:
     """An experiment of the positions of a run sheet in their order, whose drifts have the times of
-    that.
+    that; `names` are the short names of positions.
     """
-    chosen = with_chosen(experiment, sheet.chosen)
+    chosen = with_chosen(with_names(experiment, names or {}), sheet.written)
     placed = {one.name for one in chosen.positions}
     positions = {
         step.name: DriftPositionSettings.model_construct(
@@ -172,10 +179,12 @@ def drift_effect(
         return DriftEffect(name, sheet.seconds, change, *[float("nan")] * 4)
     found = {
         known: effects_on_distances(
-            in_time(
-                replace(plain, influences=(*plain.influences, _drift(size if known else None))),
-                sheet,
-                changes,
+            lay_out(
+                in_time(
+                    replace(plain, influences=(*plain.influences, _drift(size if known else None))),
+                    sheet,
+                    changes,
+                )
             ),
             experiment.dimension + 1,
         )
@@ -209,11 +218,10 @@ def _drift(size: DriftSize | None) -> DriftSettings:
     )
 
 
-def effects_on_distances(experiment: Experiment, p: int) -> tuple[Array, Array, Array]:
+def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
     """Uncertainties (m,) of distances between evaluation points, what they change by per unit of
     each of the last p influence parameters (m, p), and the covariance (p, p) of these.
     """
-    design = lay_out(experiment)
     at, every = linearise(design), evaluation_points(design)
     chosen = np.unique(np.linspace(0, len(every.points) - 1, MOST_POINTS).round().astype(int))
     places = replace(every, points=every.points[chosen], probes=every.probes[chosen])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
-from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -21,7 +20,7 @@ from ballplate.simulator.design.objects import Readings
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 from .drift_in_orders import effects_on_distances, without_drift
 from .orders import with_probes
@@ -30,57 +29,86 @@ from .schedule import first_readings
 # Positions of which all orders are tried; of more, exchanges from so many random starts.
 MOST_TRIED, STARTS = 6, 4
 
-# Where hours within positions stand beside readings.
-WITHIN = "hours within positions"
-
 # An order is better from this share on.
 GAIN = 1e-9
 
 
 @dataclass(frozen=True)
-class ScaleByPosition(Influence):
-    """Scales that are wrong by a ratio of their own in each position, and drift within all of them
-    by the `clock`.
+class ScaleByBlock(Influence):
+    """Scales that are wrong by a ratio of their own in each of the `blocks`, what is read in one
+    position with one probe, and by the drift within blocks.
     """
 
-    clock: Clock
+    blocks: Blocks
 
     @property
     def parameters(self) -> tuple[InfluenceParameter, ...]:
-        """The ratios by position, then the drift within positions."""
-        names = [f"scale {k}" for k in range(len(self.clock.starts))]
+        """The ratios of blocks, then the drift within them."""
+        names = [f"scale {k}" for k in range(len(self.blocks.weight))]
         return tuple(
             InfluenceParameter(name, "1", 0.0, 1e-6, 1.0) for name in (*names, "scale within")
         )
 
-    def in_sequence(self, readings: Readings) -> Mapping[str, Array]:
-        """Hours from the first reading of a position on."""
-        return {WITHIN: within_positions(self.clock, readings)}
-
     def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        """What the scales say too much, by position and within."""
-        is_here = at.position[:, None] == np.arange(len(self.clock.starts))
-        share = np.column_stack([is_here, at.column(WITHIN)])
+        """What the scales say too much, by block and within."""
+        order = at.column("order").astype(np.int64)
+        is_here = self.blocks.of_reading[order][:, None] == np.arange(len(self.blocks.weight))
+        share = np.column_stack([is_here, self.blocks.within[order]])
         return np.zeros(at.x.shape), at.x[:, :, None] * share[:, None, :]
 
 
-def within_positions(clock: Clock, readings: Readings) -> Array:
-    """Hours (m,) of readings from the beginning of the first in their position."""
-    found = clock.hours(readings)
-    for k in np.unique(readings.position):
-        here = np.flatnonzero(readings.position == k)
-        found[here] -= found[here[0]] - 0.5 * clock.reading[k] * readings.repeats[here[0]] / HOUR
-    return found
+class ScaleByBlockSettings(InfluenceSettings):
+    """Settings that no file has."""
+
+    reading: tuple[float, ...]
+    probe_change: float
+
+    def influence(self, design: DesignParts) -> ScaleByBlock:
+        """The scales of all blocks of a design."""
+        count = len(design.positions.names)
+        clock = Clock(0.0, self.probe_change, self.reading, (0.0,) * count)
+        return ScaleByBlock(blocks(clock, design.readings))
 
 
-class ScaleByPositionSettings(InfluenceSettings):
-    """Settings that no file has, of all positions there are."""
+@dataclass(frozen=True)
+class Blocks:
+    """Readings of a position with a probe: `of_reading` (m,) tells the block, `within` (m,) hours
+    from its mean. By block (b,) are its `position` and `probe`, the number of readings in it as
+    `weight`, the `middle` of it in hours from the first reading of the position on, as the file has
+    the probes, and the `length` of what is read.
+    """
 
-    clock: Any
+    of_reading: Integers
+    within: Array
+    position: Integers
+    probe: Integers
+    weight: Array
+    middle: Array
+    length: Array
 
-    def influence(self, design: DesignParts) -> ScaleByPosition:
-        """The scales of all positions of a design."""
-        return ScaleByPosition(self.clock)
+    def hours(self, k: int, probes: Sequence[str], names: Sequence[str], change: float) -> Array:
+        """Hours of the middles of a position's blocks from its first reading on, where it is read
+        with its probes in this order.
+        """
+        own = np.flatnonzero(self.position == k)
+        order = np.argsort([list(probes).index(names[probe]) for probe in self.probe[own]])
+        length, found = self.length[own][order], np.empty(len(own))
+        found[order] = np.cumsum(length + change) - change - 0.5 * length
+        return found
+
+
+def blocks(clock: Clock, readings: Readings) -> Blocks:
+    """The blocks of a design, each position of which begins at zero by its clock."""
+    pairs, inverse = np.unique(
+        np.stack([readings.position, readings.probe], axis=1), axis=0, return_inverse=True
+    )
+    inverse = inverse.ravel()
+    hours = clock.seconds(readings) / HOUR
+    weight = np.bincount(inverse, readings.repeats)
+    middle = np.bincount(inverse, hours * readings.repeats) / weight
+    position, probe = pairs.T
+    length = np.array(clock.reading)[position] * weight / HOUR
+    return Blocks(inverse, hours - middle[inverse], position, probe, weight, middle, length)
 
 
 @single_threaded
@@ -88,29 +116,35 @@ def least_drift(
     experiment: Experiment, chosen: Sequence[Candidate], changes: ChangeTimes, seed: int
 ) -> tuple[str, ...]:
     """Names of positions in the order in which the largest change of a distance by a drift of the
-    scales is least, of equal ones the shortest found first.
+    scales is least, of equal ones the first that was tried.
 
     Up to `MOST_TRIED` positions all orders are tried; of more, two are exchanged as long as that
     helps.
     """
     own = [one for one in chosen if isinstance(one.item, Position)]
-    taken = tuple(candidate.reading_seconds for candidate in own)
-    clock = Clock(0.0, changes.probe, taken, (np.nan,) * len(own))
-    plain, own_scales = without_drift(experiment), ScaleByPositionSettings(clock=clock)
-    by_position = replace(plain, influences=(*plain.influences, own_scales))
-    alone = with_chosen(by_position, chosen)
-    uncertainty, effects, _ = effects_on_distances(alone, len(own) + 1)
+    settings = ScaleByBlockSettings(
+        reading=tuple(one.reading_seconds for one in own), probe_change=changes.probe
+    )
+    plain = without_drift(experiment)
+    by_block = replace(plain, influences=(*plain.influences, settings))
+    design = lay_out(with_chosen(by_block, chosen))
+    (scales,) = [one for one in design.influences if isinstance(one, ScaleByBlock)]
+    told, names = scales.blocks, design.probes.names
+    uncertainty, effects, _ = effects_on_distances(design, len(told.weight) + 1)
     effects = effects[np.isfinite(uncertainty)]
-    readings = lay_out(alone).readings
-    weights = np.bincount(readings.position, readings.repeats, len(own))
-    hours = within_positions(clock, readings) * readings.repeats
-    middle = np.bincount(readings.position, hours, len(own)) / weights
 
     def size(order: Sequence[int]) -> float:
         sequence = with_probes([own[k] for k in order], changes)
-        times = np.ones(len(own) + 1)
-        times[list(order)] = np.array(first_readings(sequence, changes)) / HOUR
-        times[:-1] -= np.average(times[:-1] + middle, weights=weights)
+        times = np.append(told.middle, 1.0)
+        starts = first_readings(sequence, changes)
+        for k, start, (candidate, probes) in zip(order, starts, sequence, strict=True):
+            here = np.flatnonzero(told.position == k)
+            assert isinstance(candidate.item, Position)
+            # Probes of several groups stay in the order of the groups.
+            if len(candidate.item.readings) == 1:
+                times[here] = told.hours(k, probes, names, changes.probe / HOUR)
+            times[here] += start / HOUR
+        times[:-1] -= np.average(times[:-1], weights=told.weight)
         return float(np.abs(effects @ times).max(initial=0.0))
 
     count = len(own)

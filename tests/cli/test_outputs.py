@@ -82,6 +82,11 @@ WALK = {
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
         ("--positions", "3", "--workers", "1"),
     ),
+    "sheet": Walk(
+        EXPERIMENT,
+        {"-o": "sheet.html", "--readings": "table.csv", "--points": "points.csv"},
+        prints=False,
+    ),
     "lengths": Walk(
         EXPERIMENT,
         {"--csv": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},

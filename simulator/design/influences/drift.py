@@ -169,10 +169,10 @@ class Clock:
         beside = readings.beside or {}
         seconds = beside.get(TIME, np.full(len(readings), np.nan))
         if np.isnan(seconds).any():
-            seconds = self._in_order(readings)
+            seconds = self.seconds(readings)
         return np.asarray((seconds - np.average(seconds, weights=readings.repeats)) / HOUR)
 
-    def _in_order(self, readings: Readings) -> Array:
+    def seconds(self, readings: Readings) -> Array:
         """Seconds (m,) at which readings are made, one after the other, repeats together."""
         position, probe = readings.position, readings.probe
         is_next = np.append(True, position[1:] != position[:-1])
