@@ -384,3 +384,42 @@ def test_what_is_wrong_is_told_at_its_place(
     with pytest.raises(ExperimentError) as caught:
         file_with(tmp_path, [told])
     assert expected in str(caught.value) and "influences[0]" in str(caught.value)
+
+
+# What is read again, by the name of the row on the documentation's page.
+def _again(name: str) -> list[dict[str, Any]]:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    places: list[dict[str, Any]] = yaml.safe_load(text)["positions"]
+    if name == "the first position once more at the end":
+        return [*places, places[0] | {"name": "z low again"}]
+    if name == "the corners once more at the end of each position":
+        groups = [{"balls": "all"}, {"balls": ["r1c1", "r1c3", "r3c1", "r3c3"]}]
+        return [
+            {key: value for key, value in one.items() if key != "probes"}
+            | {"readings": [group | {"probes": one["probes"]} for group in groups]}
+            for one in places
+        ]
+    return places
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "nothing",
+        "the first position once more at the end",
+        "the corners once more at the end of each position",
+    ],
+)
+def test_the_page_states_what_reading_again_buys(name: str, tmp_path: Path) -> None:
+    """The uncertainties of unknown drifts, and the mean U6 with them, by the dense computation."""
+    places = _again(name)
+    design = lay_out(file_with(tmp_path, [UNKNOWN | {"times": TIMES}], positions=places))
+    found, of = dense_spread(design, law, np.full(4, np.inf))
+    u = np.sqrt(np.diag(found.covariance))[-4:]
+    rows = np.pad(dense.jacobian(dense.quantities(of)["U6"], of.parameters), ((0, 0), (0, 4)))
+    without = dense.standard_uncertainties(of)["U6"].mean()
+    expected = [1e6 * u[:3].max(), 1e6 * u[3], 1e6 * found.of(rows).mean(), 1e6 * without]
+    assert told_on_page(name) == pytest.approx(expected, rel=0.01)
+    at = linearise(design)
+    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
+    np.testing.assert_allclose(own, u, rtol=1e-6)
