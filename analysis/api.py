@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
     from .results.fit import Fit
+    from .results.imported import ReadReport
     from .results.prediction import Prediction
 
 PathLike = str | os.PathLike[str]
@@ -284,6 +285,49 @@ def certificate(
     found = certificate_files.with_drawn_values(chosen, simulated_readings(chosen, seed, exact))
     rows = certificate_files.certificate_rows(found)
     return pandas.DataFrame(rows, columns=list(certificate_files.COLUMNS))
+
+
+def read_report(
+    reports: PathLike | Sequence[PathLike],
+    experiment: Experiment | PathLike | None = None,
+    name: str | None = None,
+    form: str | None = None,
+    unit: Literal["mm", "cm", "m", "in"] | None = None,
+    circles: bool = False,
+) -> ReadReport:
+    """Readings out of reports that measuring programs write; their `to_frame()` is a table that
+    `fit` takes.
+
+    Positions, balls and probes are in the names of features, by a rule such as
+    {position}_{ball}_{probe}: that of `name`, or the one by which the names are those of the
+    `experiment`. `form` is dmis, pcdmis, calypso or qif, and is recognised if it is left out;
+    `unit` is that of reports which state none; `circles` takes centres of circles, too.
+
+    >>> read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
+    ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
+    """
+    from .results.imported import ReadReport
+    from .simulator.experiment.layout import lay_out
+    from .simulator.inputs.quantities import LENGTH_UNITS
+    from .simulator.readings.feature_names import check_rule
+    from .simulator.readings.formats.registered import FORMATS
+    from .simulator.readings.imported import ImportSettings, import_readings
+
+    paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
+    for path in paths:
+        ensure_path("reports", path)
+    if not paths:
+        raise ValueError("reports=[]; name at least one file")
+    ensure_type(str, "a rule such as {position}_{ball}", name=name)
+    ensure_one_of([one.name for one in FORMATS], form=form)
+    ensure_one_of(("mm", "cm", "m", "in"), unit=unit)
+    ensure_type(bool, "True or False", circles=circles)
+    design = None if experiment is None else lay_out(_experiment(experiment))
+    rule = None if name is None else check_rule(name)
+    factor = None if unit is None else LENGTH_UNITS[unit]
+    settings = ImportSettings(design, rule, form, factor, circles)
+    found = import_readings([Path(path) for path in paths], settings)
+    return ReadReport(Path(paths[0]).stem, found)
 
 
 @overload

@@ -213,14 +213,9 @@ def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integer
 
 
 def _single_readings(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    m, d = at.weight.shape
-    rows = np.arange(m * d)
-    yield _block(
-        "reading",
-        (rows, rows, at.weight.ravel()),
-        np.repeat(at.chosen, d),
-        np.tile(np.arange(d), m),
-    )
+    row, axis = np.nonzero(at.weight)
+    entries = at.weight.shape[1] * row + axis, np.arange(len(row)), at.weight[row, axis]
+    yield _block("reading", entries, at.chosen[row], axis)
 
 
 def _single_lengths(at: LinearisedDesign) -> Iterator[BiasPatterns]:

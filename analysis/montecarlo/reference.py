@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, Rows, State
+from ballplate.simulator.design.arrays import Design, Rows, State, reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.covariance import Spectrum
@@ -155,6 +155,7 @@ def reference(design: Design, truth: Truth) -> Reference:
 
     blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
     weight = reading_weights(observed, readings.select(plates))
+    noise = reading_noise(observed, readings.select(plates))
     groups, at = [], 0
     for chosen in _groups(observed):
         rows = readings.select(plates[chosen])
@@ -165,14 +166,14 @@ def reference(design: Design, truth: Truth) -> Reference:
                 position,
                 _as_slice(rows.ball),
                 np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
-                np.ascontiguousarray((blocks.residual / weight)[chosen].T),
+                np.ascontiguousarray((blocks.residual * noise)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
                 local(exact[plates[chosen]], p[plates[chosen]]),
                 rows.probe if observed.probes.free.any() else None,
                 None
                 if blocks.by_influence is None
                 else np.ascontiguousarray(
-                    (blocks.by_influence / weight[:, :, None])[chosen].transpose(2, 1, 0)
+                    (blocks.by_influence * noise[:, :, None])[chosen].transpose(2, 1, 0)
                 ),
             )
         )
@@ -195,7 +196,7 @@ def reference(design: Design, truth: Truth) -> Reference:
             difference[of_end] += sign * (
                 exact[end] + observed.model.error(exact[end], start.a, p[end])
             )
-        end_noise.append((1.0 / reading_weights(observed, readings.select(end))).T)
+        end_noise.append(reading_noise(observed, readings.select(end)).T)
     difference[~read] -= start.origins[readings.position[given.first[~read]]]
     return Reference(
         observed,
@@ -203,7 +204,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         start,
         solution.factor,
         solution.spectrum,
-        np.ascontiguousarray((1.0 / weight)[order].T),
+        np.ascontiguousarray(noise[order].T),
         tuple(groups),
         ends,
         (end_noise[0], end_noise[1]),
@@ -267,7 +268,7 @@ def _is_faithful(
     """Whether an expansion of the model tells the same as the model itself."""
     p = start.probes[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    noise = 1.0 / reading_weights(design, design.readings).T
+    noise = reading_noise(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, spectrum.root.shape[1])) @ spectrum.root[columns].T
     offsets = 1e-6 * generator.standard_normal(moved.shape) if design.probes.free.any() else None

@@ -18,6 +18,7 @@ from .objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
+    Flags,
     Machine,
     Positions,
     Probes,
@@ -116,8 +117,9 @@ class Design:
 
         Of lengths that are read together only those count that do not follow from the others.
         """
-        count = int(self.readings.repeats[self.plate_readings].sum())
-        return self.dimension * count + sum(one.count(self) for one in self.observations)
+        readings = self.readings.select(self.plate_readings)
+        count = int((readings.repeats[:, None] * measured(self, readings)).sum())
+        return count + sum(one.count(self) for one in self.observations)
 
     @property
     def parameter_count(self) -> int:
@@ -173,6 +175,22 @@ def reading_uncertainties(design: Design, readings: Readings) -> Array:
     if readings.uncertainty is not None:
         return readings.uncertainty
     return np.broadcast_to(design.machine.repeatability, (len(readings), design.dimension))
+
+
+def measured(design: Design, readings: Readings) -> Flags:
+    """Which co-ordinates (m, d) are read: all but those across artefacts that are read in their
+    plane.
+    """
+    shape = (len(readings), design.dimension)
+    if design.positions.across is None:
+        return np.broadcast_to(True, shape)
+    return np.arange(shape[1]) != design.positions.across[readings.position][:, None]
+
+
+def reading_noise(design: Design, readings: Readings) -> Array:
+    """Standard uncertainties (m, d) of the mean of each reading's repeats, in metres."""
+    times = np.sqrt(readings.repeats)[:, None]
+    return np.asarray(reading_uncertainties(design, readings) / times)
 
 
 def nominal_state(design: Design) -> State:
@@ -335,6 +353,12 @@ class Observations(ABC):
         """Starting values with what these observations tell of them."""
         return state
 
+    def as_read(self, design: Design, x: Array) -> Design:
+        """The design with probe offsets that readings tell, for these observations, by far better
+        than the drawing.
+        """
+        return design
+
     def reread(self, design: Design, place: Integers) -> Self:
         """The same where the design's readings stand at other places (readings,)."""
         return self
@@ -365,6 +389,7 @@ class Replicates:
 
     `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
     S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
+    `offsets` (l, d) are the columns of probe offsets, -1 where they are held.
     """
 
     start: State
@@ -374,6 +399,7 @@ class Replicates:
     squares: Array
     by_ball: Array
     by_shared: Array
+    offsets: Integers
 
     def pull(self, balls: Integers, forces: Array) -> None:
         """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""

@@ -25,18 +25,18 @@ from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
 from ..machines.description import MachineDescription, random_part
+from ..machines.error_names import AXIS_ERRORS
 from ..machines.settings import (
     MachineFileSettings,
-    MetricSettings,
     PythonSettings,
     build_error_model,
-    dimension_of,
+    kind_of,
 )
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
 from .curve_files import read_curves
 from .machine_file import load_machine
-from .model import Evaluation, Position
+from .model import Evaluation, Position, Probe
 from .structure import Sections
 
 TOLERANCE = 1e-9
@@ -81,33 +81,21 @@ def _check_model(
             build_error_model(settings, *machine.volume.corners)
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
-    elif isinstance(settings, MetricSettings):
-        allowed = {2: ("none", "x", "y", "split"), 3: ("each", "none")}.get(
-            references.dimension or 0
-        )
-        if allowed and settings.scale is not None and settings.scale not in allowed:
-            text = (
-                f"has no meaning in {references.dimension} dimensions; choose from:"
-                f" {listing(allowed)}"
-            )
-            references.problems.add((*steps, "scale"), text)
-    elif references.dimension not in (None, dimension_of(settings)):
+        return True
+    kind, dimension = kind_of(settings), references.dimension
+    if dimension is None:
+        return True
+    if dimension not in kind.dimensions:
         text = (
-            f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume'
-            f" has {references.dimension}; change one of the two"
+            f'kind "{settings.kind}" has {kind.dimensions[0]} dimensions, but machine.volume has'
+            f" {dimension}; change one of the two"
         )
         references.problems.add((*steps, "kind"), text)
-    elif (
-        isinstance(settings, MachineFileSettings)
-        and machine is not None
-        and not build_error_model(settings, *machine.volume.corners).parameters
-    ):
-        text = (
-            f"{settings.file} states no error that could be estimated; give polynomials or tables"
-        )
-        references.problems.add((*steps, "file"), text)
-        return False
-    return True
+        return True
+    wrong = list(kind.wrong(settings, dimension))
+    for below, text in wrong:
+        references.problems.add((*steps, *below), text)
+    return not wrong
 
 
 def _machine_of_file(
@@ -125,9 +113,6 @@ def _true_machine_of_file(
 ) -> None:
     """Let the true machine be that of its file, or report what is wrong with it."""
     steps: Steps = ("true_machine", "file")
-    if references.dimension == 2:
-        text = 'kind "machine" has 3 dimensions, but machine.volume has 2; change one of the two'
-        references.problems.add(("true_machine", "kind"), text)
     found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
         return
@@ -140,9 +125,16 @@ def _true_machine_of_file(
             " machine file"
         )
         references.problems.add(steps, text)
-    if machine is None or machine.dimension != 3:
+    if machine is None:
         return
-    for axis, name in enumerate(AXES):
+    level = truth.level
+    if level is not None and machine.dimension == 3:
+        references.problems.add(("true_machine", "level"), "is for two dimensions; remove it")
+    elif level is not None and not found.lower[2] <= level <= found.upper[2]:
+        ends = " to ".join(format_length(one[2]) for one in (found.lower, found.upper))
+        text = f"is outside the file's volume, which goes from {ends} in z; stay within it"
+        references.problems.add(("true_machine", "level"), text)
+    for axis, name in enumerate(AXES[: machine.dimension]):
         low, high = machine.volume.lower[axis], machine.volume.upper[axis]
         if low < found.lower[axis] - TOLERANCE or high > found.upper[axis] + TOLERANCE:
             text = (
@@ -198,9 +190,6 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine have the curves of its files, or report what is wrong with them."""
     problems, curves = references.problems, dict[str, Points]()
-    if references.dimension == 2:
-        text = 'kind "curves" has 3 dimensions, but machine.volume has 2; change one of the two'
-        problems.add(("true_machine", "kind"), text)
     for i, file in enumerate(truth.files):
         steps: Steps = ("true_machine", "files", i)
         try:
@@ -215,10 +204,14 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
                 f"{listing(twice)} is in an earlier file already; leave it out of one of the two",
             )
         curves |= found
-        if machine is None or machine.dimension != 3:
+        if machine is None:
+            continue
+        if machine.dimension == 2 and not any(AXIS_ERRORS[one].in_plane for one in found):
+            text = "has no error that moves points within the plane of x and y; leave it out"
+            problems.add(steps, text)
             continue
         name, points = next(iter(found.items()))
-        axis = "XYZ".index(name[2])
+        axis = AXIS_ERRORS[name].axis
         lower, upper = machine.volume.lower[axis], machine.volume.upper[axis]
         covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
         if covered < 0.5 * (upper - lower):
@@ -255,21 +248,20 @@ def check_inside(
     position: Position,
     steps: Steps,
     volume: Volume,
-    offsets: Mapping[str, Floats],
+    probes: Mapping[str, Probe],
     references: References,
 ) -> None:
-    """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those
-    of the probes.
+    """Report readings with scale readings outside the measuring volume.
 
     Error models are functions of the scale readings, where the ball is less the probe's offset.
     Balls may be outside, and scale readings by a thousandth of the volume.
     """
     layout = references.layouts[position.artefact]
     rows = [
-        (group.ball_indices, probe, offsets[probe])
+        (group.ball_indices, probe, probes[probe].offset)
         for group in position.readings
         for probe in group.probes
-        if probe in offsets and offsets[probe].shape == volume.lower.shape
+        if probe in probes and probes[probe].offset.shape == volume.lower.shape
     ]
     if not rows:
         return
@@ -284,7 +276,7 @@ def check_inside(
     # The first of those furthest outside, whatever rounding makes of equal ones.
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
-    offset, place = float(offsets[probe][axis]), float(places[balls[worst], axis])
+    offset, place = float(probes[probe].offset[axis]), float(places[balls[worst], axis])
     others = (
         f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}"
         if len(outside) > 1
@@ -435,7 +427,7 @@ def check_size(
     machine: Machine | None,
     positions: dict[int, Position],
     calibrations: Mapping[int, Calibration],
-    offset_uncertainties: Mapping[str, Floats],
+    probes: Mapping[str, Probe],
     references: References,
 ) -> None:
     """Report what would take more memory than a computer usually has, or hours."""
@@ -449,11 +441,12 @@ def check_size(
     }
     pivots = [one for one in positions.values() if one.artefact in gauges]
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
-    shared = errors + pose_size(d) * poses + d * (len(pivots) + len(offset_uncertainties))
+    offsets = sum(probe.is_estimated for probe in probes.values())
+    shared = errors + pose_size(d) * poses + d * (len(pivots) + offsets)
     if shared > MOST_SHARED:
         text = (
-            f"{poses + len(pivots)} poses, {errors} machine errors and {len(offset_uncertainties)}"
-            f" probe offsets make {shared} parameters besides the balls; at most {MOST_SHARED} are"
+            f"{poses + len(pivots)} poses, {errors} machine errors and {offsets} probe"
+            f" offsets make {shared} parameters besides the balls; at most {MOST_SHARED} are"
             " possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)

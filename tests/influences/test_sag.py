@@ -114,6 +114,7 @@ def test_a_plate_hangs_down_lying_and_turned_over_and_not_standing(tmp_path: Pat
         ({"shape": "both"}, BOWL),
         ({"shape": "x"}, TROUGH),
         ({"shape": "y"}, TROUGH.reshape(3, 3).T.ravel()),
+        ({"shape": {"x": 2}}, np.array([1.0, 0.0, 1.0] * 3)),
         # 2 x^2 - x^4 y^2 at -1, 0 and 1 along both axes, its largest value 2.
         (
             {"shape": [{"factor": 2.0, "x": 2}, {"factor": -1.0, "x": 4, "y": 2}]},

@@ -14,7 +14,7 @@ from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
+from ballplate.simulator.experiment.model import Experiment, Position, Probe, ReadingGroup
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, pairs
 from ballplate.simulator.geometry.positions import Pose, ball_coordinates
 from ballplate.simulator.machines.protocol import Array
@@ -86,16 +86,14 @@ def go_together(changes: Sequence[Change]) -> bool:
 
 
 def is_inside(
-    position: Position, layout: BallLayout, volume: Volume, offsets: Mapping[str, Array]
+    position: Position, layout: BallLayout, volume: Volume, probes: Mapping[str, Probe]
 ) -> bool:
-    """Whether all scale readings of a position are in the volume, as in a file, with the `offsets`
-    (d,) of probes.
-    """
+    """Whether all scale readings of a position are in the volume, as in a file."""
     places = ball_coordinates(position.pose, layout)
     lower, upper = volume.of_readings
     for group in position.readings:
         for name in group.probes:
-            read = places[group.ball_indices] - offsets[name]
+            read = places[group.ball_indices] - probes[name].offset
             if (read < lower).any() or (read > upper).any():
                 return False
     return True
@@ -135,7 +133,7 @@ def further(position: Position, probe: str) -> Position:
 
 
 def with_further(
-    experiment: Experiment, name: str, more: Position, probes: Mapping[str, Array]
+    experiment: Experiment, name: str, more: Position, probes: Mapping[str, Probe]
 ) -> Experiment:
     """The experiment with the readings of `more` in the position `name` besides, with probes that
     may be new.

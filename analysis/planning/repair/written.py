@@ -58,9 +58,9 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
     for name, artefact in after.artefacts.items():
         found += _fields(("artefacts", name), before.artefacts[name], artefact)
     found += _fields(("error_model",), before.error_model, after.error_model)
-    for name, offset in after.probes.items():
+    for name, probe in after.probes.items():
         if name not in before.probes:
-            found.append(Edit(("probes", name), [written_length(v) for v in offset]))
+            found.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
     known = {place.name: position_settings(before, place) for place in before.positions}
     for place in after.positions:
         settings = position_settings(after, place)

@@ -12,12 +12,14 @@ from pydantic import Field
 
 from .drift import DriftSettings
 from .protocol import InfluenceSettings
+from .reindexing import ReindexingSettings
 from .sag import SagSettings
 from .temperature import TemperaturesSettings
 
 INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     # In the order of the documentation.
     TemperaturesSettings,
+    ReindexingSettings,
     DriftSettings,
     SagSettings,
 )

@@ -157,10 +157,12 @@ def _shape(
     extent = np.abs(flat).max(axis=0, initial=0.0)
     u = np.zeros((len(flat), 2))
     u[:, : d - 1] = flat / np.where(extent > 0.0, extent, 1.0)
-    if isinstance(settings.shape, tuple):
-        terms = [term.factor * u[:, 0] ** term.x * u[:, 1] ** term.y for term in settings.shape]
+    shape = settings.shape
+    if shape is not None and not isinstance(shape, str):
+        listed = shape if isinstance(shape, tuple) else (shape,)
+        terms = [term.factor * u[:, 0] ** term.x * u[:, 1] ** term.y for term in listed]
         return np.asarray(np.sum(terms, axis=0))
-    along = [AXIS_NAMES.index(one) for one in QUADRATIC[str(settings.shape or "both")]]
+    along = [AXIS_NAMES.index(one) for one in QUADRATIC[shape or "both"]]
     size = np.append(extent, 0.0)[along]
     squared = ((u[:, along] * size) ** 2).sum(axis=1)
     largest = squared.max(initial=0.0)

@@ -61,6 +61,16 @@ def no_coordinates() -> CalibratedCoordinates:
     return CalibratedCoordinates(none, none, empty, empty)
 
 
+def flat(layout: BallLayout, first: int, uncertainty: float) -> CalibratedCoordinates:
+    """Co-ordinates out of the plane as drawn, of an artefact whose balls begin at `first` and of
+    which nothing else tells them.
+    """
+    count = len(layout.names)
+    drawn = layout.coordinates[:, 2]
+    balls = first + np.arange(count, dtype=np.int64)
+    return CalibratedCoordinates(balls, np.full(count, 2), drawn, np.full(count, uncertainty))
+
+
 @dataclass(frozen=True, eq=False)
 class CoordinateCalibration(Calibration):
     """Calibrated ball co-ordinates in the artefact's frame.
