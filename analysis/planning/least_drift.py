@@ -104,7 +104,7 @@ def blocks(clock: Clock, readings: Readings) -> Blocks:
     )
     inverse = inverse.ravel()
     hours = clock.seconds(readings) / HOUR
-    weight = np.bincount(inverse, readings.repeats.astype(float))
+    weight = np.bincount(inverse, readings.repeats).astype(float)
     middle = np.bincount(inverse, hours * readings.repeats) / weight
     position, probe = pairs.T
     length = np.array(clock.reading)[position] * weight / HOUR
