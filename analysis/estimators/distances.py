@@ -221,7 +221,8 @@ def _refuse_many_terms(
 def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
     """Refuse what estimators of distances alone cannot follow.
 
-    :raises ExperimentError: a gauge, a length standard without a certificate, holes, or a star.
+    :raises ExperimentError: a gauge, a length standard without a certificate, holes, a star, or
+        correlated values.
     """
     if experiment.stars:
         text = "estimators of distances alone cannot follow where a star points; use the full one"
@@ -229,6 +230,13 @@ def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
     if design.positions.across is not None:
         text = "estimators of distances alone cannot follow what is read in plane; use the full one"
         raise refused(experiment.source, text, "artefacts")
+    for k, item in enumerate(experiment.calibration):
+        if item.root is not None:
+            text = (
+                "estimators of distances alone take certified distances as independent; use the"
+                " full estimator for correlated values and functions of your own"
+            )
+            raise refused(experiment.source, text, f"calibration[{k}]")
     gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
     if gauges or unknown:
         what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"

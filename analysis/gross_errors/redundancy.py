@@ -124,11 +124,16 @@ def reliability_of(
     is_read = measured(design, readings)
     # Co-ordinates that are not read are no observations.
     redundancy[places["reading"]][~is_read.ravel()] = 0.0
+    joint = [one.word for one in design.observations if one.is_joint]
+    # Of standards' lengths those that share no reading come first, and have a pattern each.
     for kind, rows in places.items():
         own, of_kind = np.flatnonzero(given.kind == kind), redundancy[rows]
         if kind == "reading":
-            of_kind = of_kind[is_read.ravel()]
-        left[own] = of_kind[: len(own)]
+            left[own] = of_kind[is_read.ravel()][: len(own)]
+        elif kind == "length":
+            left[own] = of_kind[: len(own)]
+        elif kind not in joint:
+            left[own] = of_kind[given.subject[own]]
     every = patterns(design, at.state, None, every_start=True)
     tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
     across = effects.pop(ACROSS).change if mixed is not None else np.zeros(len(given))

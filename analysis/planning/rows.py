@@ -15,12 +15,14 @@ from functools import cached_property
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
 from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.lengths import (
     Lengths,
     length_derivative,
     length_whitening,
 )
 from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.observations.whitening import EXACT
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
@@ -248,7 +250,8 @@ def calibration_rows(
     artefact = drawn.design.artefacts.names.index(item.artefact)
     if experiment.artefacts[item.artefact].role == "plate":
         first = int(drawn.design.balls.of(artefact)[0])
-        return _of_observations(drawn, [item.observed(first)])
+        one, root = item.observed(first), item.root
+        return _of_observations(drawn, [one if root is None else JointValues.of([(one, root)])])
     named = drawn.design.unknown_lengths.of(artefact)
     if len(named) != 1:
         text = (
@@ -258,8 +261,8 @@ def calibration_rows(
         raise refused(experiment.source, text, "pool.calibration")
     stated = next(item.certified_values(experiment.layouts[item.artefact]))
     row = np.zeros((1, drawn.shared))
-    row[0, drawn.layout.lengths.start - drawn.layout.model.start + named[0]] = (
-        1.0 / stated.standard_uncertainty
+    row[0, drawn.layout.lengths.start - drawn.layout.model.start + named[0]] = 1.0 / max(
+        stated.standard_uncertainty, EXACT
     )
     return [_of_shared(drawn, row * drawn.scale)]
 

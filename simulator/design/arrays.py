@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
@@ -280,13 +281,15 @@ class Observations(ABC):
     """All observations (m,) of one kind in a design; a frozen dataclass of arrays.
 
     `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
-    too long by one ratio where its scale is wrong. `words` tell what is wrong with a wrong one.
+    too long by one ratio where its scale is wrong; where they are `is_joint`, a row is a
+    combination of several values. `words` tell what is wrong with a wrong one.
     Values are in `measured_in`, unless `unit` says otherwise of each.
     """
 
     word: ClassVar[str]
     measured_in: ClassVar[Unit] = "m"
     scales: ClassVar[bool] = False
+    is_joint: ClassVar[bool] = False
     words: ClassVar[Words] = Words()
     value: Array
     uncertainty: Array
@@ -306,6 +309,11 @@ class Observations(ABC):
     def along(self) -> Integers:
         """The axis (m,) that each is along, -1 without one."""
         return np.full(len(self), -1)
+
+    @property
+    def is_exact(self) -> NDArray[np.bool_]:
+        """Which values (m,) are stated without any uncertainty, and cannot be wrong."""
+        return np.full(len(self), False)
 
     def count(self, design: Design) -> int:
         """Number of independent rows."""
@@ -345,9 +353,30 @@ class Observations(ABC):
         """The same observations with other values or uncertainties (m,)."""
         return cast(Self, replace(cast(Any, self), **changed))
 
-    def fixing(self) -> tuple[Integers, Integers]:
-        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter."""
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    def whitened(self, rows: Array) -> Array:
+        """What changes (m, ...) of the values are in uncorrelated rows (count, ...) of unit
+        variance.
+        """
+        return rows / self.uncertainty.reshape(-1, *[1] * (rows.ndim - 1))
+
+    def scaled(self) -> Array:
+        """What the values (m,) change by, per ratio, where the scale of their certificate is
+        wrong.
+        """
+        return self.value if self.scales else np.zeros(len(self))
+
+    def loosened(self, least: float) -> Self:
+        """The same with standard uncertainties of `least` at the least, where smaller ones stand
+        for none.
+        """
+        return self
+
+    def fixing(self) -> tuple[Integers, Integers, Array]:
+        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter, and
+        the co-ordinates (f,).
+        """
+        none = np.zeros(0, np.int64)
+        return none, none, np.zeros(0)
 
     def started(self, design: Design, x: Array, state: State) -> State:
         """Starting values with what these observations tell of them."""

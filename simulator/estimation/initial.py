@@ -163,9 +163,9 @@ def _into_frame(
         )
     target, certified = design.balls.places.copy(), np.zeros(len(members), bool)
     for one in design.observations:
-        ball, axis = one.fixing()
+        ball, axis, value = one.fixing()
         if len(ball):
-            target[ball, axis] = one.value
+            target[ball, axis] = value
             certified |= np.isin(members, ball)
     known = ~np.isnan(shape[:, 0])
     chosen = certified & known

@@ -24,6 +24,7 @@ from ..design.objects import (
 from ..design.observations.balls import BallObservations
 from ..design.observations.coordinates import CalibratedCoordinates, flat, no_coordinates
 from ..design.observations.distances import CalibratedDistances, no_distances
+from ..design.observations.joint_values import JointValues
 from ..design.observations.priors import Priors
 from ..design.observations.radius import RadiusCalibration
 from ..design.observations.star import Stars, observed_stars
@@ -240,16 +241,22 @@ def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallOb
         CalibratedDistances: [no_distances()],
         CalibratedCoordinates: [no_coordinates()],
     }
+    joint = []
     for item in experiment.calibration:
         if experiment.artefacts[item.artefact].role == "plate":
             one = item.observed(int(first_ball[item.artefact]))
-            parts.setdefault(type(one), []).append(one)
+            root = item.root
+            if root is None:
+                parts.setdefault(type(one), []).append(one)
+            else:
+                joint.append((one, root))
     for name, artefact in experiment.artefacts.items():
         if artefact.flatness is not None:
             parts[CalibratedCoordinates].append(
                 flat(experiment.layouts[name], int(first_ball[name]), artefact.flatness)
             )
-    return [kind.joined(own) for kind, own in parts.items()]
+    found = [kind.joined(own) for kind, own in parts.items()]
+    return [*found, JointValues.of(joint)] if joint else found
 
 
 def _held(
@@ -267,7 +274,7 @@ def _held(
     """
     d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
-    ball, axis = (
+    ball, axis, _ = (
         np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
     )
     for artefact in np.unique(position_artefact):

@@ -124,7 +124,13 @@ def drawn_values(
     if generator is None:
         return np.array(true, float)
     uncertainty = np.array([one.standard_uncertainty for one in certified_values(experiment)])
-    return np.asarray(np.array(true, float) + uncertainty * generator.standard_normal(len(true)))
+    normal = generator.standard_normal(len(true))
+    errors, at = uncertainty * normal, 0
+    for item in experiment.calibration:
+        part = slice(at, at + len(item.true_values(truth.balls, first_ball[item.artefact])))
+        errors[part] = item.drawn_errors(normal[part], uncertainty[part])
+        at = part.stop
+    return np.asarray(np.array(true, float) + errors)
 
 
 def certificate_rows(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:

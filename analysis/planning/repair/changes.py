@@ -228,7 +228,12 @@ def with_artefact(
 def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibration | None:
     if isinstance(item, DistanceCalibration):
         chosen = pair_set(old, item.pairs)
-        if chosen is None or chosen not in (*new.pair_sets, "all") or item.certified:
+        if (
+            chosen is None
+            or chosen not in (*new.pair_sets, "all")
+            or item.certified
+            or item.standard_uncertainty is None
+        ):
             return None
         return distances(item, new, pairs(new, chosen))
     if isinstance(item, CoordinateCalibration):
@@ -243,7 +248,10 @@ def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibr
 def distances(
     like: DistanceCalibration, layout: BallLayout, chosen: Indices
 ) -> DistanceCalibration:
-    """Calibrated distances between pairs (m, 2) of balls, otherwise like others."""
+    """Calibrated distances between pairs (m, 2) of balls, otherwise like others that state one
+    standard uncertainty.
+    """
+    assert like.standard_uncertainty is not None
     ends = layout.coordinates[chosen][:, :, : like.dimensions]
     values = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     return replace(
@@ -252,4 +260,5 @@ def distances(
         values=values,
         certified=False,
         standard_uncertainties=like.standard_uncertainty.at(values),
+        root=None,
     )

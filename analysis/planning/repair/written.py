@@ -178,7 +178,12 @@ def _group(experiment: Experiment, position: Position, group: ReadingGroup) -> d
 
 def can_be_written(item: Calibration) -> bool:
     """Whether `calibration_settings` tell all of an item but its certified values."""
-    return isinstance(item, DistanceCalibration | CoordinateCalibration | RadiusCalibration)
+    if isinstance(item, DistanceCalibration):
+        return item.standard_uncertainty is not None
+    if isinstance(item, CoordinateCalibration):
+        # A file states those of each ball.
+        return item.standard_uncertainties.ndim == 1
+    return isinstance(item, RadiusCalibration)
 
 
 def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str, Any]:
@@ -192,6 +197,7 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
         said["pairs"] = pair_set(layout, item.pairs) or named
         if item.dimensions == 2 and experiment.dimension == 3:
             said["dimensions"] = 2
+        assert item.standard_uncertainty is not None
         said["standard_uncertainty"] = length_function(item.standard_uncertainty)
     elif isinstance(item, CoordinateCalibration):
         balls = ball_set(layout, item.balls)
