@@ -166,6 +166,7 @@ def read_readings(
         else _planned_uncertainty(design, readings)
     )
     readings = replace(readings, uncertainty=uncertainty, beside=beside)
+    readings = in_sequence(readings, design.influences)
     missing, unplanned = _compare(design, readings, [row.mark for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
