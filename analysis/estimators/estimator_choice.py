@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from ballplate.simulator.inputs.messages import refused
+
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.reading_files import ObservedReadings
@@ -61,6 +63,9 @@ def fit_readings(
 
     :raises ExperimentError: it cannot estimate this experiment.
     """
+    if experiment.influences and estimator != "full":
+        text = f"{estimator} does not know influence quantities; use the full estimator"
+        raise refused(experiment.source, text, "influences")
     if estimator == "reversal":
         from .reversal_fits import fit_reversal
 

@@ -26,7 +26,7 @@ from ballplate.simulator.design.observations.readings import (
     rotation_sensitivity,
 )
 from ballplate.simulator.estimation.hat import row_count, row_places
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
 if TYPE_CHECKING:
     from ballplate.simulator.design.observations.whitening import Whitening
@@ -94,7 +94,7 @@ class Patterns:
         """Indices of the patterns of some kinds."""
         return np.flatnonzero(np.isin(self.kind, kinds))
 
-    def unit(self, k: int) -> Literal["m", "rad", "1"]:
+    def unit(self, k: int) -> Unit:
         """Unit of the bias."""
         kind: str = self.kind[k]
         for one in self.design.observations:

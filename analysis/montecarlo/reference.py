@@ -17,7 +17,7 @@ from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.readings.generate import scale_readings
+from ballplate.simulator.readings.generate import true_readings
 
 from .expansion import Direct, LocalModel, expand
 
@@ -54,7 +54,8 @@ class PositionReadings:
 
     `ball` are their m balls, a slice where they follow one another, `arm` (d, m) the balls turned
     into the machine's axes, `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None
-    where no probe's offset is a parameter.
+    where no probe's offset is a parameter, and `by_influence` (p, d, m), the derivative of the
+    residuals by influence quantities, where there are none.
     """
 
     rows: slice
@@ -65,6 +66,7 @@ class PositionReadings:
     weight: Array
     model: LocalModel
     probe: Integers | None
+    by_influence: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -134,13 +136,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     if deficiency:
         raise RankDeficientError(f"the design is rank deficient by {deficiency}")
     readings = observed.readings
-    p = truth.state.probes[readings.probe]
-    turned = np.einsum(
-        "mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball]
-    )
-    exact = scale_readings(
-        truth.model, turned + truth.state.origins[readings.position], truth.state.a, p
-    )
+    exact = true_readings(observed, truth.state, readings, truth.model)
     true = [one.true_values(observed, truth.state, truth.model) for one in observed.observations]
     observed = observed.observed(
         *(one.given(value=value) for one, value in zip(observed.observations, true, strict=True))
@@ -173,6 +169,11 @@ def reference(design: Design, truth: Truth) -> Reference:
                 np.ascontiguousarray(weight[chosen].T),
                 local(exact[plates[chosen]], p[plates[chosen]]),
                 rows.probe if observed.probes.free.any() else None,
+                None
+                if blocks.by_influence is None
+                else np.ascontiguousarray(
+                    (blocks.by_influence / weight[:, :, None])[chosen].transpose(2, 1, 0)
+                ),
             )
         )
         at += len(chosen)

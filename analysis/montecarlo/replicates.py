@@ -217,6 +217,10 @@ def _gradient(
         by_shared[:, layout.model] += group.model.gather(
             moved, step, pull, _offsets(at, group.probe)
         )
+        if group.by_influence is not None:
+            by_shared[:, layout.influences] += np.tensordot(
+                pull, group.by_influence, ((1, 2), (1, 2))
+            )
         if group.probe is not None:
             _add_by_offset(by_shared, layout, group.probe, group.model.gather_offsets(step, pull))
     position, parameter = np.nonzero(layout.pose_columns >= 0)
@@ -258,6 +262,9 @@ def _pull(
         displaced += (rotation + less @ rotation) @ at.balls[:, :, group.ball]
         residual -= displaced
         residual -= at.origins[:, group.position, :, None]
+        if group.by_influence is not None:
+            influences = at.shared[:, shared.factor.layout.influences]
+            residual += np.tensordot(influences, group.by_influence, (1, 0))
         arm = group.arm + displaced
     residual *= group.weight
     return residual, arm

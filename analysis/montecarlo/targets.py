@@ -167,6 +167,7 @@ def _parameters(
     offsets = start.probes - real.probes
     steps = np.zeros((1, len(layout)))
     steps[:, layout.lengths] = start.lengths - real.lengths
+    steps[:, layout.influences] = start.influences - real.influences
     origins, balls = start.origins - real.origins, np.zeros((1, 0, 0))
     error = Deviations(balls, turned[None], origins[None], a[None], offsets[None], steps)
 

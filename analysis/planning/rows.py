@@ -102,7 +102,30 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     if messages:
         raise ExperimentError(messages)
     design = lay_out(replace(experiment, positions=tuple(positions)))
+    refuse_influences(experiment, design)
     return PoolDesign(design, shared_layout(design), nominal_state(design))
+
+
+def refuse_influences(experiment: Experiment, design: Design) -> None:
+    """Refuse influence quantities that a plan cannot weigh.
+
+    :raises ExperimentError: they depend on when readings are made, or a position brings a free
+        parameter of its own.
+    """
+    text = ""
+    if any(one.in_order for one in design.influences):
+        text = "depend on the order of readings, which a plan does not know; remove them to plan"
+    own = [
+        one.name
+        for one in design.influence_parameters
+        if one.position >= 0 and not np.isfinite(one.uncertainty)
+    ]
+    if own:
+        text = (
+            f"{own[0]} is unknown, which a plan cannot weigh; state a standard uncertainty to plan"
+        )
+    if text:
+        raise refused(experiment.source, text, "influences")
 
 
 def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
@@ -127,6 +150,11 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
             for axis in range(d):
                 free = np.flatnonzero(columns[:, axis] >= 0)
                 by_shared[free, :, columns[free, axis]] = blocks.by_offset[free, :, axis]
+        if blocks.by_influence is not None:
+            first_of = drawn.layout.influences.start - drawn.own.start
+            by_shared[:, :, first_of : first_of + blocks.by_influence.shape[2]] = (
+                blocks.by_influence
+            )
         by_shared *= drawn.scale
         for k in range(first, last):
             if k in lengths:

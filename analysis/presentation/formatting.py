@@ -12,7 +12,16 @@ import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
-SHOWN = {"m": "µm", "rad": "µrad", "1": "ppm"}
+SHOWN = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}
+
+
+def amount_of(value: float, unit: str) -> tuple[float, str]:
+    """A small value with the unit it reads well in.
+
+    >>> amount_of(0.02, "K")
+    (20.0, 'mK')
+    """
+    return (1e3 * value, "mK") if unit == "K" else (1e6 * value, SHOWN[unit])
 
 
 def shown_unit(unit: str) -> str:

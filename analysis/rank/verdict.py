@@ -16,7 +16,7 @@ from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.machines.protocol import Array, HasLines
+from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
 from .canonical import elementary_mixture, principal_directions
 from .missing_bars import reasons, relative_changes
@@ -80,10 +80,13 @@ class PositionPart:
 
 @dataclass(frozen=True)
 class LengthPart:
-    """The change of an unknown length, in metres."""
+    """The change of an unknown length, or of a parameter of an influence quantity, in its
+    `unit`.
+    """
 
     name: str
     change: float
+    unit: Unit = "m"
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,7 @@ class Direction:
     standard_deviation: float = float("inf")
     probes: tuple[PositionPart, ...] = ()
     lengths: tuple[LengthPart, ...] = ()
+    influences: tuple[LengthPart, ...] = ()
     points: int = 0
     beyond: int = 0
     limit: float = float("inf")
@@ -321,8 +325,18 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
         for name, change in zip(design.unknown_lengths.names, shared[layout.lengths], strict=True)
         if above(abs(change), NEGLIGIBLE * largest)
     )
+    influences = tuple(
+        LengthPart(one.name, float(change), one.unit)
+        for one, change in zip(design.influence_parameters, shared[layout.influences], strict=True)
+        if above(abs(change) * one.effect, NEGLIGIBLE * largest)
+    )
     return Direction(
-        functions, tuple(artefacts), tuple(positions), probes=tuple(probes), lengths=lengths
+        functions,
+        tuple(artefacts),
+        tuple(positions),
+        probes=tuple(probes),
+        lengths=lengths,
+        influences=influences,
     )
 
 
@@ -459,6 +473,12 @@ def in_words(direction: Direction) -> str:
         parts.append(
             ", ".join(f"{part.name} ({length(part.change)})" for part in direction.lengths)
         )
+    if direction.influences:
+        parts.append(
+            ", ".join(
+                f"{part.name} ({_amount(part.change, part.unit)})" for part in direction.influences
+            )
+        )
     if np.isinf(direction.standard_deviation):
         end = (
             "change together without changing any observation"
@@ -495,5 +515,5 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    shown = {"m": "µm", "rad": "µrad", "1": "ppm"}[unit]
+    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}[unit]
     return f"{printable(value * 1e6):.3g} {shown}"

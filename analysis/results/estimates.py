@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -25,16 +25,13 @@ from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
 from ..uncertainty.quantities import task_distances
 
-ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "ball"]
+ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]
 FunctionKind = Literal[ParameterKind, "task"]
 
 # What may be asked for in place of a kind of its own.
 KINDS: dict[str, tuple[FunctionKind, ...]] = {
     "pose": ("origin", "rotation"),
-    **{
-        kind: (kind,)
-        for kind in ("machine", "origin", "rotation", "offset", "length", "ball", "task")
-    },
+    **{kind: (kind,) for kind in (*get_args(ParameterKind), "task")},
 }
 
 
@@ -44,7 +41,7 @@ class ParameterEstimate:
     undetermined.
 
     `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a
-    standard's length, a ball.
+    standard's length, an influence quantity, a ball.
     """
 
     name: str
@@ -225,6 +222,9 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
 
     names = list(design.unknown_lengths.names)
     add("length", names, ["m"] * len(names), state.lengths, own[layout.lengths])
+    disturbing = design.influence_parameters
+    names, units = [one.name for one in disturbing], [one.unit for one in disturbing]
+    add("influence", names, units, state.influences, own[layout.influences])
 
     d, balls = design.dimension, design.plate_balls
     names = [f"{design.ball_label(ball)}: {letter}" for ball in balls for letter in AXIS_NAMES[:d]]

@@ -18,7 +18,7 @@ from ballplate.simulator.readings.reading_files import ObservedReadings, far_out
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
-from ..presentation.formatting import SHOWN, aligned, finite, number, to_uncertainty
+from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
@@ -141,12 +141,14 @@ class Fit(FitResult):
         lines += [*task_table(self.tasks), ""] if self.tasks else []
         rows = [["parameter", "value", "standard uncertainty", "unit"]]
         for estimate in (one for one in self.estimates if one.kind not in ("origin", "ball")):
+            value, unit = amount_of(estimate.value, estimate.unit)
+            u, _ = amount_of(estimate.standard_uncertainty, estimate.unit)
             rows.append(
                 [
                     estimate.name,
-                    to_uncertainty(1e6 * estimate.value, 1e6 * estimate.standard_uncertainty),
-                    number(1e6 * estimate.standard_uncertainty, 3),
-                    SHOWN[estimate.unit],
+                    to_uncertainty(value, u),
+                    number(u, 3),
+                    unit,
                 ]
             )
         lines += aligned(rows, [False, True, True, False])

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
+from .influences.protocol import Disturbed, Influence, InfluenceParameter
 from .objects import (
     Artefacts,
     Balls,
@@ -24,43 +24,10 @@ from .objects import (
     Tasks,
     UnknownLengths,
 )
+from .objects import Readings as Readings
 
 Made = TypeVar("Made")
 Kind = TypeVar("Kind", bound="Observations")
-
-
-@dataclass(frozen=True)
-class Readings:
-    """Which ball is read in which position with which probe, and how often; all arrays (m,).
-
-    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None
-    where all have the machine's repeatability.
-    """
-
-    ball: Integers
-    position: Integers
-    probe: Integers
-    repeats: Integers
-    uncertainty: Array | None = None
-
-    def __len__(self) -> int:
-        return len(self.ball)
-
-    def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
-        """The readings at the given indices."""
-        uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
-        return Readings(
-            self.ball[chosen],
-            self.position[chosen],
-            self.probe[chosen],
-            self.repeats[chosen],
-            uncertainty,
-        )
-
-    def expanded(self) -> Readings:
-        """One row for each repeat."""
-        chosen = np.repeat(np.arange(len(self)), self.repeats)
-        return replace(self.select(chosen), repeats=np.ones(len(chosen), np.int64))
 
 
 @dataclass(frozen=True)
@@ -84,6 +51,7 @@ class Design:
     unknown_lengths: UnknownLengths
     evaluation: EvaluationPoints
     tasks: Tasks
+    influences: tuple[Influence, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -154,7 +122,7 @@ class Design:
     @property
     def parameter_count(self) -> int:
         """Number of free parameters: balls, poses less what is held, machine errors, probe offsets,
-        unknown lengths.
+        unknown lengths, influence quantities.
         """
         return (
             self.dimension * len(self.plate_balls)
@@ -162,7 +130,19 @@ class Design:
             + len(self.model.parameters)
             + int(self.probes.free.sum())
             + len(self.unknown_lengths.names)
+            + len(self.influence_parameters)
         )
+
+    @cached_property
+    def influence_parameters(self) -> tuple[InfluenceParameter, ...]:
+        """The parameters of all influence quantities, less constants."""
+        every = [parameter for one in self.influences for parameter in one.parameters]
+        return tuple(parameter for parameter in every if parameter.uncertainty)
+
+    @cached_property
+    def influence_values(self) -> Array:
+        """Their stated values (p,)."""
+        return np.array([one.value for one in self.influence_parameters], float)
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
@@ -174,7 +154,7 @@ class Design:
 @dataclass(frozen=True)
 class State:
     """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a`
-    (parameters,), offsets of the `probes` (l, d) and unknown `lengths`.
+    (parameters,), offsets of the `probes` (l, d), unknown `lengths` and `influences` (p,).
     """
 
     balls: Array
@@ -183,6 +163,7 @@ class State:
     a: Array
     probes: Array
     lengths: Array
+    influences: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def reading_uncertainties(design: Design, readings: Readings) -> Array:
@@ -203,6 +184,7 @@ def nominal_state(design: Design) -> State:
         np.zeros(len(design.model.parameters)),
         design.probes.offsets,
         design.unknown_lengths.drawn,
+        design.influence_values,
     )
 
 
@@ -210,6 +192,32 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
     """True positions (m, d) of the balls that are read, T(y, t) in metres."""
     turned = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
     return np.asarray(turned + state.origins[readings.position])
+
+
+def influence_shifts(
+    design: Design, state: State, readings: Readings, x: Array
+) -> tuple[Array, Array]:
+    """What influence quantities add to the locations of readings (m, d), and its derivative by
+    their parameters (m, d, p), where the scales say `x` (m, d); metres.
+    """
+    at = Disturbed(
+        readings.ball,
+        readings.position,
+        readings.probe,
+        x,
+        state.balls[readings.ball],
+        state.rotations[readings.position],
+        state.probes[readings.probe],
+        readings.beside or {},
+    )
+    shift, parts = np.zeros(x.shape), [np.zeros((*x.shape, 0))]
+    for one in design.influences:
+        stated, derivative = one.shifts(at)
+        shift += stated
+        varies = np.array([parameter.uncertainty != 0.0 for parameter in one.parameters], bool)
+        parts.append(derivative[:, :, varies])
+    by_parameter = np.concatenate(parts, axis=2)
+    return shift + by_parameter @ (state.influences - design.influence_values), by_parameter
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
-"""Parts of a design: probes, artefacts, balls, positions and tasks, each with its own arrays in
-SI units.
+"""Parts of a design: probes, artefacts, balls, positions, readings and tasks, each with its own
+arrays in SI units.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +113,44 @@ class Positions:
     rotations: Array
     origins: Array
     held: Flags
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Which ball is read in which position with which probe, and how often; all arrays (m,).
+
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None
+    where all have the machine's repeatability. `beside` has what influence quantities need besides,
+    values (m,) by the names of their columns; None where there are none.
+    """
+
+    ball: Integers
+    position: Integers
+    probe: Integers
+    repeats: Integers
+    uncertainty: Array | None = None
+    beside: Mapping[str, Array] | None = None
+
+    def __len__(self) -> int:
+        return len(self.ball)
+
+    def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
+        """The readings at the given indices."""
+        uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
+        beside = self.beside and {name: one[chosen] for name, one in self.beside.items()}
+        return Readings(
+            self.ball[chosen],
+            self.position[chosen],
+            self.probe[chosen],
+            self.repeats[chosen],
+            uncertainty,
+            beside,
+        )
+
+    def expanded(self) -> Readings:
+        """One row for each repeat."""
+        chosen = np.repeat(np.arange(len(self)), self.repeats)
+        return replace(self.select(chosen), repeats=np.ones(len(chosen), np.int64))
 
 
 @dataclass(frozen=True)

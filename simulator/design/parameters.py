@@ -14,12 +14,13 @@ from .arrays import Design
 @dataclass(frozen=True)
 class SharedLayout:
     """Columns of the shared parameters: the free ones of poses, machine errors, free probe offsets,
-    unknown lengths.
+    unknown lengths, influence quantities.
 
     `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or
     belongs to a length standard, and `offset_columns` (l, d) the same for probe offsets; `lengths`
-    are the columns of unknown lengths. `scale` (columns,) is the size of each parameter, in its own
-    unit, that moves a point somewhere by about one metre.
+    are the columns of unknown lengths and `influences` those of influence quantities. `scale`
+    (columns,) is the size of each parameter, in its own unit, that moves a point somewhere by about
+    one metre.
     """
 
     parameters: tuple[Parameter, ...]
@@ -28,6 +29,7 @@ class SharedLayout:
     scale: Array
     offset_columns: Integers
     lengths: slice
+    influences: slice
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -73,5 +75,10 @@ def shared_layout(design: Design) -> SharedLayout:
         parameters.append(Parameter(f"probe {name}: offset {letter}", "m", "offset", meaning))
     lengths = slice(len(parameters), len(parameters) + len(design.unknown_lengths.names))
     parameters += [Parameter(name, "m", "length", name) for name in design.unknown_lengths.names]
+    influences = slice(lengths.stop, lengths.stop + len(design.influence_parameters))
+    parameters += [
+        Parameter(one.name, one.unit, "influence", one.name, one.effect)
+        for one in design.influence_parameters
+    ]
     scale = np.array([1.0 / p.effect for p in parameters])
-    return SharedLayout(tuple(parameters), columns, model, scale, offsets, lengths)
+    return SharedLayout(tuple(parameters), columns, model, scale, offsets, lengths, influences)

@@ -234,7 +234,7 @@ def _all_rows(
         by_shared = of_lengths.by_shared[:, design.once(shared_layout).model]
         found.append((of_lengths.residual, by_shared))
     priors = design.of(Priors)
-    of_model = np.flatnonzero((priors.position < 0) & (priors.probe < 0))
+    of_model = np.flatnonzero(priors.of_model)
     if len(of_model):
         weight, of_parameters = 1.0 / priors.uncertainty[of_model], priors.by_model[of_model]
         found.append(

@@ -402,7 +402,7 @@ def _batches(
                 columns = np.concatenate(
                     [columns, layout.offset_columns[readings.probe[index]]], axis=1
                 )
-            _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout.model, present)
+            _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout, present)
         if c:
             member = np.arange(c) < extra[batch][:, None]
             source = by_ball_first[np.where(member, extra_start[batch][:, None] + np.arange(c), 0)]
@@ -412,12 +412,14 @@ def _batches(
         yield batch, by_ball, rest
 
 
-def _fill(by_ball, rest, blocks, columns, model, present) -> None:  # type: ignore[no-untyped-def]
+def _fill(by_ball, rest, blocks, columns, layout, present) -> None:  # type: ignore[no-untyped-def]
     """Write reading blocks (b m, d, ...) into the rows of a batch, in place."""
     b, m = present.shape
     d = by_ball.shape[2]
     by_ball[:] = blocks.by_ball.reshape(b, m * d, d)
-    rest[:, :, model] = blocks.by_model.reshape(b, m * d, -1)
+    rest[:, :, layout.model] = blocks.by_model.reshape(b, m * d, -1)
+    if blocks.by_influence is not None:
+        rest[:, :, layout.influences] = blocks.by_influence.reshape(b, m * d, -1)
     rest[:, :, -1] = blocks.residual.reshape(b, m * d)
     flat = rest.reshape(b, m, d, -1)
     ball, place = np.nonzero(present)

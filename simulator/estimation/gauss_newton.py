@@ -191,4 +191,5 @@ def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> St
         state.a + shared[layout.model],
         state.probes + step[layout.offset_columns],
         state.lengths + shared[layout.lengths],
+        state.influences + shared[layout.influences],
     )

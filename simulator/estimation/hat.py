@@ -140,4 +140,6 @@ def _reading_rows(
     shared[at, :, layout.pose_columns[readings.position]] = blocks.by_pose.transpose(0, 2, 1)
     if blocks.by_offset is not None:
         shared[at, :, layout.offset_columns[readings.probe]] = blocks.by_offset.transpose(0, 2, 1)
+    if blocks.by_influence is not None:
+        shared[:, :, layout.influences] = blocks.by_influence
     return shared[:, :, :-1], blocks.by_ball

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..computing.rounding import comparable
 from ..design.arrays import Design, State, nominal_state
+from ..design.observations.readings import seen_places
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
 from .spheres import fit_sphere
@@ -71,7 +72,7 @@ def _mean_locations(design: Design, x: Array) -> Array:
     readings = design.readings
     total = np.zeros((len(design.positions.names), len(design.balls.names), design.dimension))
     count = np.zeros(total.shape[:2])
-    np.add.at(total, (readings.position, readings.ball), x + design.probes.offsets[readings.probe])
+    np.add.at(total, (readings.position, readings.ball), seen_places(design, readings, x))
     np.add.at(count, (readings.position, readings.ball), 1.0)
     with np.errstate(invalid="ignore"):
         return np.asarray(total / count[:, :, None])

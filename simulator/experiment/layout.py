@@ -32,6 +32,7 @@ from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
+from .influences import with_influences
 from .length_standards import standard_lengths
 from .model import Experiment, Prior
 
@@ -93,7 +94,7 @@ def lay_out(experiment: Experiment) -> Design:
     # A pivot has a place; how the bar turns about it is what the readings say.
     held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     priors = _priors(experiment, held, len(model.parameters))
-    return Design(
+    design = Design(
         model,
         machine,
         Probes(
@@ -117,6 +118,7 @@ def lay_out(experiment: Experiment) -> Design:
             tuple(task.target for task in tasks),
         ),
     )
+    return with_influences(design, experiment)
 
 
 def _free(experiment: Experiment) -> Flags:

@@ -27,6 +27,7 @@ from .checks import (
     check_true_machine,
     check_use,
 )
+from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, target_of
 from .model import Experiment
 from .modules import refused_modules
@@ -203,6 +204,7 @@ def _build(
     check_radii(calibrations, problems)
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, references)
+    influences = resolve_influences(sections, named, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
     evaluation = resolve_evaluation(sections, machine, probes, references)
@@ -232,6 +234,7 @@ def _build(
         builder=partial(_built, source=source, name=name, planning=planning),
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
+        influences=influences,
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ..design.influences.protocol import InfluenceSettings
 from ..design.lookup import Floats, Indices
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
@@ -213,6 +214,7 @@ class Experiment:
     builder: Callable[[Node], Experiment]
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
+    influences: tuple[InfluenceSettings, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
+from ..design.influences.kinds import AnyInfluence
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
@@ -179,6 +180,9 @@ class ExperimentSettings(Settings):
     )
     priors: NonEmpty[PriorSettings] | None = Field(
         None, description="prior knowledge of machine errors and poses"
+    )
+    influences: NonEmpty[AnyInfluence] | None = Field(
+        None, description="what disturbs readings: temperature"
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 from pydantic import TypeAdapter, ValidationError
 
+from ..design.influences.kinds import AnyInfluence
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings
 from ..inputs.messages import Steps
@@ -29,6 +30,7 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
     "positions": (Sequence, PositionSettings),
     "calibration": (Sequence, CalibrationSettings),
     "priors": (Sequence, PriorSettings),
+    "influences": (Sequence, AnyInfluence),
 }
 
 # Sections that files complete which they name, and which may say something else next time.

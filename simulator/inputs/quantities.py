@@ -59,8 +59,8 @@ TEMPERATURE_UNITS: Mapping[str, Fraction] = {
     "mK": Fraction(1, 10**3),
 }
 EXPANSION_UNITS: Mapping[str, Fraction] = {
-    f"{ratio}/{degree}": RATIO_UNITS[ratio]
-    for ratio in ("um/m", "ppm", "mm/m", "m/m")
+    f"{ratio}/{degree}": RATIO_UNITS.get(ratio, Fraction(1))
+    for ratio in ("um/m", "ppm", "mm/m", "m/m", "1")
     for degree in ("K", "degC")
 }
 BENDING_UNITS: Mapping[str, Fraction] = {
@@ -105,7 +105,7 @@ EXAMPLES: Mapping[str, str] = {
 LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
-QUANTITY = re.compile(rf"({NUMBER})\s*([^\s0-9.+-].*)?")
+QUANTITY = re.compile(rf"({NUMBER})\s*((?:(?<=\s)1/|[^\s0-9.+-]).*)?")
 CONSTANT_AND_DIVISOR = re.compile(rf"([^+]*(?:[eE]\+[^+]*)?)\+\s*L\s*/\s*({NUMBER})\s*")
 CONSTANT_AND_RATIO = re.compile(
     rf"\s*([+-]?[^+]*(?:[eE]\+[^+]*)?)\+\s*({NUMBER}\s*[^\s0-9+-][^+]*)"
@@ -250,6 +250,20 @@ def parse_positive_temperature_difference(value: object) -> float:
     :raises QuantityError: not a number with K or degC, or not above zero.
     """
     return _positive(value, parse_temperature_difference(value), "temperature difference")
+
+
+def parse_temperature(value: object) -> float:
+    """Read a temperature and return it in degrees Celsius.
+
+    :raises QuantityError: not a number with degC.
+
+    >>> parse_temperature("20.3 degC")
+    20.3
+    """
+    found = parse_temperature_difference(value)
+    if not str(value).strip().endswith("degC") or found < -273.15:
+        raise QuantityError(f'"{value}" is no temperature; write for example "20.3 degC"')
+    return found
 
 
 def parse_expansion(value: object) -> float:
@@ -643,6 +657,11 @@ PositiveTemperatureDifference = Annotated[
     float,
     PlainValidator(parse_positive_temperature_difference),
     _schema("temperature difference", "0.5 degC"),
+]
+Temperature = Annotated[
+    float,
+    PlainValidator(parse_temperature),
+    WithJsonSchema({"type": "string", "pattern": f"^ *{NUMBER} *degC$", "examples": ["20.3 degC"]}),
 ]
 Expansion = Annotated[
     float, PlainValidator(parse_expansion), _schema("thermal expansion", "11 um/m/degC")

@@ -63,14 +63,16 @@ def read_table(
     problems: list[Message] | None = None,
     defaults: Mapping[str, str] = MappingProxyType({}),
     absent: float = 0.0,
+    units: Mapping[str, Mapping[str, Fraction]] = MappingProxyType({}),
 ) -> tuple[FileRow, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
     unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are
-    ``absent``; ``defaults`` tell what required columns of text say where they are missing. Empty
-    lines and lines that begin with # are skipped. Messages about rows are added to ``problems`` if
-    it is given, so that the caller can say more at once; a length that is wrong is then NaN.
+    ``absent``; those of ``units`` are no lengths and have units of their own; ``defaults`` tell
+    what required columns of text say where they are missing. Empty lines and lines that begin with
+    # are skipped. Messages about rows are added to ``problems`` if it is given, so that the caller
+    can say more at once; a length that is wrong is then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
         a number, there are no rows; all problems of the file at once.
@@ -84,7 +86,7 @@ def read_table(
             [Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")]
         )
     places, factors = _columns(
-        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example
+        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
     )
     count = len(places)
     places += [name for name in defaults if name not in places]
@@ -282,29 +284,34 @@ def _columns(
     optional: Sequence[str],
     defaults: Mapping[str, str],
     example: str,
+    units: Mapping[str, Mapping[str, Fraction]],
 ) -> tuple[list[str], dict[str, Fraction]]:
     """Return the names of the columns without their units, and the factor of each unit."""
     messages: list[Message] = []
     names: list[str] = []
     factors: dict[str, Fraction] = {}
     for place, cell, name, unit in header_cells(mark, header, example):
+        of_name = units.get(name, LENGTH_UNITS)
         if cell in texts:
             name = cell
-        elif name in (*lengths, *optional) and unit in LENGTH_UNITS:
-            factors[name] = LENGTH_UNITS[unit]
+        elif name in (*lengths, *optional) and unit in of_name:
+            factors[name] = of_name[unit]
         elif name in (*lengths, *optional):
             messages.append(
-                place.message(
-                    "", f'unknown unit in the column "{cell}"; {hint(unit, LENGTH_UNITS)}'
-                )
+                place.message("", f'unknown unit in the column "{cell}"; {hint(unit, of_name)}')
             )
         elif cell in (*lengths, *optional):
-            name = cell
-            messages.append(
-                place.message("", f'the column "{cell}" has no unit; write for example {cell}_mm')
-            )
+            name, example = cell, next(iter(units.get(cell, {"mm": 1})))
+            text = f'the column "{cell}" has no unit; write for example {cell}_{example}'
+            messages.append(place.message("", text))
         else:
-            known = [*texts, *(f"{length}_mm" for length in (*lengths, *optional))]
+            known = [
+                *texts,
+                *(
+                    f"{one}_{next(iter(units.get(one, {'mm': 1})))}"
+                    for one in (*lengths, *optional)
+                ),
+            ]
             messages.append(
                 place.message("", f'unknown column "{shorten(cell)}"; {hint(cell, known)}')
             )

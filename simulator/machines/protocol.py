@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Unit = Literal["m", "rad", "1"]
+Unit = Literal["m", "rad", "1", "K", "1/K"]
 
 
 @dataclass(frozen=True)
 class Parameter:
     """A named parameter of an error model.
 
-    `unit` is the unit of its value: metres, radians, or 1 for a ratio. `function` is the error it
+    `unit` is the unit of its value: metres, radians, 1 for a ratio, or those of influence
+    quantities. `function` is the error it
     belongs to, by its ISO 230-1 name where it has one, and `meaning` says in words what that error
     is. `effect` is the displacement of a corrected point, in metres per `unit`, that the parameter
     causes where in the volume it causes most: it makes parameters of different kinds comparable.

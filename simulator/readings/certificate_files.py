@@ -119,6 +119,7 @@ def drawn_values(
         true += item.true_values(truth.balls, first_ball[item.artefact]).tolist()
     # Those of offsets come last in the design, and first here.
     priors = design.of(Priors).true_values(design, truth, model)
+    priors = priors[design.of(Priors).of_influence < 0]
     true += [*priors[len(experiment.priors) :], *priors[: len(experiment.priors)]]
     if generator is None:
         return np.array(true, float)

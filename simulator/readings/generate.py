@@ -6,7 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design, Readings, State, locations, nominal_state, reading_uncertainties
+from ..design.arrays import (
+    Design,
+    Readings,
+    State,
+    influence_shifts,
+    locations,
+    nominal_state,
+    reading_uncertainties,
+)
 from ..design.observations.joint_lengths import FLAT
 from ..design.observations.lengths import Lengths
 from ..machines.protocol import Array, ErrorModel, Integers
@@ -45,11 +53,28 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
     return x
 
 
+def true_readings(
+    design: Design, truth: State, readings: Readings, model: ErrorModel | None = None
+) -> Array:
+    """Scale readings (m, d) without noise, of a true machine with another error model than the
+    design's if one is given.
+
+    :raises NoReadingError: as `scale_readings`.
+    """
+    model = model or design.model
+    p, true = truth.probes[readings.probe], locations(design, truth, readings)
+    x = scale_readings(model, true, truth.a, p)
+    # Each time what the scales say decides a ten-thousandth of the shift at the most.
+    for _ in range(5 if design.influences else 0):
+        shift, _ = influence_shifts(design, truth, readings, x)
+        x = scale_readings(model, true + shift, truth.a, p)
+    return x
+
+
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
     readings = design.readings.expanded()
-    p = truth.probes[readings.probe]
-    return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
+    return readings, true_readings(design, truth, readings)
 
 
 def noisy_readings(
@@ -62,6 +87,15 @@ def noisy_readings(
     return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(
         design, readings
     )
+
+
+def true_influences(design: Design, generator: np.random.Generator) -> Array:
+    """True values (p,) of influence quantities, drawn from what is stated of them; of those that
+    are unknown, the stated values.
+    """
+    u = np.array([one.uncertainty for one in design.influence_parameters], float)
+    errors = np.where(np.isfinite(u), u, 0.0) * generator.standard_normal(len(u))
+    return np.asarray(design.influence_values + errors)
 
 
 # In one piece: random numbers are drawn in an order on which what a seed gives depends.

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ..design.arrays import Design
 from ..design.observations.lengths import Lengths
 from ..design.observations.priors import Priors
+from ..design.observations.readings import seen_places
 from ..estimation.consensus import consensus_motion, distances
 from ..estimation.initial import initial_state
 from ..geometry.motions import fit_motion
@@ -104,7 +105,7 @@ def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], li
 
 def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
-    seen = x + design.probes.offsets[readings.probe]
+    seen = seen_places(design, readings, x)
     pitch = _pitches(design)
     found, positions = _against_drawing(design, seen, pitch)
     lost = np.isin(readings.position, [wrong.position for wrong in positions])

@@ -93,8 +93,9 @@ def read_readings(
     The probe's column may be left out where there is one probe only. An optional column u, with a
     unit as in u_um, states the standard uncertainty of each co-ordinate of a reading; without it a
     reading has the uncertainty that the design plans for it, and one that is not planned the
-    machine's repeatability. A reading stands in the file no more often than the design plans it;
-    one that is not planned, once. Unless `every_ball` has to be read, some may be missing.
+    machine's repeatability. Influence quantities have further columns. A reading stands in the file
+    no more often than the design plans it; one that is not planned, once. Unless `every_ball` has
+    to be read, some may be missing.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
@@ -103,7 +104,10 @@ def read_readings(
     # One probe need not be named.
     defaults = {"probe": design.probes.names[0]} if len(design.probes.names) == 1 else {}
     messages: list[Message] = []
-    rows = read_table(path, texts, AXES[:d], ["u"], messages, defaults, absent=np.nan)
+    units = {name: one for kind in design.influences for name, one in kind.columns.items()}
+    rows = read_table(
+        path, texts, AXES[:d], ["u", *units], messages, defaults, absent=np.nan, units=units
+    )
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
@@ -114,6 +118,10 @@ def read_readings(
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     x, stated = lengths[:, :d], lengths[:, d]
+    beside = None
+    if design.influences:
+        order = {"order": np.arange(len(rows), dtype=float)}
+        beside = order | dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     _refuse_far_outside(rows, x, design)
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     uncertainty = (
@@ -121,7 +129,7 @@ def read_readings(
         if has_uncertainty
         else _planned_uncertainty(design, readings)
     )
-    readings = replace(readings, uncertainty=uncertainty)
+    readings = replace(readings, uncertainty=uncertainty, beside=beside)
     missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:

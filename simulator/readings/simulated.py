@@ -18,6 +18,7 @@ from .generate import (
     noisy_readings,
     on_true_machine,
     true_artefacts,
+    true_influences,
 )
 
 
@@ -59,7 +60,8 @@ def simulated_readings(
         if generator is None:
             readings, x = exact_readings(on_truth, truth)
         else:
-            truth = replace(truth, balls=true_artefacts(design, generator))
+            balls = true_artefacts(design, generator)
+            truth = replace(truth, balls=balls, influences=true_influences(design, generator))
             readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
         raise ExperimentError(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.experiment.layout import lay_out
@@ -91,11 +91,26 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
         )
         if blocks.by_offset is not None:
             rows = rows + blocks.by_offset @ with_held[layout.offset_columns[readings.probe]]
+        if blocks.by_influence is not None:
+            rows = rows + blocks.by_influence @ _of_influences(base, extended, null)
         if change.of is None:
             rows = _without(rows, blocks.by_pose)
         else:
             rows = rows + blocks.by_pose @ with_held[layout.pose_columns[names.index(change.of)]]
         found[change] = _triangle(rows.reshape(-1, rows.shape[2]))
+    return found
+
+
+def _of_influences(base: Examined, extended: Design, null: Array) -> Array:
+    """How null directions (s, k) change influence quantities (p, k) of a design with more
+    positions; those of the latter alone stay.
+    """
+    own = null[base.at.layout.influences]
+    names = [one.name for one in base.at.design.influence_parameters]
+    found = np.zeros((len(extended.influence_parameters), null.shape[1]))
+    for k, one in enumerate(extended.influence_parameters):
+        if one.name in names:
+            found[k] = own[names.index(one.name)]
     return found
 
 

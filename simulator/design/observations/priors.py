@@ -10,6 +10,7 @@ import numpy as np
 from ...geometry.motions import vector_from_rotation, vector_rate
 from ...machines.protocol import Array, ErrorModel, Integers, Unit
 from ..arrays import Design, Observations, Rows, State, Words
+from ..objects import Flags
 from ..parameters import shared_layout
 
 
@@ -18,8 +19,9 @@ class Priors(Observations):
     """Prior knowledge of shared parameters; arrays (m,), metres, radians or ratios.
 
     Each row is about a pose parameter (`position` and `component`, by place among origin and
-    rotation), about a probe offset (`probe` and `component`), or about a linear function of the
-    model's parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
+    rotation), about a probe offset (`probe` and `component`), about a parameter of an influence
+    quantity (`influence`, None where there are none), or about a linear function of the model's
+    parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
     stated as co-ordinates, pose angles as deviations from the nominal pose.
     """
 
@@ -33,6 +35,17 @@ class Priors(Observations):
     by_model: Array
     value: Array
     uncertainty: Array
+    influence: Integers | None = None
+
+    @property
+    def of_influence(self) -> Integers:
+        """The parameter of influence quantities (m,) that each is about, -1 without one."""
+        return np.full(len(self), -1) if self.influence is None else self.influence
+
+    @property
+    def of_model(self) -> Flags:
+        """Which (m,) are about the error model."""
+        return (self.position < 0) & (self.probe < 0) & (self.of_influence < 0)
 
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
         weight = 1.0 / self.uncertainty
@@ -46,9 +59,8 @@ class Priors(Observations):
         """Priors about an error model that is not the true machine's stay what they are."""
         if model == design.model:
             return self._values(design, truth)
-        of_model = (self.position < 0) & (self.probe < 0)
         elsewhere = replace(truth, a=np.zeros(self.by_model.shape[1]))
-        return np.where(of_model, self.value, self._values(design, elsewhere))
+        return np.where(self.of_model, self.value, self._values(design, elsewhere))
 
     def weights(self, design: Design, state: State) -> Array:
         """Largest derivatives (m,) by a parameter, in its effect."""
@@ -69,6 +81,8 @@ class Priors(Observations):
             return "rad" if self.component[k] >= design.dimension else "m"
         if self.probe[k] >= 0:
             return "m"
+        if self.of_influence[k] >= 0:
+            return design.influence_parameters[self.of_influence[k]].unit
         used = np.flatnonzero(self.by_model[k])
         return design.model.parameters[int(used[0])].unit if len(used) else "1"
 
@@ -78,6 +92,8 @@ class Priors(Observations):
         axis = np.minimum(self.component, design.dimension - 1)
         of_probes = state.probes[self.probe, axis]
         of_model = self.by_model @ state.a if len(self) else np.zeros(0)
+        if self.influence is not None and len(state.influences):
+            of_model = np.where(self.influence >= 0, state.influences[self.influence], of_model)
         return np.where(
             self.position >= 0, of_poses, np.where(self.probe >= 0, of_probes, of_model)
         )
@@ -91,6 +107,8 @@ class Priors(Observations):
         derivative[:, layout.model] = self.by_model
         rows = np.flatnonzero(self.probe >= 0)
         derivative[rows, layout.offset_columns[self.probe[rows], self.component[rows]]] = 1.0
+        rows = np.flatnonzero(self.of_influence >= 0)
+        derivative[rows, layout.influences.start + self.of_influence[rows]] = 1.0
         rows = np.flatnonzero((self.position >= 0) & (self.component < d))
         derivative[rows, layout.pose_columns[self.position[rows], self.component[rows]]] = 1.0
         rows = np.flatnonzero((self.position >= 0) & (self.component >= d))

@@ -13,7 +13,15 @@ import numpy as np
 
 from ...geometry.motions import pose_size
 from ...machines.protocol import Array, ErrorModel
-from ..arrays import Design, Readings, State, locations, reading_uncertainties
+from ..arrays import (
+    Design,
+    Readings,
+    State,
+    influence_shifts,
+    locations,
+    nominal_state,
+    reading_uncertainties,
+)
 
 # Metres: of the size of probe offsets.
 OFFSET_STEP = 0.1
@@ -24,8 +32,8 @@ class ReadingBlocks:
     """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m,
     d, n).
 
-    `by_offset` (m, d, d) is the derivative by the probe's offset, None where no offset is a
-    parameter.
+    `by_offset` (m, d, d) is the derivative by the probe's offset and `by_influence` (m, d, p) that
+    by influence quantities, None where these are no parameters.
     """
 
     residual: Array
@@ -33,11 +41,22 @@ class ReadingBlocks:
     by_pose: Array
     by_model: Array
     by_offset: Array | None = None
+    by_influence: Array | None = None
 
 
 def expected_readings(design: Design, state: State, readings: Readings) -> Array:
     """Scale readings (m, d) of a machine without errors, true location less probe offset."""
     return locations(design, state, readings) - state.probes[readings.probe]
+
+
+def seen_places(design: Design, readings: Readings, x: Array) -> Array:
+    """Where scale readings x (m, d) were made on a machine without errors (m, d), influence
+    quantities at their stated values.
+    """
+    seen = x + design.probes.offsets[readings.probe]
+    if design.influences:
+        seen = seen - influence_shifts(design, nominal_state(design), readings, x)[0]
+    return np.asarray(seen)
 
 
 def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
@@ -90,11 +109,18 @@ def reading_blocks(
     arm = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
     true = arm + state.origins[readings.position]
     weight = reading_weights(design, readings)
+    shift, by_influence = None, None
+    if design.influences:
+        shift, by_influence = influence_shifts(
+            design, state, readings, true - p if x is None else x
+        )
+        by_influence *= -weight[:, :, None]
     if x is None:
         x = true - p
         residual = np.zeros_like(x)
     else:
-        residual = weight * (x + design.model.error(x, state.a, p) - true)
+        off = x + design.model.error(x, state.a, p) - true
+        residual = weight * (off if shift is None else off - shift)
     by_model = design.model.jacobian(x, state.a, p)
     by_model *= weight[:, :, None]
     by_pose = np.zeros((len(x), d, pose_size(d)), np.result_type(arm, float))
@@ -103,4 +129,5 @@ def reading_blocks(
     by_offset = None
     if design.probes.free.any():
         by_offset = weight[:, :, None] * offset_sensitivity(design.model, x, state.a, p)
-    return ReadingBlocks(residual, -weight[:, :, None] * rotation, by_pose, by_model, by_offset)
+    by_ball = -weight[:, :, None] * rotation
+    return ReadingBlocks(residual, by_ball, by_pose, by_model, by_offset, by_influence)

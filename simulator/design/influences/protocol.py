@@ -1,0 +1,124 @@
+"""What a kind of influence quantity is: parameters with what is known of them, and what they add to
+readings.
+
+A reading obeys T(x, a, p) = R y + o + s(e) + noise, where s is linear in the influence parameters
+e about their stated values. The derivatives of s by poses, balls and readings are neglected: they
+are smaller than those of R y by the ratio of s to the places themselves, 1e-4 at most.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from ...inputs.messages import Steps
+from ...inputs.settings import Settings
+from ...machines.protocol import Array, Integers, Unit
+from ..lookup import References
+from ..objects import Artefacts, Balls, Machine, Positions, Probes, Readings
+
+
+@dataclass(frozen=True)
+class InfluenceParameter:
+    """A parameter of an influence quantity: `value` with its standard `uncertainty`, both in
+    `unit`.
+
+    An uncertainty of zero makes it a constant, an infinite one a free parameter. `effect` is what
+    a unit of it displaces readings by, in metres, where it does most. `position` is the index of
+    the position that it is of alone, -1 where it is of several.
+    """
+
+    name: str
+    unit: Unit
+    value: float
+    uncertainty: float
+    effect: float
+    position: int = -1
+
+
+@dataclass(frozen=True)
+class DesignParts:
+    """What an influence quantity is laid out for; `readings` are those planned."""
+
+    machine: Machine
+    probes: Probes
+    artefacts: Artefacts
+    balls: Balls
+    positions: Positions
+    readings: Readings
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """Readings (m,) that are disturbed, where they are made.
+
+    `ball`, `position` and `probe` are indices (m,), `x` (m, d) the scale readings, `places` (m, d)
+    those of the balls in their artefact's frame, `rotations` (m, d, d) from there into the
+    machine's axes, and `offsets` (m, d) of the probes' tips, all in metres. `beside` has further
+    values (m,) of the readings by the names of their columns, `order` among them.
+    """
+
+    ball: Integers
+    position: Integers
+    probe: Integers
+    x: Array
+    places: Array
+    rotations: Array
+    offsets: Array
+    beside: Mapping[str, Array]
+
+    @property
+    def arms(self) -> Array:
+        """Places (m, d) of the balls about the origin of their artefact, along the machine's
+        axes.
+        """
+        return np.asarray(np.einsum("mij,mj->mi", self.rotations, self.places))
+
+    def column(self, name: str) -> Array:
+        """Values (m,) of a column, NaN where a reading has none."""
+        return self.beside.get(name, np.full(len(self.ball), np.nan))
+
+
+class Influence(ABC):
+    """An influence quantity laid out for a design; a frozen dataclass of arrays.
+
+    Where it is `in_order` it depends on when readings are made, which no plan knows.
+    """
+
+    in_order: ClassVar[bool] = False
+
+    @property
+    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+        """Columns of a file of readings that it asks for, with the units that each may have; what
+        a reading has there is a `column` of `Disturbed`.
+        """
+        return {}
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[InfluenceParameter, ...]:
+        """Its parameters (p,), constants among them."""
+
+    @abstractmethod
+    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
+        """What is added to the locations of readings at the stated values (m, d), and its
+        derivative by the parameters (m, d, p), in metres.
+        """
+
+
+class InfluenceSettings(Settings):
+    """Settings of one kind of influence quantity, with a `kind` of its own."""
+
+    def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
+        """Report what is wrong with them where `positions` are names with those of their
+        artefacts.
+        """
+
+    def influence(self, design: DesignParts) -> Influence:
+        """The influence quantity in a design."""
+        raise NotImplementedError

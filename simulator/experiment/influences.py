@@ -1,0 +1,73 @@
+"""Influence quantities of an experiment: what is wrong with them, and what they are in a design."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..design.arrays import Design
+from ..design.influences.protocol import DesignParts, InfluenceSettings
+from ..design.lookup import References
+from ..design.observations.priors import Priors
+from .model import Experiment, Position
+from .structure import Sections
+
+
+def resolve_influences(
+    sections: Sections, positions: dict[int, Position], references: References
+) -> tuple[InfluenceSettings, ...]:
+    """Return the influence quantities; what is wrong goes to the problems."""
+    placed = {one.name: one.artefact for one in positions.values()}
+    found: list[InfluenceSettings] = []
+    standards = [
+        name
+        for name in dict.fromkeys(placed.values())
+        if references.artefacts[name].role != "plate"
+    ]
+    for i, settings in sections.entries("influences").items():
+        steps = ("influences", i)
+        text = (
+            f'"{standards[0]}" is a length standard, and influence quantities are of plates only;'
+            " give it role: plate, or remove influences"
+            if standards
+            else ""
+        )
+        if references.require(not text, steps, text):
+            settings.check(steps, placed, references)
+            found.append(settings)
+    return tuple(found)
+
+
+def with_influences(design: Design, experiment: Experiment) -> Design:
+    """The design with the influence quantities of its experiment, and what is known of them."""
+    if not experiment.influences:
+        return design
+    order = np.arange(len(design.readings), dtype=float)
+    readings = replace(design.readings, beside={"order": order})
+    parts = DesignParts(
+        design.machine,
+        design.probes,
+        design.artefacts,
+        design.balls,
+        design.positions,
+        readings,
+    )
+    influences = tuple(one.influence(parts) for one in experiment.influences)
+    disturbed = replace(design, readings=readings, influences=influences)
+    parameters = disturbed.influence_parameters
+    known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
+    priors, none = design.of(Priors), np.full(len(known), -1)
+    stated = [parameters[k] for k in known]
+    return disturbed.observed(
+        Priors(
+            (*priors.names, *(one.name for one in stated)),
+            np.append(priors.position, none),
+            np.append(priors.probe, none),
+            np.append(priors.component, none),
+            np.concatenate([priors.by_model, np.zeros((len(known), priors.by_model.shape[1]))]),
+            np.append(priors.value, [one.value for one in stated]),
+            np.append(priors.uncertainty, [one.uncertainty for one in stated]),
+            np.append(np.full(len(priors), -1), known),
+        )
+    )

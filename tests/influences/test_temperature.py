@@ -1,0 +1,520 @@
+"""Temperature of artefacts and scales against what is written down beside the program: the
+physical model with all its products, in dense computations and in simulated campaigns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+import yaml
+from ballplate.estimators.estimator_choice import fit_readings
+from ballplate.montecarlo.experiments import trials
+from ballplate.rank.verdict import verdict
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.estimation.functions import linear_functions
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.generate import scale_readings
+from ballplate.simulator.readings.reading_files import observe, read_readings, write_readings
+from ballplate.simulator.readings.simulated import simulated_readings
+from ballplate.uncertainty.quantities import QUANTITIES
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from tests.reference import dense
+
+Real = NDArray[np.float64]
+TOP = Path(__file__).parents[2]
+
+PLATE = {"value": 11.5e-6, "u": 0.6e-6}
+SCALE = {"value": 8e-6, "u": 0.3e-6}
+# Above 20 degC, in the six positions; uncertainties of each, and of a sensor, in K.
+PLATES, SCALES = [1.5, 1.2, 1.8, 1.5, 1.5, 1.5], [0.8, 0.5, 0.8, 0.8, 1.1, 0.8]
+EACH, SENSOR = 0.05, 0.03
+STATED = {
+    "kind": "temperature",
+    "artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "0.6 um/m/K"},
+    "artefact_temperature": {
+        "value": "21.5 degC",
+        "standard_uncertainty": "50 mK",
+        "sensor_uncertainty": "30 mK",
+    },
+    "scale_expansion": {"value": "8 ppm/K", "standard_uncertainty": "0.3 um/m/degC"},
+    "scale_temperature": {
+        "value": "20.8 degC",
+        "standard_uncertainty": "50 mK",
+        "sensor_uncertainty": "30 mK",
+    },
+    "positions": {
+        "z high": {"artefact": "21.2 degC", "scales": "20.5 degC"},
+        "x low": {"artefact": "21.8 degC"},
+        "y low": {"scales": "21.1 degC"},
+    },
+}
+
+
+def file_with(folder: Path, influences: list[dict[str, Any]] | None, **changed: Any) -> Experiment:
+    """The first example with influence quantities, a smaller plate and fewer coefficients."""
+    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
+    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    told["true_machine"] = {"kind": "zero"}
+    told["evaluation"]["points"] = {"random": 20, "seed": 3}
+    told["sigma"] = "given"
+    told |= {"influences": influences} if influences else {}
+    path = folder / "file.yaml"
+    path.write_text(yaml.safe_dump(told | changed), encoding="utf-8")
+    return load(path)[0]
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return file_with(tmp_path_factory.mktemp("drawn"), [STATED])
+
+
+def test_the_parameters_are_those_stated(drawn: Experiment) -> None:
+    found = [(p.name, p.unit, p.value, p.uncertainty) for p in lay_out(drawn).influence_parameters]
+    places = ["z low", "z high", "x low", "x high", "y low", "y high"]
+    assert found == [
+        ("expansion of plate", "1/K", 11.5e-6, 0.6e-6),
+        ("sensor error of plate", "K", 0.0, SENSOR),
+        *((f"temperature error of plate in {place}", "K", 0.0, EACH) for place in places),
+        ("expansion of the scales", "1/K", 8e-6, 0.3e-6),
+        ("sensor error of the scales", "K", 0.0, SENSOR),
+        *((f"temperature error of the scales in {place}", "K", 0.0, EACH) for place in places),
+    ]
+    assert lay_out(drawn).parameter_count == len(linearise(lay_out(drawn)).layout) + 27
+
+
+# The parameters in their order: expansion, sensor and six temperatures, of plate and of scales.
+EXPECTED = np.array([PLATE["value"], 0.0, *[0.0] * 6, SCALE["value"], 0.0, *[0.0] * 6])
+SPREAD = np.array([PLATE["u"], SENSOR, *[EACH] * 6, SCALE["u"], SENSOR, *[EACH] * 6])
+
+
+def expanded(arms: Any, x: Any, position: Any, e: Any) -> Any:
+    """What the temperatures add to locations, by the law itself, with parameters e (16,)."""
+    of_plate = e[0] * (np.array(PLATES)[position] + e[1] + e[2:8][position])
+    of_scales = e[8] * (np.array(SCALES)[position] + e[9] + e[10:][position])
+    return of_plate[:, None] * arms - of_scales[:, None] * x
+
+
+@dataclass(frozen=True)
+class Dense:
+    """The dense problem of a design with temperatures, as drawn; its last 16 parameters are
+    EXPECTED.
+    """
+
+    of: dense.Problem
+
+    def rows(self, step: Any) -> Any:
+        problem, readings = self.of, self.of.design.readings
+        inner = step[:-16]
+        found = dense.residuals(problem, inner)
+        balls, rotations, _, _ = dense.unpack(problem, inner)
+        arms = np.einsum("mij,mj->mi", rotations[readings.position], balls[readings.ball])
+        e = EXPECTED + step[-16:]
+        shift = expanded(arms, problem.scales, readings.position, e)
+        m = 3 * len(readings)
+        found[:m] = found[:m] - (shift / problem.design.machine.repeatability).ravel()
+        return np.concatenate([found, step[-16:] / SPREAD])
+
+    def spread(self) -> dense.Spread:
+        count = self.of.parameters + 16
+        return dense.spread(dense.jacobian(self.rows, count))
+
+
+def plain(design: Design) -> Design:
+    """The design without its influence quantities and what is known of them."""
+    priors = design.of(Priors)
+    none = replace(
+        priors,
+        **{
+            name: value[:0]
+            for name, value in vars(priors).items()
+            if name != "influence" and value is not None
+        },
+        influence=None,
+    )
+    readings = replace(design.readings, beside=None)
+    return replace(design, influences=(), readings=readings).observed(none)
+
+
+def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -> None:
+    design = lay_out(drawn)
+    of = dense.planned(plain(design), 3, 3)
+    found, at = Dense(of).spread(), linearise(design)
+    assert at.deficiency == found.deficiency == 0
+    widened = {
+        symbol: found.of(np.pad(dense.jacobian(function, of.parameters), ((0, 0), (0, 16))))
+        for symbol, function in dense.quantities(of).items()
+    }
+    for symbol, expected in widened.items():
+        (functions,) = QUANTITIES[symbol].functions(design, at.layout)
+        # The program neglects derivatives of the shift by places, of 2e-5.
+        np.testing.assert_allclose(
+            at.uncertainty(linear_functions(at, functions)), expected, rtol=1e-4
+        )
+    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
+    np.testing.assert_allclose(own, np.sqrt(np.diag(found.covariance))[-16:], rtol=1e-4)
+    # Of no use if temperatures had no part in them.
+    without = dense.standard_uncertainties(of)["U6"].mean()
+    assert widened["U6"].mean() > 1.1 * without
+
+
+def test_the_derivative_is_that_of_the_law(drawn: Experiment) -> None:
+    design = lay_out(drawn)
+    state, readings = nominal_state(design), design.readings
+    x = np.random.default_rng(3).random((len(readings), 3))
+    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    blocks = reading_blocks(design, state, readings, x)
+    assert blocks.by_influence is not None
+    for k in range(16):
+        step = 1e-30j * np.eye(16)[k]
+        slope = expanded(arms, x, readings.position, EXPECTED + step).imag / 1e-30
+        expected = -slope / design.machine.repeatability
+        np.testing.assert_allclose(blocks.by_influence[:, :, k], expected, rtol=1e-12, atol=1e-9)
+    undisturbed = reading_blocks(plain(design), state, readings, x).residual
+    shift = expanded(arms, x, readings.position, EXPECTED) / design.machine.repeatability
+    np.testing.assert_allclose(blocks.residual, undisturbed - shift, rtol=0, atol=1e-6)
+
+
+def test_a_distance_is_as_uncertain_as_its_plate_expands(tmp_path: Path) -> None:
+    """On a perfect machine whose scale is known, L u(b) t is all that is left of a distance."""
+    temperature = {
+        "kind": "temperature",
+        "artefact_expansion": {"value": "10 um/m/K", "standard_uncertainty": "1 um/m/K"},
+        "artefact_temperature": {"value": "23 degC"},
+    }
+    told = {
+        "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": "1e-3 nm"},
+        "calibration": [],
+        "priors": [
+            {"parameter": name, "standard_uncertainty": "1e-3 nm"}
+            for name in ("EXX", "EYX", "EZX", "EXY", "EYY", "EZY", "EXZ", "EYZ", "EZZ")
+        ],
+    }
+    design = lay_out(file_with(tmp_path, [temperature], **told))
+    at = linearise(design)
+    (functions,) = QUANTITIES["U5"].functions(design, at.layout)
+    first, second = np.triu_indices(9, 1)
+    length = np.linalg.norm(design.balls.places[first] - design.balls.places[second], axis=1)
+    np.testing.assert_allclose(
+        at.uncertainty(linear_functions(at, functions)), length * 3.0 * 1e-6, rtol=1e-3
+    )
+
+
+def campaign(design: Design, generator: np.random.Generator) -> tuple[Design, State, Real]:
+    """A campaign by the law itself: truth drawn from the statement, certified distances and
+    readings; the design with the certificate's values, the true places, and the readings.
+    """
+    state, readings = nominal_state(design), design.readings
+    e = EXPECTED + SPREAD * generator.standard_normal(16)
+    p = state.probes[readings.probe]
+    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    true = arms + state.origins[readings.position]
+    x = true - p
+    for _ in range(6):
+        x = scale_readings(design.model, true + expanded(arms, x, readings.position, e), state.a, p)
+    x += design.machine.repeatability * generator.standard_normal(x.shape)
+    given = design.of(CalibratedDistances)
+    wrong = given.value + given.uncertainty * generator.standard_normal(len(given))
+    return design.observed(given.given(value=wrong)), state, x
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Share of distances within 1.96 uncertainties, root mean square of their errors in
+    uncertainties, and share of fits whose S^2 is beyond its 95 % limit.
+    """
+
+    within: dict[str, float]
+    size: dict[str, float]
+    noticed: float
+
+
+def coverage(experiment: Experiment, told: Design, count: int) -> Shares:
+    """Campaigns of an experiment, fitted as the design `told` has them."""
+    design = lay_out(experiment)
+    generator = np.random.default_rng(20261122)
+    ratios: dict[str, list[Real]] = {"U5": [], "U6": []}
+    noticed = 0
+    for _ in range(count):
+        certified, _, x = campaign(design, generator)
+        one = told.observed(certified.of(CalibratedDistances))
+        solution = estimate(one, x)
+        assert solution.status == "converged"
+        at = linearised_fit(one, solution)
+        noticed += int(
+            solution.factor.sum_of_squares
+            > chi2.isf(0.05, one.observation_count - one.parameter_count)
+        )
+        for symbol, errors in ratios.items():
+            (functions,) = QUANTITIES[symbol].functions(one, at.layout)
+            places = functions.places.at(one, at.state)
+            true = functions.places.at(one, nominal_state(one))
+            first, second = np.triu_indices(len(places), 1)
+            error = np.linalg.norm(places[first] - places[second], axis=1) - np.linalg.norm(
+                true[first] - true[second], axis=1
+            )
+            errors.append(error / at.uncertainty(linear_functions(at, functions)))
+    both = {symbol: np.array(one) for symbol, one in ratios.items()}
+    return Shares(
+        {symbol: float((np.abs(one) < 1.96).mean()) for symbol, one in both.items()},
+        {symbol: float(np.sqrt((one**2).mean())) for symbol, one in both.items()},
+        noticed / count,
+    )
+
+
+def as_told(change: dict[str, Any], folder: Path) -> Experiment:
+    """The statement with some keys changed; None leaves a key out."""
+    told = {key: value for key, value in (STATED | change).items() if value is not None}
+    return file_with(folder, [told])
+
+
+# What is told of the same campaigns: everything, the values without their uncertainties, nothing.
+EXACT = {
+    "artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "0 um/m/K"},
+    "artefact_temperature": {"value": "21.5 degC"},
+    "scale_expansion": {"value": "8 um/m/K", "standard_uncertainty": "0 um/m/K"},
+    "scale_temperature": {"value": "20.8 degC"},
+}
+
+
+def shares(name: str, experiment: Experiment, folder: Path, count: int) -> Shares:
+    """Coverage of what is told, by its name on the documentation's page."""
+    design = lay_out(experiment)
+    told = {
+        "declared": lambda: design,
+        "values alone": lambda: lay_out(as_told(EXACT, folder)),
+        "not declared": lambda: plain(design),
+    }[name]()
+    return coverage(experiment, told, count)
+
+
+def assert_covered(found: Shares, count: int) -> None:
+    # Distances of one campaign have a scale in common: they are one draw at the worst.
+    for symbol in ("U5", "U6"):
+        assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
+        assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
+    assert found.noticed < 0.05 + 4.0 * np.sqrt(0.95 * 0.05 / count)
+
+
+def test_declared_temperatures_are_covered(drawn: Experiment) -> None:
+    assert_covered(coverage(drawn, lay_out(drawn), 100), 100)
+
+
+@pytest.mark.long
+def test_declared_temperatures_are_covered_in_many_campaigns(drawn: Experiment) -> None:
+    assert_covered(coverage(drawn, lay_out(drawn), 3000), 3000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["declared", "values alone", "not declared"])
+def test_the_page_states_what_is_wrong_otherwise(
+    name: str, drawn: Experiment, tmp_path: Path
+) -> None:
+    page = (TOP / "docs" / "how-to" / "influence-quantities.md").read_text(encoding="utf-8")
+    (line,) = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
+    told = [float(cell.split()[0]) for cell in line.split("|")[2:-1]]
+    found = shares(name, drawn, tmp_path, 400)
+    within, size = found.within, found.size
+    expected = [100 * within["U5"], 100 * within["U6"], size["U5"], size["U6"]]
+    assert told == pytest.approx([*expected, 100 * found.noticed], rel=0.01, abs=0.5)
+
+
+def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
+    outcome = trials(drawn, 1024).outcome
+    assert outcome is not None and not outcome.failed
+    for one in outcome.comparisons.values():
+        ratio = one.spread_ratio
+        assert abs(ratio.value - 1.0) < 4.0 * ratio.standard_error
+
+
+UNKNOWN = {
+    "artefact_expansion": {"value": "11.5 um/m/K"},
+    "artefact_temperature": {"value": "21.5 degC"},
+    "scale_expansion": {"value": "8 um/m/K"},
+    "scale_temperature": {"value": "20.8 degC"},
+}
+
+
+@pytest.mark.parametrize(
+    ("places", "deficiency"),
+    [
+        # A scale that is wrong by one ratio everywhere is a machine error like that.
+        ({}, 1),
+        ({"x low": {"artefact": "21.8 degC"}}, 1),
+        ({"x low": {"scales": "21.1 degC"}}, 0),
+        # What is just at the reference temperature does not expand.
+        ({place: {"artefact": "20 degC", "scales": "20 degC"} for place in "zxy"}, 2),
+    ],
+)
+def test_the_verdict_tells_what_cannot_be_told_apart(
+    tmp_path: Path, places: dict[str, Any], deficiency: int
+) -> None:
+    if "z" in places:
+        places = {f"{one} {level}": place for one, place in places.items() for level in HIGH_LOW}
+    design = lay_out(as_told(UNKNOWN | {"positions": places}, tmp_path))
+    found = verdict(linearise(design))
+    assert found.deficiency == deficiency
+    # The same of a dense Jacobian, by the law.
+    of = dense.planned(plain(design), 3, 3)
+    plates, scales = (
+        np.array([20.0 + part.differences[k] for k in range(6)]) - 20.0
+        for part in design.influences[0].parts  # type: ignore[attr-defined]
+    )
+    readings = design.readings
+    m = 3 * len(readings)
+
+    def rows(step: Any) -> Any:
+        inner = step[:-2]
+        balls, rotations, _, _ = dense.unpack(of, inner)
+        arms = np.einsum("mij,mj->mi", rotations[readings.position], balls[readings.ball])
+        shift = step[-2] * plates[readings.position][:, None] * arms
+        shift = shift - step[-1] * scales[readings.position][:, None] * of.scales
+        found = dense.residuals(of, inner)
+        found[:m] = found[:m] - (shift / of.design.machine.repeatability).ravel()
+        return found
+
+    count = of.parameters + 2
+    assert dense.spread(dense.jacobian(rows, count)).deficiency == deficiency
+    told = "; ".join(map(str, found.null))
+    assert ("expansion of the scales" in told) == (deficiency > 0)
+    assert ("expansion of plate" in told) == (deficiency > 1)
+
+
+HIGH_LOW = ("low", "high")
+
+
+def test_temperatures_of_readings_are_those_of_their_positions(
+    drawn: Experiment, tmp_path: Path
+) -> None:
+    """Temperatures in the file are the same as those of positions that are stated so."""
+    simulated = simulated_readings(drawn, seed=4)
+    with (tmp_path / "plain.csv").open("w", encoding="utf-8", newline="") as stream:
+        write_readings(stream, simulated.design, simulated.readings, simulated.x)
+    lines = (tmp_path / "plain.csv").read_text(encoding="utf-8").splitlines()
+    place = simulated.readings.position
+    told = [f"{lines[0]},temperature_artefact_degC,temperature_scales_degC"] + [
+        f"{line},{20 + PLATES[k]},{20 + SCALES[k]}"
+        for line, k in zip(lines[1:], place, strict=True)
+    ]
+    (tmp_path / "told.csv").write_text("\n".join(told) + "\n", encoding="utf-8")
+    anywhere = {"artefact_temperature", "scale_temperature"}
+    other = as_told(
+        {key: STATED[key] | {"value": "24 degC"} for key in anywhere} | {"positions": None},
+        tmp_path,
+    )
+    one, same, wrong = (
+        estimate(observed.design, observed.x).state
+        for observed in (
+            read_readings(tmp_path / "plain.csv", lay_out(drawn)),
+            read_readings(tmp_path / "told.csv", lay_out(other)),
+            read_readings(tmp_path / "plain.csv", lay_out(other)),
+        )
+    )
+    np.testing.assert_allclose(same.balls, one.balls, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(same.influences, one.influences, rtol=0, atol=1e-12)
+    assert np.abs(wrong.balls - one.balls).max() > 1e-8
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"artefact_temperature": None}, "artefact_expansion and artefact_temperature go together"),
+        ({"positions": {"z lwo": {"scales": "21 degC"}}}, 'did you mean "z low"?'),
+        ({"artefact": "plat"}, 'did you mean "plate"?'),
+        ({"scale_temperature": {"value": ["21 degC", "20 degC"]}}, "has 2 axes, but"),
+        (
+            {"artefact_temperature": {"value": ["21 degC", "20 degC", "20 degC"]}},
+            "an artefact has no axes",
+        ),
+        (
+            {"scale_temperature": {"value": "21 degC", "standard_uncertainty": "-50 mK"}},
+            "is below zero",
+        ),
+        ({"artefact_temperature": {"value": "294 K"}}, "is no temperature"),
+        ({"scale_expansion": {"value": "8 um"}}, "is a length; a thermal expansion is expected"),
+        (
+            {
+                "artefact_expansion": None,
+                "artefact_temperature": None,
+                "scale_expansion": None,
+                "scale_temperature": None,
+                "positions": None,
+            },
+            "nothing expands",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_at_its_place(
+    tmp_path: Path, change: dict[str, Any], expected: str
+) -> None:
+    with pytest.raises(ExperimentError) as caught:
+        as_told(change, tmp_path)
+    assert expected in str(caught.value) and "influences[0]" in str(caught.value)
+
+
+def test_length_standards_are_refused(tmp_path: Path) -> None:
+    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    bar = {"kind": "two_spheres", "length": "500 mm", "role": "length_standard"}
+    places = [one | {"artefact": "plate"} for one in told["positions"]]
+    bars = {"name": "bar", "artefact": "bar", "plane": "z", "level": "300 mm", "probes": ["down"]}
+    bars |= {"corner": {"x": "100 mm", "y": "100 mm"}}
+    told |= {"positions": [*places, bars], "influences": [STATED]}
+    told["artefacts"]["bar"] = bar
+    told["calibration"] = [told["calibration"][0] | {"artefact": "plate"}]
+    (tmp_path / "bar.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
+    with pytest.raises(ExperimentError, match='"bar" is a length standard'):
+        load(tmp_path / "bar.yaml")
+
+
+def test_other_estimators_refuse(drawn: Experiment) -> None:
+    simulated = simulated_readings(drawn)
+    observed = observe(simulated.design, simulated.readings, simulated.x)
+    for estimator in ("distances", "reversal", "length-equations"):
+        with pytest.raises(ExperimentError, match="does not know influence quantities"):
+            fit_readings(drawn, observed, estimator)
+
+
+def test_fit_tells_the_parameters(drawn: Experiment) -> None:
+    simulated = simulated_readings(drawn, seed=9)
+    observed = observe(simulated.design, simulated.readings, simulated.x)
+    found = fit_readings(drawn, observed)
+    told = {one.name: one for one in found.estimates if one.kind == "influence"}  # type: ignore[attr-defined]
+    assert len(told) == 16
+    off = np.array([one.value for one in told.values()]) - simulated.truth.influences
+    u = np.array([one.standard_uncertainty for one in told.values()])
+    assert (np.abs(off) < 4.5 * u).all() and (u <= SPREAD * 1.001).all()
+    (line,) = [one for one in found.lines() if one.startswith("expansion of plate")]
+    assert line.split()[-1] == "ppm/K"
+    assert float(line.split()[-3]) == pytest.approx(
+        1e6 * told["expansion of plate"].value, rel=1e-2
+    )
+
+
+def test_a_plan_knows_what_temperatures_leave(tmp_path: Path) -> None:
+    """Everything in the pool chosen is the design of all positions."""
+    whole = file_with(tmp_path, [STATED])
+    told = yaml.safe_load((tmp_path / "file.yaml").read_text(encoding="utf-8"))
+    first, *others = told["positions"]
+    told |= {"positions": [first], "pool": {"candidates": others}}
+    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
+    plan = bp.plan(tmp_path / "pool.yaml", "U6", positions=len(others) + 1)
+    design = lay_out(whole)
+    at = linearise(design)
+    (functions,) = QUANTITIES["U6"].functions(design, at.layout)
+    expected = at.uncertainty(linear_functions(at, functions)).mean()
+    assert plan.to_dict()["value"] == pytest.approx(expected, rel=1e-6)
