@@ -31,6 +31,8 @@ class InfluenceParameter:
     An uncertainty of zero makes it a constant, an infinite one a free parameter. `effect` is what
     a unit of it displaces readings by, in metres, where it does most. `position` is the index of
     the position that it is of alone, -1 where it is of several.
+    Parameters of the same `component` are alike: values drawn from one distribution, the variance
+    of which can be estimated from them.
     """
 
     name: str
@@ -39,6 +41,7 @@ class InfluenceParameter:
     uncertainty: float
     effect: float
     position: int = -1
+    component: str = ""
 
 
 @dataclass(frozen=True)
