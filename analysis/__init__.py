@@ -36,11 +36,13 @@ if TYPE_CHECKING:
     from .stores import stored, sweep, sweep_report
     from .sweeps.running import OtherSweepError
     from .sweeps.store_file import StoreError
+    from .variance_components.groups import GROUPINGS
 
 __all__ = [
     "ESTIMATORS",
     "Experiment",
     "ExperimentError",
+    "GROUPINGS",
     "OtherSweepError",
     "StoreError",
     "certificate",
@@ -70,6 +72,7 @@ _PLACES = {
     "ESTIMATORS": "ballplate.estimators.estimator_choice",
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
+    "GROUPINGS": "ballplate.variance_components.groups",
     "OtherSweepError": "ballplate.sweeps.running",
     "StoreError": "ballplate.sweeps.store_file",
     "stored": "ballplate.stores",

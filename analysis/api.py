@@ -33,10 +33,12 @@ from .estimators.estimator_choice import (
     OF_DISTANCES,
     OF_LENGTHS,
     EstimatorName,
+    misused,
     takers,
 )
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
+from .variance_components.groups import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas
@@ -291,6 +293,9 @@ def fit(
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
+    *,
+    components: Grouping | None = None,
+    reweight: bool = False,
 ) -> Fit: ...
 
 
@@ -306,6 +311,8 @@ def fit(
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
+    components: Grouping | None = None,
+    reweight: bool = False,
 ) -> FitResult: ...
 
 
@@ -320,6 +327,8 @@ def fit(
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
+    components: Grouping | None = None,
+    reweight: bool = False,
 ) -> FitResult:
     """The estimate from readings.
 
@@ -327,7 +336,9 @@ def fit(
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
-    `offsets` between its positions are estimated. What is to be known beside the figures is in the
+    `offsets` between its positions are estimated. With `components`, one of the
+    `ballplate.GROUPINGS`, variances of groups of observations are estimated, and `reweight` puts
+    these in the place of the stated ones. What is to be known beside the figures is in the
     result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
@@ -349,18 +360,34 @@ def fit(
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
-    ensure_type(bool, "True or False", offsets=offsets)
+    ensure_type(bool, "True or False", offsets=offsets, reweight=reweight)
+    if components is not None:
+        ensure_one_of(GROUPINGS, components=components)
     asked = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
+    asked |= {"components": components, "reweight": reweight}
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} goes with the estimator {wrong[1]} only; leave it out")
+    reason = misused(components, reweight, sigma)
+    if reason:
+        raise ValueError(reason)
     chosen, table = _experiment(experiment), _table("readings", readings)
     if certificate is not None:
         chosen = read_certificate(_table("certificate", certificate), chosen)
     observed = read_readings(table, lay_out(chosen))
     return fit_readings(
-        chosen, observed, estimator, sigma, monomials, pairs, across_probes, scale, offsets
+        chosen,
+        observed,
+        estimator,
+        sigma,
+        monomials,
+        pairs,
+        across_probes,
+        scale,
+        offsets,
+        components,
+        reweight,
     )
 
 

@@ -5,7 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ..estimators.estimator_choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
+from ..estimators.estimator_choice import (
+    DRAWN,
+    ESTIMATORS,
+    TAKE,
+    fit_readings,
+    misused,
+    takers,
+)
+from ..variance_components.groups import GROUPINGS
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .outputs import UsageError, add_force, write
@@ -69,6 +77,20 @@ def add_options(parser: ArgumentParser) -> None:
             " of five"
         ),
     )
+    parser.add_argument(
+        "--components",
+        choices=GROUPINGS,
+        metavar="BY",
+        help=(
+            "estimate how uncertain groups of observations are against what is stated, by axis,"
+            " probe, position, artefact or calibration (variance components, REML)"
+        ),
+    )
+    parser.add_argument(
+        "--reweight",
+        action="store_true",
+        help="with --components: fit again with the estimated variances in place of the stated",
+    )
     add_picture(
         parser,
         "--plot",
@@ -104,6 +126,8 @@ def run(options: Namespace) -> int:
         options.across_probes,
         options.scale,
         not options.no_offsets,
+        options.components,
+        options.reweight,
     )
     if options.plot and result.converged:
         write(options, {options.plot: result.plot})
@@ -126,6 +150,11 @@ def _refuse_misused(options: Namespace) -> None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
         raise UsageError(f"--{option} goes with --estimator {estimators} only; leave it out")
+    reason = misused(options.components, options.reweight, options.sigma)
+    if reason:
+        for name in ("components", "sigma"):
+            reason = reason.replace(f" {name}", f" --{name}")
+        raise UsageError(f"--{reason}")
     first, second = options.files[0], options.readings
     if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
         raise UsageError(

@@ -26,6 +26,8 @@ from .restricted_likelihood import (
     group_sums,
 )
 
+LARGER, SMALLER, AS_STATED = "larger than stated", "smaller than stated", "agrees with stated"
+
 # Chance that a table of readings that scatter as stated calls any of its groups larger or smaller.
 FALSE_ALARM = 0.05
 
@@ -35,6 +37,9 @@ OUTSIDE = 0.05
 # Groups with fewer degrees of freedom have no estimate: its standard deviation would be larger than
 # itself.
 LEAST_FREEDOM = 1.0
+
+# Degrees of freedom of an estimate below which it does not replace a smaller stated variance.
+FEW = 10
 
 # Entries of the matrices of all groups, of eight bytes each, of which there are several copies.
 MOST_ENTRIES = 20_000_000
@@ -63,15 +68,28 @@ class VarianceComponent:
     def is_estimated(self) -> bool:
         return not np.isnan(self.ratio)
 
+    @property
+    def is_to_be_used(self) -> bool:
+        """Whether a fit that is reweighted uses the estimate: it may make uncertainties smaller
+        only where it is good to a half.
+        """
+        good = self.ratio > 0.0 and 2.0 * (self.ratio / self.standard_uncertainty) ** 2 >= FEW
+        return self.is_estimated and (good or self.verdict == LARGER)
+
 
 @dataclass(frozen=True, repr=False)
 class VarianceComponents(Result):
-    """Variance components of the groups that `by` makes of all observations of a fit."""
+    """Variance components of the groups that `by` makes of all observations of a fit.
+
+    `weighting` are the ratios that take the place of what is stated where a fit is reweighted: 1
+    where there is no estimate, or one with few degrees of freedom, unless it is larger than stated.
+    """
 
     label: str
     title: str
     by: Grouping
     groups: tuple[VarianceComponent, ...]
+    weighting: tuple[float, ...]
 
     def headline(self) -> str:
         count = sum(one.is_estimated for one in self.groups)
@@ -122,14 +140,10 @@ class VarianceComponents(Result):
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        groups = [
-            {name: finite(value) if isinstance(value, float) else value for name, value in row.items()}
-            for row in self.rows()
-        ]
+        groups = self.rows()
+        for row in groups:
+            row |= {name: finite(one) for name, one in row.items() if isinstance(one, float)}
         return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": groups}
-
-
-LARGER, SMALLER, AS_STATED = "larger than stated", "smaller than stated", "agrees with stated"
 
 
 def too_many_groups(design: Design, groups: Sequence[Group]) -> str:
@@ -205,7 +219,10 @@ def variance_components(
     if reason:
         raise ValueError(reason)
     found = estimate_ratios(at, x, groups)
-    return VarianceComponents(label, title, by, tuple(_components(found)))
+    components = tuple(_components(found))
+    used = np.flatnonzero([one.is_to_be_used for one in components])
+    weighting = estimated_ratios(found.sums, used)
+    return VarianceComponents(label, title, by, components, tuple(weighting.tolist()))
 
 
 def _components(found: Estimated) -> list[VarianceComponent]:

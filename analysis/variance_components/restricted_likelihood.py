@@ -3,11 +3,11 @@
 Whitened observations y = J x + e have errors whose variance is r_g in group g. The restricted
 likelihood is that of what of y does not depend on x (Patterson and Thompson, Biometrika 58, 1971).
 With the columns of Q an orthonormal basis of those of J, it depends on y and J through the sums of
-squares of the residuals of the groups, their products with Q and the groups' parts of Q'Q alone: one
-linearisation serves all ratios. Matrices are Q' W Q, whose condition is no worse than the ratio of
-the largest weight to the smallest, unlike that of the normal equations J' W J. Where the derivative
-is zero, squares of residuals equal their redundancy, group by group: the same as what iterating
-Helmert's estimate leads to.
+squares of the residuals of the groups, their products with Q and the groups' parts of Q'Q alone:
+one linearisation serves all ratios. Matrices are Q' W Q, whose condition is no worse than the ratio
+of the largest weight to the smallest, unlike that of the normal equations J' W J. Where the
+derivative is zero, squares of residuals equal their redundancy, group by group: the same as what
+iterating Helmert's estimate leads to.
 """
 
 from __future__ import annotations
@@ -168,9 +168,9 @@ class Profile:
     def chance(self, ratio: float) -> float:
         """Chance that residuals are as large as they are, or larger, where the ratio is `ratio`.
 
-        The score of the ratio, less what the others have in common with it, is taken for a
-        chi-squared variable about its mean (Neyman's C(alpha), 1959): exact where there is one
-        group.
+        The square of the residuals, with the score of the others taken into account (Neyman's
+        C(alpha), 1959), is taken for a multiple of a chi-squared variable of its mean and variance
+        (Satterthwaite): exact where there is one group.
         """
         from scipy.special import chdtrc
 
@@ -188,15 +188,19 @@ class Profile:
         traces = np.trace(inner, axis1=1, axis2=2)
         flat = inner.reshape(len(inner), -1)
         information = flat @ flat.T + np.diag(self.counts - 2.0 * traces)
-        slope = squares - (self.counts - traces)
+        redundancies = self.counts - traces
+        slope = squares - redundancies
         others = np.delete(np.arange(len(weight)), self.group)
         mixed = information[self.group, others]
         share = np.linalg.lstsq(information[np.ix_(others, others)], mixed)[0]
         freedom = float(information[self.group, self.group] - share @ mixed)
         score = float(slope[self.group] - share @ slope[others])
-        if not freedom > 0.0:
+        redundancy = float(redundancies[self.group])
+        if not freedom > 0.0 or not redundancy > 0.0:
             return 1.0
-        return float(chdtrc(freedom, max(score + freedom, 0.0)))
+        # Of the mean and the variance of the square of its residuals, less what the others know.
+        times = redundancy / freedom
+        return float(chdtrc(redundancy * times, max(score + redundancy, 0.0) * times))
 
     def end(self, chance: float) -> float:
         """The ratio at which residuals so large have some chance; 0 or infinite where there is
