@@ -34,6 +34,10 @@ MOST_PAIRS = 1000
 # Changes of distances that are computed at once.
 ENTRIES_AT_ONCE = 16_384
 
+# An uncertainty below this fraction of the largest in its unit is that of a value which the model
+# leaves alone: a length of a metre is rounded by a billionth of a tenth of a micrometre.
+UNCHANGED = 1e-8
+
 
 @dataclass(frozen=True)
 class MonteCarloQuantity:
@@ -138,19 +142,28 @@ def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations],
 
 
 def _uncertain(target: MonteCarloQuantity) -> MonteCarloQuantity | None:
-    """A target without the members that no observation could change; None where nothing is left."""
-    kept = target.uncertainty > 0.0
+    """A target without the members that no observation could change, whose uncertainties are
+    rounding beside the others in their unit; None where nothing is left.
+    """
+    kept, units = np.zeros(len(target.uncertainty), bool), np.array(target.units)
+    for unit in set(target.units):
+        size = target.uncertainty[units == unit]
+        kept[units == unit] = size > UNCHANGED * size.max()
     if not kept.any():
         return None
     if kept.all():
         return target
-    units = tuple(unit for unit, keep in zip(target.units, kept, strict=True) if keep)
 
     def change(replicates: Deviations) -> Array:
         return target.change(replicates)[:, kept]
 
     return MonteCarloQuantity(
-        target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled
+        target.symbol,
+        target.base[kept],
+        target.uncertainty[kept],
+        tuple(units[kept].tolist()),
+        change,
+        target.sampled,
     )
 
 

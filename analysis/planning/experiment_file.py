@@ -153,6 +153,10 @@ def _content(
         said["priors"] = [
             one for one, path in zip(said["priors"], paths, strict=True) if path not in gone
         ]
+    for one in said.get("influences", []):
+        left = {name: at for name, at in one.get("positions", {}).items() if name not in others}
+        one.pop("positions", None)
+        one |= {"positions": left} if left else {}
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
     order = (

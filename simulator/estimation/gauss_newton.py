@@ -26,6 +26,10 @@ Status = Literal["converged", "not converged", "diverged"]
 # neighbourhood of the drawing.
 NEIGHBOURHOOD = 0.01
 
+# What readings seem to tell of directions that are open as drawn is noise, unless noise alone would
+# seem to tell as much less often than this.
+CHANCE_OF_NOISE = 0.001
+
 
 @dataclass(frozen=True)
 class GaussNewtonSettings:
@@ -112,21 +116,39 @@ def gauss_newton(
 def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = None) -> Solution:
     """The estimate from scale readings `x` (readings, d) and starting values of their own.
 
-    What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as
-    in NPL Report CISE 15/98, section 5.4, where the iteration wanders along it without leaving the
-    neighbourhood, and held if that fails or goes far: poses a little off their nominal ones call
-    for steps of metres. Rank and null space of the solution are those of the design as drawn in any
-    case.
+    What is open as drawn is held, since noise alone would lead far along it, and the square of such
+    a way would falsify what is determined. Of plates it is followed, as in NPL Report CISE 15/98,
+    section 5.4, where the readings tell something of it, see `_tells_of_open`, without leaving the
+    neighbourhood: poses a little off their nominal ones call for steps of metres. Rank and null
+    space of the solution are those of the design as drawn in any case.
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
+    held = gauss_newton(design, x, start, settings, drawn)
     if not drawn.deficiency or len(design.of(Lengths)):
-        return gauss_newton(design, x, start, settings, drawn)
-    solution = gauss_newton(design, x, start, settings)
-    went_far = max(one.step for one in solution.iterations) > NEIGHBOURHOOD
-    if solution.status == "converged" and not went_far:
-        return replace(solution, spectrum=spectrum(solution.factor, drawn))
-    return gauss_newton(design, x, start, settings, drawn)
+        return held
+    followed = gauss_newton(design, x, start, settings)
+    went_far = max(one.step for one in followed.iterations) > NEIGHBOURHOOD
+    if followed.status != "converged" or went_far:
+        return held
+    if held.status == "converged" and not _tells_of_open(design, held, followed, drawn.deficiency):
+        return held
+    return replace(followed, spectrum=spectrum(followed.factor, drawn))
+
+
+def _tells_of_open(design: Design, held: Solution, followed: Solution, deficiency: int) -> bool:
+    """Whether S^2 falls by more than noise explains where what is open as drawn is followed: an
+    F-test with the scatter of the readings themselves.
+    """
+    from scipy.special import fdtrc
+
+    freedom = design.observation_count - design.parameter_count
+    if freedom <= 0:
+        return False
+    left = followed.factor.sum_of_squares
+    gained = held.factor.sum_of_squares - left
+    ratio = np.inf if left == 0.0 else max(gained, 0.0) / deficiency / (left / freedom)
+    return bool(fdtrc(deficiency, freedom, ratio) < CHANCE_OF_NOISE)
 
 
 def as_drawn(design: Design) -> Spectrum:

@@ -10,6 +10,8 @@ from ..design.arrays import Design
 from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
+from ..inputs.messages import ExperimentError
+from .checks import MOST_SHARED
 from .model import Experiment, Position
 from .structure import Sections
 
@@ -40,7 +42,10 @@ def resolve_influences(
 
 
 def with_influences(design: Design, experiment: Experiment) -> Design:
-    """The design with the influence quantities of its experiment, and what is known of them."""
+    """The design with the influence quantities of its experiment, and what is known of them.
+
+    :raises ExperimentError: they have more parameters than there is memory for.
+    """
     if not experiment.influences:
         return design
     order = np.arange(len(design.readings), dtype=float)
@@ -56,6 +61,14 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
     influences = tuple(one.influence(parts) for one in experiment.influences)
     disturbed = replace(design, readings=readings, influences=influences)
     parameters = disturbed.influence_parameters
+    shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
+    if shared > MOST_SHARED:
+        text = (
+            f"their {len(parameters)} parameters make {shared} besides the balls; at most"
+            f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
+            " of single positions as exact"
+        )
+        raise ExperimentError([experiment.message(("influences",), text)])
     known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
     priors, none = design.of(Priors), np.full(len(known), -1)
     stated = [parameters[k] for k in known]

@@ -99,7 +99,7 @@ def test_a_plate_upright_in_one_position(tmp_path: Path) -> None:
     assert_says_as_run(experiment, 1)
 
 
-@pytest.mark.parametrize("seed", [1, 5, 12, 23, 39])
+@pytest.mark.parametrize("seed", [1, 5, 12, 23, 39, 393])
 def test_experiments_drawn_at_random(tmp_path: Path, seed: int) -> None:
     assert_says_as_run(random_experiment(seed, tmp_path), seed)
 

@@ -12,6 +12,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
+from ballplate.cli import main
 from ballplate.estimators.estimator_choice import fit_readings
 from ballplate.montecarlo.experiments import trials
 from ballplate.rank.verdict import verdict
@@ -236,7 +237,7 @@ def campaign(design: Design, generator: np.random.Generator) -> tuple[Design, St
 @dataclass(frozen=True)
 class Shares:
     """Share of distances within 1.96 uncertainties, root mean square of their errors in
-    uncertainties, and share of fits whose S^2 is beyond its 95 % limit.
+    uncertainties, and share of fits that would warn of S^2: one in a thousand does by chance.
     """
 
     within: dict[str, float]
@@ -258,7 +259,7 @@ def coverage(experiment: Experiment, told: Design, count: int) -> Shares:
         at = linearised_fit(one, solution)
         noticed += int(
             solution.factor.sum_of_squares
-            > chi2.isf(0.05, one.observation_count - one.parameter_count)
+            > chi2.isf(0.001, one.observation_count - one.parameter_count)
         )
         for symbol, errors in ratios.items():
             (functions,) = QUANTITIES[symbol].functions(one, at.layout)
@@ -308,7 +309,7 @@ def assert_covered(found: Shares, count: int) -> None:
     for symbol in ("U5", "U6"):
         assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
         assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
-    assert found.noticed < 0.05 + 4.0 * np.sqrt(0.95 * 0.05 / count)
+    assert found.noticed < 0.001 + 6.0 * np.sqrt(0.001 / count)
 
 
 def test_declared_temperatures_are_covered(drawn: Experiment) -> None:
@@ -338,8 +339,7 @@ def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
     outcome = trials(drawn, 1024).outcome
     assert outcome is not None and not outcome.failed
     for one in outcome.comparisons.values():
-        ratio = one.spread_ratio
-        assert abs(ratio.value - 1.0) < 4.0 * ratio.standard_error
+        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
 
 
 UNKNOWN = {
@@ -481,6 +481,19 @@ def test_length_standards_are_refused(tmp_path: Path) -> None:
         load(tmp_path / "bar.yaml")
 
 
+def test_more_parameters_than_there_is_room_for_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment = file_with(tmp_path, [STATED])
+    design = lay_out(experiment)
+    shared = len(linearise(design).layout)
+    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared)
+    lay_out(experiment)
+    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared - 1)
+    with pytest.raises(ExperimentError, match=rf"their 16 parameters make {shared} besides"):
+        lay_out(experiment)
+
+
 def test_other_estimators_refuse(drawn: Experiment) -> None:
     simulated = simulated_readings(drawn)
     observed = observe(simulated.design, simulated.readings, simulated.x)
@@ -518,3 +531,18 @@ def test_a_plan_knows_what_temperatures_leave(tmp_path: Path) -> None:
     (functions,) = QUANTITIES["U6"].functions(design, at.layout)
     expected = at.uncertainty(linear_functions(at, functions)).mean()
     assert plan.to_dict()["value"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_file_of_a_plan_has_temperatures_of_its_positions(tmp_path: Path) -> None:
+    file_with(tmp_path, [STATED])
+    told = yaml.safe_load((tmp_path / "file.yaml").read_text(encoding="utf-8"))
+    told["pool"] = {"candidates": told.pop("positions")}
+    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
+    command = ["plan", str(tmp_path / "pool.yaml"), "--positions", "3", "-q"]
+    main([*command, "-o", str(tmp_path / "chosen.yaml")])
+    (chosen,) = load(tmp_path / "chosen.yaml")
+    names = [one.name for one in chosen.positions]
+    (item,) = yaml.safe_load((tmp_path / "chosen.yaml").read_text(encoding="utf-8"))["influences"]
+    assert item.get("positions", {}) == {
+        name: at for name, at in STATED["positions"].items() if name in names
+    }

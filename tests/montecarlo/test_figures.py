@@ -312,6 +312,17 @@ def test_what_cannot_be_wrong_is_not_counted() -> None:
         assert np.isfinite([one.spread.value, one.bias.value]).all() and one.flags == ()
 
 
+def test_distances_that_the_model_leaves_alone_are_not_counted() -> None:
+    """In this plane the model changes no distance along y: nine of 36, whose uncertainties are
+    rounding.
+    """
+    done = trials(shipped("certified/two-dimensions.yaml"), 256)
+    assert done.outcome is not None
+    counted = done.outcome.comparisons["U6"]
+    assert counted.count == 27
+    assert abs(counted.spread.value - 1.0) < 4.0 * counted.spread.error
+
+
 def test_power_of_a_misfit() -> None:
     """Against a simulation of shifted normal variables."""
     generator = np.random.default_rng(1)
