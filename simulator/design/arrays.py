@@ -14,6 +14,7 @@ import numpy as np
 
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
+from .noise import Noise
 from .objects import (
     Artefacts,
     Balls,
@@ -52,6 +53,7 @@ class Design:
     evaluation: EvaluationPoints
     tasks: Tasks
     influences: tuple[Influence, ...] = ()
+    noise: Noise = Noise()
 
     @property
     def dimension(self) -> int:

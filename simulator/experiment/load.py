@@ -28,7 +28,7 @@ from .checks import (
     check_use,
 )
 from .influences import resolve_influences
-from .machine import resolve_evaluation, resolve_machine, target_of
+from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Experiment
 from .modules import refused_modules
 from .placements import resolve_position
@@ -207,6 +207,7 @@ def _build(
     influences = resolve_influences(sections, named, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
+    noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
     if problems.messages or machine is None or evaluation is None:
@@ -235,6 +236,7 @@ def _build(
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         influences=influences,
+        noise=noise,
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),

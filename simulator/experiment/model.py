@@ -14,6 +14,7 @@ import numpy as np
 
 from ..design.influences.protocol import InfluenceSettings
 from ..design.lookup import Floats, Indices
+from ..design.noise import Noise
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
@@ -186,10 +187,10 @@ class Experiment:
     ``expected_rank_deficiency`` are None where nothing was stated. ``coverage_factor`` times the
     standard uncertainty is what targets are meant for. ``offset_uncertainties``: standard
     uncertainties (d,) of the offsets that are estimated, by the probe's name, infinite where the
-    offset is unknown; other offsets are as stated. ``pool``: what a plan may choose from.
-    ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
-    without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an
-    experiment of a tree.
+    offset is unknown; other offsets are as stated. ``noise``: of simulated readings. ``pool``: what
+    a plan may choose from. ``doubts``: what of the file is possible, and unlikely to be meant.
+    ``tree``: what was written, without variants, ``mark``: where the experiment itself stands, and
+    ``builder``: what makes an experiment of a tree.
     """
 
     title: str
@@ -215,6 +216,7 @@ class Experiment:
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     influences: tuple[InfluenceSettings, ...] = ()
+    noise: Noise = Noise()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()

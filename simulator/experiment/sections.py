@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StringConstraints
 
 from ..design.influences.kinds import AnyInfluence
+from ..design.noise import Distribution, NoiseSettings
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
@@ -210,6 +211,13 @@ class ExperimentSettings(Settings):
     )
     expected_rank_deficiency: Annotated[int, Field(ge=0, strict=True)] | None = Field(
         None, description="number of undetermined parameters that is accepted as intended"
+    )
+    noise: Forms[Distribution, NoiseSettings, NoiseSettings] = Field(
+        "normal",
+        description=(
+            "distribution of the noise of readings that are simulated: normal (default), uniform,"
+            " or {distribution: student t, degrees_of_freedom: 5, correlation: 0.2}"
+        ),
     )
     seed: Seed = Field(1, description="seed of simulated readings; default 1")
     variants: Annotated[dict[Name, dict[Text, Any]], Field(min_length=1)] | None = Field(
