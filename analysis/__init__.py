@@ -32,11 +32,11 @@ if TYPE_CHECKING:
         spline,
     )
     from .estimators.estimator_choice import ESTIMATORS
+    from .results.variance_components.groupings import GROUPINGS
     from .simulator.experiment.model import Experiment
     from .stores import stored, sweep, sweep_report
     from .sweeps.running import OtherSweepError
     from .sweeps.store_file import StoreError
-    from .variance_components.groups import GROUPINGS
 
 __all__ = [
     "ESTIMATORS",
@@ -72,7 +72,7 @@ _PLACES = {
     "ESTIMATORS": "ballplate.estimators.estimator_choice",
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
-    "GROUPINGS": "ballplate.variance_components.groups",
+    "GROUPINGS": "ballplate.results.variance_components.groupings",
     "OtherSweepError": "ballplate.sweeps.running",
     "StoreError": "ballplate.sweeps.store_file",
     "stored": "ballplate.stores",

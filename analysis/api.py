@@ -36,9 +36,9 @@ from .estimators.estimator_choice import (
     misused,
     takers,
 )
+from .results.variance_components.groupings import GROUPINGS, Grouping
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
-from .variance_components.groups import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas

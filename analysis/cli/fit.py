@@ -13,7 +13,7 @@ from ..estimators.estimator_choice import (
     misused,
     takers,
 )
-from ..variance_components.groups import GROUPINGS
+from ..results.variance_components.groupings import GROUPINGS
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .outputs import UsageError, add_force, write

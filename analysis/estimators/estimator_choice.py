@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
     from ..presentation.result import FitResult
-    from ..variance_components.groups import Grouping
+    from ..results.variance_components.groupings import Grouping
 
 EstimatorName = Literal[
     "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"

@@ -25,7 +25,6 @@ from ..presentation.vectors import Vectors, draw_vectors
 from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
-from ..variance_components.groups import GROUPINGS, Grouping
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
 from .estimates import (
     CorrectedPoints,
@@ -50,12 +49,13 @@ from .parts import (
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals
+from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from ..variance_components.components import VarianceComponents
+    from .variance_components.components import VarianceComponents
 
 REWEIGHTED = (
     "(everything below is as if these estimates had been stated, but for those of fewer than 10"
@@ -293,7 +293,7 @@ class Fit(FitResult):
         >>> [group.verdict for group in fit.components("calibration").groups]
         ['agrees with stated', 'agrees with stated']
         """
-        from ..variance_components.components import variance_components
+        from .variance_components.components import variance_components
 
         ensure_one_of(GROUPINGS, by=by)
         at = self.functions.at

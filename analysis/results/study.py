@@ -20,15 +20,15 @@ from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ..uncertainty.tasks import TaskUncertainty
-from ..variance_components.groups import Grouping, groups_of, reweighted
 from .adjustments import Adjustment, adjustments
 from .prediction import Prediction
+from .variance_components.groupings import Grouping
 
 if TYPE_CHECKING:
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
-    from ..variance_components.components import VarianceComponents
     from .fit import Fit
+    from .variance_components.components import VarianceComponents
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,7 @@ def fit(
     from .fit import Fit
     from .plates import plate_coordinates
     from .residuals import largest_residuals
+    from .variance_components.groups import groups_of, reweighted
 
     design = observed.design
     solution = estimate(design, observed.x)
@@ -155,7 +156,7 @@ def fit(
 def _variance_components(
     experiment: Experiment, at: Linearisation, x: Array, by: Grouping
 ) -> VarianceComponents:
-    from ..variance_components.components import variance_components
+    from .variance_components.components import variance_components
 
     try:
         return variance_components(experiment.label, experiment.title, at, x, by)

@@ -58,8 +58,13 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
         design.positions,
         readings,
     )
-    influences = tuple(one.influence(parts) for one in experiment.influences)
-    disturbed = replace(design, readings=readings, influences=influences)
+    influences = []
+    for i, one in enumerate(experiment.influences):
+        try:
+            influences.append(one.influence(parts))
+        except ValueError as error:
+            raise ExperimentError([experiment.message(("influences", i), str(error))]) from None
+    disturbed = replace(design, readings=readings, influences=tuple(influences))
     parameters = disturbed.influence_parameters
     shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
     if shared > MOST_SHARED:

@@ -10,12 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
+from .position_scale import PositionScaleSettings
+from .probing import ProbingSettings
 from .protocol import InfluenceSettings
+from .reproducibility import ReproducibilitySettings
 from .temperature import TemperaturesSettings
 
 INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     # In the order of the documentation.
     TemperaturesSettings,
+    ProbingSettings,
+    PositionScaleSettings,
+    ReproducibilitySettings,
 )
 """Settings class of every kind of influence quantity."""
 

@@ -123,5 +123,8 @@ class InfluenceSettings(Settings):
         """
 
     def influence(self, design: DesignParts) -> Influence:
-        """The influence quantity in a design."""
+        """The influence quantity in a design.
+
+        :raises ValueError: the design does not say what it needs.
+        """
         raise NotImplementedError

@@ -20,7 +20,7 @@ import numpy as np
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..gross_errors.leftover import Leftover
+from ...gross_errors.leftover import Leftover
 from .groups import Group
 
 # Ratios of variances that are looked at; outside these, a group has no scatter or no weight.
@@ -148,7 +148,7 @@ def degrees_of_freedom(information: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Profile:
+class RatioTest:
     """Tests of one group's ratio, `group` by its place among those `free`, others as estimated.
 
     In a basis in which the matrix is diagonal whatever that ratio: `values` (p,), with `absorbed`
@@ -241,13 +241,13 @@ class Whitened:
             [_whitened(self.root, self.sums.grams[k]) / self.ratios[k] for k in self.free]
         )
 
-    def profile(self, place: int) -> Profile:
+    def test_of(self, place: int) -> RatioTest:
         """Tests of the ratio of the free group at a place among these."""
         sums, ratios, free = self.sums, self.ratios, self.free
         values, vectors = np.linalg.eigh(self.absorbed[place])
         basis = scipy_linalg().solve_triangular(self.root, vectors, lower=True, trans="T")
         fixed = np.setdiff1d(np.arange(len(ratios)), free)
-        return Profile(
+        return RatioTest(
             place,
             sums.counts[free],
             sums.squares[free] / ratios[free],

@@ -12,10 +12,11 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..gross_errors.leftover import leftover, too_many_entries
-from ..presentation.formatting import aligned, finite, number
-from ..presentation.result import Result
-from .groups import Group, Grouping, groups_of
+from ...gross_errors.leftover import leftover, too_many_entries
+from ...presentation.formatting import aligned, finite, number
+from ...presentation.result import Result
+from .groupings import Grouping
+from .groups import Group, groups_of
 from .restricted_likelihood import (
     SMALLEST,
     GroupSums,
@@ -194,8 +195,8 @@ def _told_apart(sums: GroupSums, names: Sequence[str]) -> tuple[Integers, tuple[
     while free:
         information = stated.information[np.ix_(free, free)]
         freedom = degrees_of_freedom(information)
-        # The first of those that are equally poor, so that rounding does not choose.
-        worst = int(np.flatnonzero(freedom <= freedom.min() + 1e-6)[0])
+        # The last of those that are equally poor, so that rounding does not choose.
+        worst = int(np.flatnonzero(freedom <= freedom.min() + 1e-6)[-1])
         if freedom[worst] >= LEAST_FREEDOM:
             break
         common = information[worst] / np.sqrt(np.diagonal(information))
@@ -239,12 +240,12 @@ def _components(found: Estimated) -> list[VarianceComponent]:
             nothing = (np.nan,) * 4
             result.append(VarianceComponent(*known, *nothing, found.reasons[k]))
             continue
-        profile = whitened.profile(int(place[0]))
-        chance = profile.chance(1.0)
+        test = whitened.test_of(int(place[0]))
+        chance = test.chance(1.0)
         verdict = LARGER if chance < limit else SMALLER if chance > 1.0 - limit else AS_STATED
         # At the bound there is no scatter but what others explain.
         ratio = float(found.ratios[k]) if found.ratios[k] > SMALLEST else 0.0
         spread = ratio * float(np.sqrt(2.0 / freedom[place[0]])) if ratio else np.nan
-        ends = profile.end(0.5 * OUTSIDE), profile.end(1.0 - 0.5 * OUTSIDE)
+        ends = test.end(0.5 * OUTSIDE), test.end(1.0 - 0.5 * OUTSIDE)
         result.append(VarianceComponent(*known, ratio, spread, *ends, verdict))
     return result

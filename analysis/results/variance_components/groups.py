@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Observations, reading_uncertainties
@@ -14,9 +13,7 @@ from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 
-Grouping = Literal["axis", "probe", "position", "artefact", "calibration"]
-
-GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)
+from .groupings import Grouping
 
 
 @dataclass(frozen=True)
