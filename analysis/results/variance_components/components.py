@@ -171,12 +171,8 @@ class Estimated:
     reasons: tuple[str, ...]
 
 
-@single_threaded
-def estimate_ratios(at: Linearisation, x: Array, groups: tuple[Group, ...]) -> Estimated:
-    """REML estimates at a fit to scale readings x (readings, d)."""
-    design = at.design
-    freedom = design.observation_count - design.parameter_count + at.deficiency
-    sums = group_sums(leftover(at, x, freedom), groups)
+def told_apart(sums: GroupSums, groups: tuple[Group, ...]) -> Estimated:
+    """REML estimates of the variances that the design tells apart."""
     free, reasons = _told_apart(sums, [group.name for group in groups])
     return Estimated(groups, sums, estimated_ratios(sums, free), free, reasons)
 
@@ -219,14 +215,15 @@ def variance_components(
     reason = too_many_groups(at.design, groups)
     if reason:
         raise ValueError(reason)
-    found = estimate_ratios(at, x, groups)
-    components = tuple(_components(found))
+    found = told_apart(group_sums(leftover(at, x, 0), groups), groups)
+    components = tuple(judged(found))
     used = np.flatnonzero([one.is_to_be_used for one in components])
     weighting = estimated_ratios(found.sums, used)
     return VarianceComponents(label, title, by, components, tuple(weighting.tolist()))
 
 
-def _components(found: Estimated) -> list[VarianceComponent]:
+def judged(found: Estimated) -> list[VarianceComponent]:
+    """Estimates with their uncertainties and verdicts."""
     at = at_ratios(found.sums, found.ratios)
     freedom = degrees_of_freedom(at.information[np.ix_(found.free, found.free)])
     whitened = Whitened(found.sums, found.ratios, found.free)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.computing.threads import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...gross_errors.leftover import Leftover
@@ -76,7 +76,6 @@ def group_sums(left: Leftover, groups: Sequence[Group]) -> GroupSums:
     return GroupSums(counts, np.array(squares), np.array(sides), np.array(grams))
 
 
-@single_threaded
 def at_ratios(sums: GroupSums, ratios: Array) -> AtRatios:
     """The restricted likelihood where variances are `ratios` (g,) of the stated ones."""
     linalg, weights = scipy_linalg(), 1.0 / ratios
