@@ -5,6 +5,7 @@ same seed.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import ballplate as bp
@@ -149,6 +150,28 @@ def test_correlated_noise_has_the_spread_of_a_dense_computation(small: bp.Experi
         assert one.actual_average == pytest.approx(expected, abs=off)
         # Most of it goes into the poses.
         assert expected < 0.8 * one.linear_average
+
+
+ON_THE_PAGE: dict[str, Any] = {
+    "normal": "normal",
+    "uniform": "uniform",
+    "student t, 5 degrees of freedom": {"distribution": "student t", "degrees_of_freedom": 5},
+    "student t, 3 degrees of freedom": {"distribution": "student t", "degrees_of_freedom": 3},
+    "normal, correlation 0.2": {"correlation": 0.2},
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ON_THE_PAGE)
+def test_the_page_states_what_monte_carlo_gives(name: str) -> None:
+    page = Path("docs/how-to/monte-carlo.md").read_text(encoding="utf-8")
+    (line,) = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
+    told = [float(cell.split()[0]) for cell in line.split("|")[2:-1]]
+    found = trials(bp.quickstart().with_(noise=ON_THE_PAGE[name]), 2000).outcome
+    assert found is not None
+    one = found.comparisons["U6"]
+    expected = [one.spread.value, *(100 * share.value for share in (one.known, one.estimated))]
+    assert told == pytest.approx([*expected, 100 * found.misfit.rejected.value], abs=0.051)
 
 
 @pytest.mark.parametrize(
