@@ -77,6 +77,17 @@ def add_options(parser: ArgumentParser) -> None:
             " of five"
         ),
     )
+    _add_components(parser)
+    add_picture(
+        parser,
+        "--plot",
+        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
+    )
+    add_force(parser)
+    add_json(parser)
+
+
+def _add_components(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--components",
         choices=GROUPINGS,
@@ -91,13 +102,6 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="with --components: fit again with the estimated variances in place of the stated",
     )
-    add_picture(
-        parser,
-        "--plot",
-        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
-    )
-    add_force(parser)
-    add_json(parser)
 
 
 def run(options: Namespace) -> int:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import DTypeLike
 from pydantic import Field
 
 from ..inputs.settings import Settings
 from ..machines.protocol import Integers
 
+Precision = type[np.float32] | type[np.float64]
 Distribution = Literal["normal", "uniform", "student t"]
 
 
@@ -50,7 +50,7 @@ class Noise:
         shape: tuple[int, ...],
         position: Integers,
         axis: int,
-        dtype: DTypeLike = np.float64,
+        dtype: Precision = np.float64,
     ) -> Any:
         """Noise of a `shape` whose `axis` counts readings, made in `position` (m,)."""
         found = self._independent(generator, shape, dtype)
@@ -65,7 +65,7 @@ class Noise:
         return found.astype(dtype, copy=False)
 
     def _independent(
-        self, generator: np.random.Generator, shape: tuple[int, ...], dtype: DTypeLike
+        self, generator: np.random.Generator, shape: tuple[int, ...], dtype: Precision
     ) -> Any:
         if self.distribution == "normal":
             return generator.standard_normal(shape, dtype)

@@ -5,12 +5,12 @@ tasks.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from ..design.lookup import Floats, References
-from ..design.noise import Distribution, Noise, NoiseSettings
+from ..design.noise import Noise, NoiseSettings
 from ..design.objects import Machine, Volume
 from ..geometry.ball_layouts import frozen
 from ..inputs.messages import ExperimentError, Steps
@@ -80,7 +80,7 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
     if settings is None:
         return Noise()
     if isinstance(settings, str):
-        settings = NoiseSettings(distribution=cast(Distribution, settings))
+        settings = NoiseSettings.model_validate({"distribution": settings})
     given, steps = settings.degrees_of_freedom, ("noise",)
     if settings.distribution == "student t" and given is None:
         text = "student t has no degrees of freedom; write {distribution: student t, degrees_of_"

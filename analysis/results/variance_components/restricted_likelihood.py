@@ -79,7 +79,7 @@ def group_sums(left: Leftover, groups: Sequence[Group]) -> GroupSums:
 def at_ratios(sums: GroupSums, ratios: Array) -> AtRatios:
     """The restricted likelihood where variances are `ratios` (g,) of the stated ones."""
     linalg, weights = scipy_linalg(), 1.0 / ratios
-    root = np.linalg.cholesky(np.tensordot(weights, sums.grams, 1))
+    root = np.asarray(np.linalg.cholesky(np.tensordot(weights, sums.grams, 1)))
     solution = linalg.cho_solve((root, True), weights @ sums.sides)
     quadratic = sums.grams @ solution
     squares = weights * (sums.squares - 2.0 * sums.sides @ solution + quadratic @ solution)
@@ -232,7 +232,7 @@ class Whitened:
 
     @cached_property
     def root(self) -> Array:
-        return np.linalg.cholesky(np.tensordot(1.0 / self.ratios, self.sums.grams, 1))
+        return np.asarray(np.linalg.cholesky(np.tensordot(1.0 / self.ratios, self.sums.grams, 1)))
 
     @cached_property
     def absorbed(self) -> Array:

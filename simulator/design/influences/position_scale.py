@@ -62,7 +62,8 @@ class PositionScaleSettings(InfluenceSettings):
         """The scales in a design."""
         u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
         names, d = design.positions.names, design.machine.dimension
-        place, parameters = np.full((len(names), d), -1), []
+        place = np.full((len(names), d), -1)
+        parameters: list[InfluenceParameter] = []
         for k in np.unique(design.readings.position).tolist():
             if names[k] not in (self.positions or names):
                 continue
