@@ -52,10 +52,12 @@ if TYPE_CHECKING:
     from .planning.requirements.answers import Reach
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
+    from .planning.sheet import Sheet
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
     from .results.fit import Fit
+    from .results.imported import ReadReport
     from .results.prediction import Prediction
 
 PathLike = str | os.PathLike[str]
@@ -286,6 +288,49 @@ def certificate(
     return pandas.DataFrame(rows, columns=list(certificate_files.COLUMNS))
 
 
+def read_report(
+    reports: PathLike | Sequence[PathLike],
+    experiment: Experiment | PathLike | None = None,
+    name: str | None = None,
+    form: str | None = None,
+    unit: Literal["mm", "cm", "m", "in"] | None = None,
+    circles: bool = False,
+) -> ReadReport:
+    """Readings out of reports that measuring programs write; their `to_frame()` is a table that
+    `fit` takes.
+
+    Positions, balls and probes are in the names of features, by a rule such as
+    {position}_{ball}_{probe}: that of `name`, or the one by which the names are those of the
+    `experiment`. `form` is dmis, pcdmis, calypso or qif, and is recognised if it is left out;
+    `unit` is that of reports which state none; `circles` takes centres of circles, too.
+
+    >>> read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
+    ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
+    """
+    from .results.imported import ReadReport
+    from .simulator.experiment.layout import lay_out
+    from .simulator.inputs.quantities import LENGTH_UNITS
+    from .simulator.readings.feature_names import check_rule
+    from .simulator.readings.formats.registered import FORMATS
+    from .simulator.readings.imported import ImportSettings, import_readings
+
+    paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
+    for path in paths:
+        ensure_path("reports", path)
+    if not paths:
+        raise ValueError("reports=[]; name at least one file")
+    ensure_type(str, "a rule such as {position}_{ball}", name=name)
+    ensure_one_of([one.name for one in FORMATS], form=form)
+    ensure_one_of(("mm", "cm", "m", "in"), unit=unit)
+    ensure_type(bool, "True or False", circles=circles)
+    design = None if experiment is None else lay_out(_experiment(experiment))
+    rule = None if name is None else check_rule(name)
+    factor = None if unit is None else LENGTH_UNITS[unit]
+    settings = ImportSettings(design, rule, form, factor, circles)
+    found = import_readings([Path(path) for path in paths], settings)
+    return ReadReport(Path(paths[0]).stem, found)
+
+
 @overload
 def fit(
     experiment: Experiment | PathLike,
@@ -493,6 +538,23 @@ def plan(
     taken = None if done is None else _table("done", done)
     before = None if earlier is None else Path(earlier)
     return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)
+
+
+def sheet(experiment: Experiment | PathLike) -> Sheet:
+    """What goes to the laboratory with an experiment: a run sheet, a table to fill in, and points
+    for a program.
+
+    `text()` is the run sheet, `template()` the CSV file of readings with empty cells, and
+    `points()` the nominal centres of the balls; that of a plan is its `to_print`.
+
+    >>> sheet(quickstart())
+    <Sheet of quickstart: 6 positions, 250 readings>
+    >>> sheet(quickstart()).template().splitlines()[:2]
+    ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
+    """
+    from .planning.sheet import sheet_of
+
+    return sheet_of(_experiment(experiment))
 
 
 def reliability(

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_json, add_picture, add_workers, count, number, show, single, whole
 from .outputs import Writer, add_force, add_output, text_writer, write
+from .sheet import sheet_name
 from .telling import note
 
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
-
-SHEETS = (".html", ".md", ".csv", ".txt")
-
 
 HELP = "choose positions and certificates from a pool, and bound what any choice could achieve"
 DESCRIPTION = (
@@ -81,7 +79,7 @@ def add_options(parser: ArgumentParser) -> None:
         output,
         "--sheet",
         metavar="FILE",
-        type=_sheet,
+        type=sheet_name,
         help="write the run sheet: .html to print, .md, .csv or .txt",
     )
     output.add_argument(
@@ -128,12 +126,6 @@ def _hours(text: str) -> float:
     if not 0.0 < value < 1e5:
         raise ArgumentTypeError(f'expected hours above zero, such as 7.5, not "{text}"')
     return value
-
-
-def _sheet(text: str) -> Path:
-    if not text.lower().endswith(SHEETS):
-        raise ArgumentTypeError(f'a run sheet\'s name ends in {", ".join(SHEETS)}, unlike "{text}"')
-    return Path(text)
 
 
 def run(options: Namespace) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.machines.arrangement import AXES
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.volumetric import meaning, symbol
 
@@ -216,7 +217,7 @@ def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
                 zorder=3,
             )
         _band_in_legend(axes, bool(deviation.any()))
-        _finish(axes, f"{name[2].lower()}, mm", unit)
+        _finish(axes, f"{AXES[along.error.axis]}, mm", unit)
         return save(figure, path, f"{name}, {meaning(name)}{band}")
 
 

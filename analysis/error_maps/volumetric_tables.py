@@ -219,7 +219,7 @@ def along_lines(along: AlongAxis) -> list[str]:
         if along.measured is None
         else np.flatnonzero(np.isin(positions, along.measured.positions))
     )
-    axis = along.error.name[2].lower()
+    axis = AXES[along.error.axis]
     rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name in given)]]
     for k in keep:
         rows.append(

@@ -28,6 +28,7 @@ from .offer import Offer, offer, open_directions
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
+from .short_names import short_names, with_names
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -172,7 +173,11 @@ def _campaign(
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
-    in_order = run_sheet(chosen, pool.changes, done, completed, interrupted).chosen
+    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted)
+    names = short_names(
+        (step.position for step in sheet.steps), offered.names, [one.name for one in candidates]
+    )
+    in_order = run_sheet(chosen, pool.changes, done, completed, interrupted, names).written
     return Campaign(
         experiment,
         pool,
@@ -193,12 +198,16 @@ def _campaign(
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
         predict(
-            replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)
+            replace(
+                with_chosen(with_names(experiment, names), in_order),
+                expected_rank_deficiency=left_open or None,
+            )
         ),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
         left_open,
+        names=names,
     )
 
 

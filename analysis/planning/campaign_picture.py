@@ -5,12 +5,13 @@ positions.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.experiment.model import Candidate
 
 from ..planning.choice import Gain, Selection
 from ..planning.constraints import HOUR, Budget, Spent
@@ -320,7 +321,7 @@ def _rows(selection: Selection) -> list[_Row]:
     of the others.
     """
     numbers = {name: k + 1 for k, name in enumerate(selection.prediction.design.positions.names)}
-    rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in selection.gains[:MOST_CHOSEN]]
+    rows = [_row(selection, gain, numbers) for gain in selection.gains[:MOST_CHOSEN]]
     if len(selection.gains) > MOST_CHOSEN:
         rows.append(
             _Row(
@@ -329,11 +330,11 @@ def _rows(selection: Selection) -> list[_Row]:
         )
     rows += [
         _Row(
-            _shown(numbers.get(one.name)),
-            one.name,
+            _shown(_place(selection, one, numbers)),
+            selection.title_of(one),
             "read already",
             None,
-            _colour(numbers.get(one.name)),
+            _colour(_place(selection, one, numbers)),
         )
         for one in selection.done[: max(MOST_CHOSEN - len(selection.gains), 0)]
     ]
@@ -342,13 +343,19 @@ def _rows(selection: Selection) -> list[_Row]:
         rows.append(
             _Row("", "left out; how much larger it is without each of these", "", None, MUTED)
         )
-    return rows + [_row(gain, None) for gain in left_out[:MOST_LEFT_OUT]]
+    return rows + [_row(selection, gain, {}) for gain in left_out[:MOST_LEFT_OUT]]
 
 
-def _row(gain: Gain, place: int | None) -> _Row:
+def _row(selection: Selection, gain: Gain, numbers: Mapping[str, int]) -> _Row:
+    place = _place(selection, gain.candidate, numbers)
     size = None if math.isnan(gain.relative) else gain.relative
     told = "–" if size is None else "needed" if math.isinf(size) else f"{number(100 * size, 2)} %"
-    return _Row(_shown(place), gain.candidate.name, told, size, _colour(place))
+    return _Row(_shown(place), selection.title_of(gain.candidate), told, size, _colour(place))
+
+
+def _place(selection: Selection, one: Candidate, numbers: Mapping[str, int]) -> int | None:
+    """The number of a candidate in the drawing, by its short name if it has one."""
+    return numbers.get(selection.names.get(one.name, one.name))
 
 
 def _shown(place: int | None) -> str:

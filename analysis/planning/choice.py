@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
@@ -10,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
+from .done import REST
 from .schedule import Completion
 
 
@@ -52,7 +54,8 @@ class Selection:
     is infinite where the selection leaves something undetermined; `bound` is what no selection can
     do better than, NaN where there is none. `drawn` is the criterion of the positions of the
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
-    `drawn_words`; None without any. `prediction` judges what is chosen in full.
+    `drawn_words`; None without any. `prediction` judges what is chosen in full. `names` are the
+    short names of positions whose names the pool composed.
     """
 
     experiment: Experiment
@@ -78,6 +81,15 @@ class Selection:
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def title_of(self, candidate: Candidate) -> str:
+        """The name of a candidate, after its short name if it has one."""
+        rest, name = "", candidate.name
+        if name.startswith(REST):
+            rest, name = REST, name.removeprefix(REST)
+        short = self.names.get(name, name)
+        return candidate.name if short == name else f"{rest}{short}, {name}"
 
     @property
     def efficiency(self) -> float:

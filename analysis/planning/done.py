@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -27,6 +27,7 @@ GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
 # How what completes a position, and what sets it up again, is named.
 REST = "rest of "
+SHORT = re.compile(r"[Pp][1-9][0-9]*")
 AGAIN = re.compile(r"(.*) again(?: ([1-9][0-9]*))?", re.DOTALL)
 
 # How often a ball is read with a probe, by ball and probe.
@@ -52,11 +53,13 @@ class SetUp:
         return self.read.name
 
 
-def done_candidates(path: Path | GivenText, experiment: Experiment) -> tuple[SetUp, ...]:
+def done_candidates(
+    path: Path | GivenText, experiment: Experiment, names: Mapping[str, str] | None = None
+) -> tuple[SetUp, ...]:
     """Set-ups of a pool's candidates that a file of readings has readings of, in its order.
 
     A position may have been set up more than once: "low again" is another set-up of the candidate
-    "low".
+    "low". `names` tell what the file calls candidates that a plan gave short names.
 
     :raises ExperimentError: the file is wrong, or names a position that is no candidate.
     """
@@ -64,29 +67,43 @@ def done_candidates(path: Path | GivenText, experiment: Experiment) -> tuple[Set
     candidates = experiment.pool.candidates
     places = {c.name: k for k, c in enumerate(candidates) if isinstance(c.item, Position)}
     texts, defaults = ["position", "ball", "probe"], {"probe": ""}
+    planned = {short: name for name, short in (names or {}).items()}
     messages: dict[str, Message] = {}
     found: dict[str, int] = {}
     name = ""
     for row in read_table(path, texts, AXES[: experiment.dimension], ["u"], defaults=defaults):
         name = row.texts[0]
-        base = places.get(name, places.get(base_name(name)))
+        meant = _meant(name, planned)
+        base = places.get(meant, places.get(base_name(meant)))
         if base is not None:
             found[name] = base
         elif name not in messages:
             text = f'no position "{name}" in the file or its pool; {hint(name, places)}'
+            if not planned and SHORT.fullmatch(name):
+                text += "; if a plan named it, give the file of that plan with --from"
             messages[name] = row.mark.message("", text)
     if messages:
         raise ExperimentError(list(messages.values()))
     drawn = [renamed(candidates[base], own) for own, base in found.items()]
     design = read_readings(path, lay_out(with_chosen(experiment, drawn)), every_ball=False).design
     result = []
-    for number, (candidate, base) in enumerate(zip(drawn, found.values(), strict=True)):
+    for number, (as_read, base) in enumerate(zip(drawn, found.values(), strict=True)):
+        own = _meant(as_read.name, planned)
+        candidate = renamed(candidates[base], own)
         item = _position(candidate)
         own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
         first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
         taken = tuple(_groups(own_readings, first, design.probes.names, experiment, item))
-        result.append(_set_up(experiment, candidate, base, taken, candidate.name == name))
+        result.append(_set_up(experiment, candidate, base, taken, as_read.name == name))
     return tuple(result)
+
+
+def _meant(name: str, planned: Mapping[str, str]) -> str:
+    """The name in the pool of what a file of readings calls so."""
+    if name in planned:
+        return planned[name]
+    base = base_name(name)
+    return planned[base] + name[len(base) :] if base in planned else name
 
 
 def renamed(candidate: Candidate, name: str) -> Candidate:

@@ -10,6 +10,8 @@ from ballplate.simulator.geometry.positions import AXIS_INDEX, ball_coordinates
 from ballplate.simulator.inputs.messages import in_one_line
 
 SIZE, MARGIN = 170.0, 22.0
+# A name longer than this is told by a number instead.
+LONGEST_NAME = 9
 # Of more balls only those at the corners are drawn.
 MOST_BALLS = 400
 # Axis across the drawing, whether it runs to the left, and axis upwards, as seen from the end of
@@ -48,10 +50,16 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
     )
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
+    # The name goes where there are no balls, and where it is outside the volume other words make
+    # room for it.
+    y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
+    above, below = (11 if y < top + 4 else 0), (11 if y > top + height else 0)
+    name = layout.names[0] if len(layout.names[0]) <= LONGEST_NAME else "1"
     parts = [
         (
-            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img"'
-            f' aria-label="{escaped(candidate.name)}" font-family="sans-serif" font-size="10">'
+            f'<svg viewBox="0 {top - 18 - above:.1f} {SIZE:g} {height + 38 + above + below:.1f}"'
+            f' role="img" aria-label="{escaped(candidate.name)}" font-family="sans-serif"'
+            ' font-size="10">'
         ),
         (
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
@@ -69,16 +77,13 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
             f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}"'
             ' stroke="#222"/>'
         )
-    # The name goes where there are no balls.
-    y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
     label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
     parts.append(
-        f'{label} stroke="white" stroke-width="3"'
-        f' paint-order="stroke">{escaped(layout.names[0])}</text>'
+        f'{label} stroke="white" stroke-width="3" paint-order="stroke">{escaped(name)}</text>'
     )
     arrow = f"← {across}" if to_left else f"{across} →"
     parts.append(
-        f'<text x="{SIZE / 2:g}" y="{top + height + 13:.1f}" text-anchor="middle"'
+        f'<text x="{SIZE / 2:g}" y="{top + height + 13 + below:.1f}" text-anchor="middle"'
         f' fill="#555">{arrow}</text>'
     )
     x, y = left - 6, top + height / 2
@@ -88,7 +93,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     )
     seen = f"seen from +{plane}" if d == 3 else "seen from above"
     parts.append(
-        f'<text x="{SIZE / 2:g}" y="{top - 6:.1f}" text-anchor="middle"'
+        f'<text x="{SIZE / 2:g}" y="{top - 6 - above:.1f}" text-anchor="middle"'
         f' fill="#555">{seen}</text></svg>'
     )
     return "".join(parts)

@@ -17,11 +17,12 @@ from ballplate.simulator.inputs.yamltree import GivenText
 
 from .done import done_candidates
 from .offer import Offer, offer
+from .short_names import names_of_plan
 
 
 def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
-    """Indices of the candidates that an experiment consists of: its positions by name, calibration
-    items by content.
+    """Indices of the candidates that an experiment consists of: its positions by name, or by what
+    describes a short name, calibration items by content.
 
     A position that was interrupted since stands for what completes it, or sets it up again, unless
     no more was to be read of it than has been. Items of calibration that are no candidates belong
@@ -37,7 +38,12 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
         for k, one in enumerate(candidates)
         if isinstance(one.item, Position) and k not in rests
     }
-    unknown = [position.name for position in chosen.positions if position.name not in places]
+    named = {
+        one.name: one.description if one.description in places else one.name
+        for one in chosen.positions
+        if one.name not in places
+    }
+    unknown = [name for name, meant in named.items() if meant not in places]
     if unknown:
         raise ExperimentError(
             message(f'"{name}" is not a candidate of the pool; {hint(name, places)}')
@@ -46,12 +52,15 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
     moved = [
         one.name
         for one in chosen.positions
-        if not _same_place(one, candidates[places[one.name]].item)
+        if not _same_place(one, candidates[places[named.get(one.name, one.name)]].item)
     ]
     if moved:
         told = "is elsewhere, or of another artefact, in the pool; give it another name"
         raise ExperimentError(message(f'"{name}" {told}') for name in moved)
-    found = [_now(offered, places[position.name], position) for position in chosen.positions]
+    found = [
+        _now(offered, places[named.get(position.name, position.name)], position)
+        for position in chosen.positions
+    ]
     for k, candidate in enumerate(candidates):
         item = candidate.item
         if not isinstance(item, Position) and any(
@@ -100,21 +109,28 @@ def begun(
     """
     if experiment.pool is None:
         return None, None
-    offered, messages = offer(experiment.pool), list[Message]()
-    chosen = None
+    pool, messages = experiment.pool, list[Message]()
+    chosen, before, names = None, None, dict[str, str]()
+    try:
+        if earlier is not None:
+            variants = load(earlier)
+            if len(variants) > 1:
+                text = "the file has several variants; name a design that was chosen"
+                raise refused(earlier, text, "variants")
+            before = variants[0]
+            names = names_of_plan(before, {one.name for one in pool.candidates})
+    except ExperimentError as error:
+        messages += error.messages
+    offered = offer(pool, known=names)
     try:
         if done is not None:
-            taken = done_candidates(done, experiment)
-            offered = offer(experiment.pool, taken, standing=not moved)
+            taken = done_candidates(done, experiment, names)
+            offered = offer(pool, taken, not moved, names)
     except ExperimentError as error:
         messages += error.messages
     try:
-        if earlier is not None:
-            before = load(earlier)
-            if len(before) > 1:
-                text = "the file has several variants; name a design that was chosen"
-                raise refused(earlier, text, "variants")
-            chosen = earlier_choice(before[0], offered)
+        if before is not None:
+            chosen = earlier_choice(before, offered)
     except ExperimentError as error:
         messages += error.messages
     if messages:

@@ -29,6 +29,8 @@ from ballplate.simulator.inputs.yamltree import (
 from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
 from ballplate.simulator.machines.custom import module_file
 
+from .short_names import renamed_keys
+
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 SCHEMA_LINE = "# yaml-language-server:"
 
@@ -40,6 +42,7 @@ def experiment_text(
     folder: Path,
     title: str | None = None,
     expected_rank_deficiency: int | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> str:
     """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
     in their order.
@@ -47,7 +50,8 @@ def experiment_text(
     `experiment` is the source, loaded for planning; of one with variants the overrides are applied.
     `header` becomes comments at the top. Names of files lead from `folder` to the same files. A
     stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
-    position places, what is known of them, and priors about other positions.
+    position places, what is known of them, and priors about other positions. `names` are the short
+    names of chosen positions by those in the pool.
 
     Of an experiment that was made or changed in Python nothing of a file is kept.
 
@@ -56,7 +60,7 @@ def experiment_text(
     source = experiment.source
     text, root, tree = _source(experiment)
     assert isinstance(root, MappingNode) and isinstance(tree, MappingNode)
-    content = _content(tree, experiment, chosen)
+    content = _content(tree, experiment, chosen, names or {})
     if title is not None:
         content["title"] = title
     if expected_rank_deficiency is not None:
@@ -125,14 +129,17 @@ def _source(experiment: Experiment) -> tuple[str, Node, Node]:
 
 
 def _content(
-    tree: MappingNode, experiment: Experiment, chosen: Sequence[Candidate]
+    tree: MappingNode,
+    experiment: Experiment,
+    chosen: Sequence[Candidate],
+    short: Mapping[str, str],
 ) -> dict[str, Any]:
     said: dict[str, Any] = to_list(to_python(tree))
     positions = [one for one in chosen if isinstance(one.item, Position)]
     placed = {one.item.artefact for one in positions}
     names = {one.name for one in positions}
     others = (
-        {one.name for one in experiment.pool.candidates} - names
+        {one.name for one in experiment.pool.candidates} - names - set(short)
         if experiment.pool is not None
         else set()
     )
@@ -156,7 +163,7 @@ def _content(
     for one in said.get("influences", []):
         left = {name: at for name, at in one.get("positions", {}).items() if name not in others}
         one.pop("positions", None)
-        one |= {"positions": left} if left else {}
+        one |= {"positions": renamed_keys(left, short)} if left else {}
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
     order = (

@@ -8,8 +8,8 @@ What was read of it counts in any case.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 
@@ -38,6 +38,7 @@ class Offer:
 
     `done` in the order in which they were read; `must` and `at_least` (of each, one) have to be
     chosen. `replaced` tells by what candidates of the pool that were interrupted may be chosen now.
+    `names` are short names of an earlier plan, by those of candidates.
     """
 
     candidates: tuple[Candidate, ...]
@@ -50,6 +51,7 @@ class Offer:
     pool: Pool
     taken: tuple[SetUp, ...]
     is_standing: bool
+    names: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def standing(self) -> Interrupted | None:
@@ -112,7 +114,7 @@ class Offer:
         left = [
             one for one in self.taken if one.rest is None or one.read.item.artefact not in plates
         ]
-        return offer(self.pool, left, self.is_standing)
+        return offer(self.pool, left, self.is_standing, self.names)
 
     def find(self, names: Sequence[str]) -> list[int]:
         """Candidates by name, or those of the pool that they go back to."""
@@ -129,11 +131,16 @@ class Offer:
         return self.replaced.get(k, (k,))[0]
 
 
-def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Offer:
+def offer(
+    pool: Pool,
+    taken: Sequence[SetUp] = (),
+    standing: bool = True,
+    known: Mapping[str, str] | None = None,
+) -> Offer:
     """What may be chosen from a pool after some set-ups have been read.
 
     `standing` states whether the artefact still is where it was read last, so that this position
-    can be completed.
+    can be completed; `known` are short names of an earlier plan.
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}
@@ -187,6 +194,7 @@ def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Off
         pool,
         tuple(taken),
         standing,
+        known or {},
     )
 
 

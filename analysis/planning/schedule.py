@@ -11,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Visit, cheapest, kind_of
+from .short_names import with_short_name
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Step:
     itself, and `start` when its change-over begins, in seconds from the first position that is to
     be read. What is `done` has neither. Of a position that is completed, `whole` has all readings
     and `candidate` those still to be taken. One that was interrupted and is not completed is `left`
-    so.
+    so. `short` is the short name of a position whose name the pool composed.
     """
 
     candidate: Candidate
@@ -46,10 +47,28 @@ class Step:
     done: bool
     whole: Candidate | None = None
     left: bool = False
+    short: str = ""
+
+    @property
+    def position(self) -> Candidate:
+        """The position with all its readings, also those taken already."""
+        return self.whole or self.candidate
 
     @property
     def name(self) -> str:
-        return (self.whole or self.candidate).name
+        return self.short or self.position.name
+
+    @property
+    def description(self) -> str:
+        """What the position is, beside its name; empty where the name says all there is."""
+        item = self.position.item
+        assert isinstance(item, Position)
+        return item.description if self.name == self.position.name else self.position.name
+
+    @property
+    def title(self) -> str:
+        """Name and description."""
+        return f"{self.name}, {self.description}" if self.description else self.name
 
     @property
     def artefact(self) -> str:
@@ -68,10 +87,13 @@ class Step:
 class RunSheet:
     """Positions in the order to read them, those done first, and items of calibration with their
     price in seconds.
+
+    Where no times are stated it is not `timed`, and all times are zero.
     """
 
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
+    timed: bool = True
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -83,6 +105,15 @@ class RunSheet:
         """
         steps = sorted(self.steps, key=lambda step: step.left)
         return (*(step.whole or step.candidate for step in steps), *self.calibration)
+
+    @property
+    def written(self) -> tuple[Candidate, ...]:
+        """The same under their short names, as an experiment file says them."""
+        named = {
+            step.position.name: with_short_name(step.position, step.name, step.probes)
+            for step in self.steps
+        }
+        return tuple(named.get(one.name, one) for one in self.chosen)
 
     @property
     def seconds(self) -> float:
@@ -104,6 +135,7 @@ def run_sheet(
     done: Sequence[Candidate] = (),
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
+    names: Mapping[str, str] | None = None,
 ) -> RunSheet:
     """The run sheet of chosen candidates: the order that costs least, what is done already first
     and as it was.
@@ -111,13 +143,15 @@ def run_sheet(
     Candidates that are `done` may be among the chosen ones too. They take no time any more, and as
     before any first position nothing is changed before the first that is left. A position that is
     `completed` is that first one, as long as its artefact stands; only its rest takes time. What
-    else is `interrupted` stays as it is.
+    else is `interrupted` stays as it is. `names` are short names by those of candidates.
     """
     again = set() if completed is None else {completed.whole.name}
     before = [one for one in done if isinstance(one.item, Position) and one.name not in again]
-    names = {candidate.name for candidate in before} | again
+    earlier = {candidate.name for candidate in before} | again
     left = {one.name for one in interrupted} - again
-    positions = [one for one in chosen if isinstance(one.item, Position) and one.name not in names]
+    positions = [
+        one for one in chosen if isinstance(one.item, Position) and one.name not in earlier
+    ]
     sequence = ordered(positions, changes, before, None if completed is None else completed.rest)
     steps: list[Step] = []
     elapsed = 0.0
@@ -125,9 +159,9 @@ def run_sheet(
         is_done = k < len(before)
         change, words = 0.0, ""
         if k > len(before):
-            change, words = _change(sequence[k - 1], sequence[k], changes)
+            change, words = change_over(sequence[k - 1], sequence[k], changes)
         seconds = 0.0 if is_done else candidate.seconds
-        place, balls, whole = _place(candidate), _balls(candidate), None
+        place, balls, whole = place_words(candidate), ball_words(candidate), None
         if completed is not None and candidate is completed.rest:
             whole = completed.whole
             place = f"as it stands: {place}"
@@ -147,6 +181,7 @@ def run_sheet(
                 is_done,
                 whole,
                 is_left,
+                (names or {}).get((whole or candidate).name, ""),
             )
         )
         elapsed += change + seconds
@@ -155,11 +190,12 @@ def run_sheet(
     )
 
 
-def _change(
+def change_over(
     one: tuple[Candidate, tuple[str, ...]],
     other: tuple[Candidate, tuple[str, ...]],
     changes: ChangeTimes,
 ) -> tuple[float, str]:
+    """Seconds of the change from one position to another, and what is changed in words."""
     before, after = kind_of(one[0]), kind_of(other[0])
     words = []
     if before.artefact != after.artefact:
@@ -173,7 +209,7 @@ def _change(
     return seconds, ", ".join(words)
 
 
-def _place(candidate: Candidate) -> str:
+def place_words(candidate: Candidate) -> str:
     """How the artefact is set up, in words; lengths are those of the file."""
     said: Mapping[str, Any] = candidate.settings
     if said.get("pose") is not None:
@@ -181,9 +217,11 @@ def _place(candidate: Candidate) -> str:
         rotation = pose.get("rotation")
         turned = "not turned"
         if rotation is not None:
-            one = isinstance(rotation, str)
+            several = isinstance(rotation, list | tuple)
             turned = (
-                f"turned by {rotation}" if one else f"turned by {', '.join(rotation)} about x, y, z"
+                f"turned by {', '.join(map(str, rotation))} about x, y, z"
+                if several
+                else f"turned by {rotation}"
             )
         return (
             f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))},"
@@ -210,7 +248,7 @@ def _at(lengths: Mapping[str, str]) -> str:
     return ", ".join(f"{axis} = {lengths[axis]}" for axis in sorted(lengths))
 
 
-def _balls(candidate: Candidate) -> str:
+def ball_words(candidate: Candidate) -> str:
     """Which balls are read, in words; with several groups of readings, by which probes."""
     assert isinstance(candidate.item, Position)
     groups = candidate.item.readings

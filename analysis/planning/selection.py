@@ -19,7 +19,9 @@ from .criteria import DESCRIPTIONS
 from .done import base_name
 from .experiment_file import experiment_text
 from .schedule import RunSheet, run_sheet
-from .sheet_forms import sheet_csv, sheet_data, sheet_lines, sheet_markdown, sheet_page
+from .sheet import Sheet
+from .sheet_forms import sheet_data, sheet_lines
+from .short_names import with_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,15 +46,15 @@ class Campaign(Selection, Result):
     def sheet(self) -> RunSheet:
         """The choice in the order in which it is to be read."""
         return run_sheet(
-            self.chosen, self.pool.changes, self.done, self.completed, self.interrupted
+            self.chosen, self.pool.changes, self.done, self.completed, self.interrupted, self.names
         )
 
     @property
     def chosen_experiment(self) -> Experiment:
         """The experiment with the chosen positions and certificates alone, in the order of the run
-        sheet.
+        sheet and under its short names.
         """
-        return with_chosen(self.experiment, self.sheet.chosen)
+        return with_chosen(with_names(self.experiment, self.names), self.sheet.written)
 
     def to_yaml(self, folder: str | Path = ".") -> str:
         """The choice as the text of an experiment file that is to stand in a folder.
@@ -63,8 +65,9 @@ class Campaign(Selection, Result):
         header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
         header += f" than {self.budget}."
         deficiency = self.left_open or None
+        written = self.sheet.written
         return experiment_text(
-            self.experiment, self.sheet.chosen, header, Path(folder), None, deficiency
+            self.experiment, written, header, Path(folder), None, deficiency, self.names
         )
 
     def sheet_text(self, form: str = ".txt") -> str:
@@ -72,16 +75,12 @@ class Campaign(Selection, Result):
 
         :raises ValueError: another form.
         """
-        sheet, experiment = self.sheet, self.experiment
-        if form == ".html":
-            return sheet_page(sheet, experiment, experiment.title)
-        if form == ".md":
-            return sheet_markdown(sheet, experiment.title)
-        if form == ".csv":
-            return sheet_csv(sheet)
-        if form == ".txt":
-            return "\n".join([experiment.title, "", *sheet_lines(sheet), ""])
-        raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
+        return self.to_print.text(form)
+
+    @property
+    def to_print(self) -> Sheet:
+        """The run sheet with what it is printed with: the table to fill in, and the points."""
+        return Sheet(self.experiment, self.sheet)
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
@@ -157,7 +156,7 @@ def _interrupted(campaign: Campaign) -> list[str]:
     lines = []
     for one in campaign.interrupted:
         text = (
-            f"{one.name} was interrupted after {one.readings}"
+            f"{campaign.title_of(one)} was interrupted after {one.readings}"
             f" reading{'' if one.readings == 1 else 's'}"
         )
         if campaign.completed is not None and campaign.completed.whole.name == one.name:
@@ -219,7 +218,10 @@ def _spent(spent: Spent) -> list[str]:
 
 def _gain_table(campaign: Campaign) -> list[str]:
     rows = [["", f"{campaign.criterion} without it", "with it", "minutes"]]
-    rows += [["chosen: " + gain.candidate.name, *_gain(campaign, gain)] for gain in campaign.gains]
+    rows += [
+        ["chosen: " + campaign.title_of(gain.candidate), *_gain(campaign, gain)]
+        for gain in campaign.gains
+    ]
     rows += [
         ["left out: " + gain.candidate.name, *_gain(campaign, gain)]
         for gain in campaign.left_out[:TOLD]
@@ -262,6 +264,7 @@ def _data(campaign: Campaign) -> dict[str, Any]:
         "excluded": campaign.excluded,
         "spent": asdict(campaign.spent),
         "chosen": [candidate.name for candidate in campaign.chosen],
+        "names": dict(campaign.names),
         "done": [candidate.name for candidate in campaign.done],
         "interrupted": [
             {"name": one.name, "readings": one.readings} for one in campaign.interrupted

@@ -14,7 +14,7 @@ from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.geometry.motions import pose_size
-from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
+from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
@@ -75,13 +75,13 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
     dropped: NDArray[np.bool_] = ~np.asarray(matrix.any(axis=1))
     if isinstance(design.model, KinematicModel):
         functions = [name.partition(" ")[0] for name in names]
-        for function in dict.fromkeys(functions):
-            if function[1] in TRANSLATIONS:
-                own = np.array([i for i, other in enumerate(functions) if other == function])
+        for function in design.model.functions:
+            if function.error.unit == "m" and function.basis.size:
+                own = np.array([i for i, other in enumerate(functions) if other == function.name])
                 # Coefficients of t^k - t^(k + 1) are sums of those of all higher monomials, up to
                 # sign.
                 matrix[own] = np.cumsum(matrix[own][::-1], axis=0)[::-1]
-                dropped[own[0]] |= function in HELD_AT_FAR_END
+                dropped[own[0]] |= function.basis.zero_at_one
     kept = np.flatnonzero(~dropped)
     rows = np.zeros((len(kept), len(layout)))
     rows[:, layout.model] = matrix[kept]

@@ -6,9 +6,15 @@ guideway has suffered about the positive axis in its name, so that the adjustmen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.machines.error_names import (
+    SQUARENESS_ERRORS,
+    TRANSLATIONS,
+    SquarenessError,
+)
 from ballplate.simulator.machines.protocol import Array, Unit
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
@@ -16,14 +22,6 @@ ARCSECOND = np.pi / (180.0 * 3600.0)
 # Below so many degrees of freedom a standard deviation is uncertain by more than about a quarter
 # (GUM, E.4.3).
 FEW = 10
-
-# Axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess
-# over 90 degrees.
-_SQUARENESS = (
-    ("X and Y", "Y", "X", -1, 1),  # C0Y
-    ("X and Z", "Z", "X", 1, -1),  # B0Z
-    ("Y and Z", "Z", "Y", -1, 1),  # A0Z
-)
 
 
 @dataclass(frozen=True)
@@ -45,9 +43,13 @@ class Adjustment:
 
 
 def adjustments(
-    values: Array, spread: Array, null: Array | None = None, degrees_of_freedom: float = np.inf
+    values: Array,
+    spread: Array,
+    null: Array | None = None,
+    degrees_of_freedom: float = np.inf,
+    squareness: Sequence[SquarenessError] = tuple(SQUARENESS_ERRORS.values()),
 ) -> tuple[Adjustment, ...]:
-    """From scale errors of X, Y and Z and C0Y, B0Z and A0Z (6,), or the latter alone (3,).
+    """From scale errors of X, Y and Z and `squareness` errors (6,), or the latter alone (s,).
 
     `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where
     scales are open and their differences are not, those of Y and Z against X are reported as well.
@@ -67,7 +69,7 @@ def adjustments(
             else (float(row @ values), float(np.linalg.norm(row @ spread)))
         )
 
-    if len(values) == 6:
+    if len(values) > len(squareness):
         for row, axis in zip(rows[:3], "XYZ", strict=True):
             value, u = told(row)
             found.append(
@@ -90,13 +92,13 @@ def adjustments(
                 found.append(
                     Adjustment(name, f"scale of {axis} against X", value, u, factor * u, "1", words)
                 )
-    for row, (axes, guideway, other, sign, excess) in zip(rows[-3:], _SQUARENESS, strict=True):
+    for row, error in zip(rows[-len(squareness) :], squareness, strict=True):
         value, u = told(row)
-        words = _turn(guideway, other, sign * value)
-        name = f"angle {other}{guideway}".lower()
-        found.append(
-            Adjustment(name, f"angle of {axes}", excess * value, u, factor * u, "rad", words)
-        )
+        guideway, other = TRANSLATIONS[error.axis], TRANSLATIONS[error.to]
+        words = _turn(guideway, other, error.sign * value)
+        name, what = f"angle {other}{guideway}".lower(), f"angle of {other} and {guideway}"
+        # An axis that leans towards the other makes the angle smaller.
+        found.append(Adjustment(name, what, -error.sign * value, u, factor * u, "rad", words))
     return tuple(found)
 
 

@@ -58,6 +58,13 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
     )
     lines += [f"({', '.join(places)})"] if places else []
     for quantity in quantities.values():
+        if quantity.parameters:
+            each = (
+                f"{name} {'undetermined' if math.isnan(u) else number(1e6 * u)}"
+                for name, u in quantity.parameters
+            )
+            unit = shown_unit(quantity.unit)
+            lines.append(f"({quantity.description}, {unit}: {', '.join(each)})")
         if quantity.within_target is not None:
             by = uncertainty_words(quantity.coverage_factor)
             lines.append(
@@ -348,6 +355,7 @@ def quantity_data(q: Quantity) -> dict[str, Any]:
         "largest_at": q.largest,
         **({"largest_places": list(q.places)} if q.places else {}),
         **compared,
+        **({"parameters": {name: finite(u) for name, u in q.parameters}} if q.parameters else {}),
         "description": q.description,
     }
 

@@ -13,6 +13,9 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.machines.error_names import SquarenessError
+from ballplate.simulator.machines.kinematic import KinematicModel
+from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 
@@ -165,7 +168,16 @@ def _variance_components(
 
 
 def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjustment, ...]:
-    if not isinstance(at.design.model, SpatialMetricModel):
+    model, of_model = at.design.model, at.layout.model
+    spread, null = sigma * at.shared[of_model], at.shared_null[of_model]
+    if isinstance(model, SpatialMetricModel):
+        return adjustments(at.state.a, spread, null, freedom)
+    chain = model.spatial if isinstance(model, PlaneModel) else model
+    if not isinstance(chain, KinematicModel) or chain.arrangement.workpiece_side:
+        # On the workpiece's side an axis's rotations turn its own line as well.
         return ()
-    of_model = at.layout.model
-    return adjustments(at.state.a, sigma * at.shared[of_model], at.shared_null[of_model], freedom)
+    square = [f.error for f in chain.functions if isinstance(f.error, SquarenessError)]
+    if not square:
+        return ()
+    own = [chain.slices[error.name].start for error in square]
+    return adjustments(at.state.a[own], spread[own], null[own], freedom, square)

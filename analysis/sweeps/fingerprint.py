@@ -46,6 +46,16 @@ LEFT_OUT = (
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 
+# Keys that files did not have at first, by what has them: where they are left out, all is as it was
+# without them.
+LATER_KEYS = {
+    "Experiment": ("influences",),
+    "KinematicSettings": ("functions", "squareness"),
+    "EmpiricalSettings": ("rotation_functions",),
+    "RadialSettings": ("function",),
+    "TrueMachineFileSettings": ("level",),
+}
+
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)
 
@@ -119,10 +129,13 @@ def _add(digest: _Digest, value: Any) -> None:
         _settings(digest, value)
     elif is_dataclass(value) and not isinstance(value, type):
         _text(digest, f"object {type(value).__name__}")
+        later = LATER_KEYS.get(type(value).__name__, ())
         for field in fields(value):
-            if field.name not in LEFT_OUT:
+            found = getattr(value, field.name)
+            is_left_out = field.name in later and found == field.default
+            if field.name not in LEFT_OUT and not is_left_out:
                 _text(digest, EARLIER_NAMES.get(field.name, field.name))
-                _add(digest, getattr(value, field.name))
+                _add(digest, found)
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
 
@@ -135,8 +148,10 @@ def _text(digest: _Digest, text: str) -> None:
 
 def _settings(digest: _Digest, value: BaseModel) -> None:
     _text(digest, f"settings {type(value).__name__}")
-    for name in type(value).model_fields:
-        if name not in TOLD_LATER:
+    later = LATER_KEYS.get(type(value).__name__, ())
+    for name, field in type(value).model_fields.items():
+        is_left_out = name in later and getattr(value, name) == field.default
+        if name not in TOLD_LATER and not is_left_out:
             _text(digest, EARLIER_NAMES.get(name, name))
             _add(digest, getattr(value, name))
     for name, item in sorted((value.__pydantic_private__ or {}).items()):

@@ -22,6 +22,7 @@ from pydantic import (
     ValidationError,
 )
 
+from ..uncertainty.quantities import RECORDED_IF_TOLD
 from .columns import is_reserved
 
 # Columns of a table that are no figures.
@@ -50,7 +51,8 @@ def _names(found: list[str]) -> tuple[str, ...]:
 
 def _is_figure(name: str) -> bool:
     is_own = name in OWN or name.endswith("_version")
-    return name.isprintable() and not is_own and (is_reserved(name) or name.startswith("tasks_"))
+    told = tuple(f"{symbol}_" for symbol in RECORDED_IF_TOLD)
+    return name.isprintable() and not is_own and (is_reserved(name) or name.startswith(told))
 
 
 Plain = Annotated[str, AfterValidator(in_lines)]

@@ -11,7 +11,7 @@ from ballplate.simulator.geometry.ball_layouts import Name
 from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings
 from pydantic import Field
 
-from ..uncertainty.quantities import QUANTITIES, RECORDED
+from ..uncertainty.quantities import QUANTITIES, RECORDED, RECORDED_IF_TOLD
 
 if TYPE_CHECKING:
     Quantity = str
@@ -19,6 +19,7 @@ else:
     Quantity = Literal[tuple(symbol for symbol in QUANTITIES if " " not in symbol)]
 
 KEPT = f"{RECORDED[0]} to {RECORDED[-1]}"
+MORE = ", ".join(RECORDED_IF_TOLD)
 
 Path = Annotated[str, Field(min_length=1)]
 Scalar = str | int | float | bool
@@ -117,5 +118,5 @@ class SweepSettings(Settings):
     )
     seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
     record: NonEmpty[Quantity] = Field(
-        RECORDED, description=f"quantities that are kept, {KEPT} and tasks; default: all of {KEPT}"
+        RECORDED, description=f"quantities that are kept, {KEPT} and {MORE}; default: all of {KEPT}"
     )

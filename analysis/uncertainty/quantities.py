@@ -22,6 +22,7 @@ from ballplate.simulator.estimation.functions import (
     Parameters,
 )
 from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.machines.error_names import SQUARENESS_ERRORS
 from ballplate.simulator.machines.protocol import Unit
 
 
@@ -37,7 +38,8 @@ class QuantityKind:
     `effect` says in a few words what reliability looks at changes of, and is empty where it does
     not. `has_target` states whether it is compared with the target uncertainty of the file,
     `in_replicates` whether Monte Carlo follows it, and `is_recorded` whether a sweep records it
-    by default. `needs` is what a design without it lacks.
+    by default. `one_by_one` tells each of its `Parameters` besides the largest. `needs` is what a
+    design without it lacks.
 
     :raises ValueError: it is between balls, or has a target, and is not about distances.
     """
@@ -52,6 +54,7 @@ class QuantityKind:
     has_target: bool = False
     in_replicates: bool = True
     is_recorded: bool = True
+    one_by_one: bool = False
     needs: str = ""
 
     def __post_init__(self) -> None:
@@ -131,6 +134,16 @@ def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
     return (Parameters(rows, names, units),) if quoted else ()
 
 
+def _squareness(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
+    """The squareness errors among the model's parameters, as angles."""
+    own = [k for k, one in enumerate(design.model.parameters) if one.function in SQUARENESS_ERRORS]
+    rows = np.zeros((len(own), len(layout)))
+    rows[np.arange(len(own)), layout.model.start + np.array(own, int)] = 1.0
+    parameters = [design.model.parameters[k] for k in own]
+    names, units = tuple(one.name for one in parameters), tuple(one.unit for one in parameters)
+    return (Parameters(rows, names, units),) if own else ()
+
+
 def _plates(design: Design) -> tuple[BallPlaces, ...]:
     """The balls of each plate."""
     return tuple(BallPlaces(design.balls.of(plate)) for plate in design.artefacts.plates)
@@ -167,6 +180,13 @@ QUANTITIES: dict[str, QuantityKind] = {
             "rad": ("angles", "model parameters: rotational errors"),
             "1": ("ratios", "model parameters: ratios"),
         },
+    ),
+    "squareness": QuantityKind(
+        "squareness errors",
+        _squareness,
+        unit="rad",
+        is_recorded=False,
+        one_by_one=True,
     ),
     "U4": QuantityKind(
         "error function at the evaluation points",
@@ -220,3 +240,5 @@ for _symbol, _kind in QUANTITIES.items():
 RECORDED = tuple(
     symbol for symbol, kind in QUANTITIES.items() if kind.is_recorded and " " not in symbol
 )
+# Those that it records if told.
+RECORDED_IF_TOLD = tuple(symbol for symbol, kind in QUANTITIES.items() if not kind.is_recorded)

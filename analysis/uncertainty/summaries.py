@@ -38,7 +38,8 @@ class Quantity:
     the maximum stands. `within_target` is the share of distances whose uncertainty,
     `coverage_factor` times the standard one, is within the target uncertainty, those undetermined
     counted as not; None where no target is compared with. `places` tell where in the volume the
-    evaluation points are that `largest` names. `named` are distances with names one by one.
+    evaluation points are that `largest` names. `named` are distances with names one by one,
+    `parameters` names of parameters with their uncertainties, NaN where undetermined.
     """
 
     symbol: str
@@ -52,6 +53,7 @@ class Quantity:
     coverage_factor: float = 1.0
     places: tuple[str, ...] = ()
     named: tuple[TaskUncertainty, ...] = field(default=(), repr=False)
+    parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
 
     @property
     def description(self) -> str:
@@ -124,7 +126,10 @@ def _of_parameters(
 ) -> dict[str, Quantity]:
     values, kind = sigma * at.of_shared(given.rows), QUANTITIES[symbol]
     unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in given.units)
-    found = {symbol: summarise(symbol, values, unit, given.names.__getitem__)}
+    whole = summarise(symbol, values, unit, given.names.__getitem__)
+    if kind.one_by_one:
+        whole = replace(whole, parameters=tuple(zip(given.names, values.tolist(), strict=True)))
+    found = {symbol: whole}
     for part, (word, _) in kind.parts.items():
         chosen = [i for i, unit in enumerate(given.units) if unit == part]
         if chosen:

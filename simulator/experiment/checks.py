@@ -25,12 +25,12 @@ from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
 from ..machines.description import MachineDescription, random_part
+from ..machines.error_names import AXIS_ERRORS
 from ..machines.settings import (
     MachineFileSettings,
-    MetricSettings,
     PythonSettings,
     build_error_model,
-    dimension_of,
+    kind_of,
 )
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
@@ -81,33 +81,21 @@ def _check_model(
             build_error_model(settings, *machine.volume.corners)
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
-    elif isinstance(settings, MetricSettings):
-        allowed = {2: ("none", "x", "y", "split"), 3: ("each", "none")}.get(
-            references.dimension or 0
-        )
-        if allowed and settings.scale is not None and settings.scale not in allowed:
-            text = (
-                f"has no meaning in {references.dimension} dimensions; choose from:"
-                f" {listing(allowed)}"
-            )
-            references.problems.add((*steps, "scale"), text)
-    elif references.dimension not in (None, dimension_of(settings)):
+        return True
+    kind, dimension = kind_of(settings), references.dimension
+    if dimension is None:
+        return True
+    if dimension not in kind.dimensions:
         text = (
-            f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume'
-            f" has {references.dimension}; change one of the two"
+            f'kind "{settings.kind}" has {kind.dimensions[0]} dimensions, but machine.volume has'
+            f" {dimension}; change one of the two"
         )
         references.problems.add((*steps, "kind"), text)
-    elif (
-        isinstance(settings, MachineFileSettings)
-        and machine is not None
-        and not build_error_model(settings, *machine.volume.corners).parameters
-    ):
-        text = (
-            f"{settings.file} states no error that could be estimated; give polynomials or tables"
-        )
-        references.problems.add((*steps, "file"), text)
-        return False
-    return True
+        return True
+    wrong = list(kind.wrong(settings, dimension))
+    for below, text in wrong:
+        references.problems.add((*steps, *below), text)
+    return not wrong
 
 
 def _machine_of_file(
@@ -125,9 +113,6 @@ def _true_machine_of_file(
 ) -> None:
     """Let the true machine be that of its file, or report what is wrong with it."""
     steps: Steps = ("true_machine", "file")
-    if references.dimension == 2:
-        text = 'kind "machine" has 3 dimensions, but machine.volume has 2; change one of the two'
-        references.problems.add(("true_machine", "kind"), text)
     found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
         return
@@ -140,9 +125,16 @@ def _true_machine_of_file(
             " machine file"
         )
         references.problems.add(steps, text)
-    if machine is None or machine.dimension != 3:
+    if machine is None:
         return
-    for axis, name in enumerate(AXES):
+    level = truth.level
+    if level is not None and machine.dimension == 3:
+        references.problems.add(("true_machine", "level"), "is for two dimensions; remove it")
+    elif level is not None and not found.lower[2] <= level <= found.upper[2]:
+        ends = " to ".join(format_length(one[2]) for one in (found.lower, found.upper))
+        text = f"is outside the file's volume, which goes from {ends} in z; stay within it"
+        references.problems.add(("true_machine", "level"), text)
+    for axis, name in enumerate(AXES[: machine.dimension]):
         low, high = machine.volume.lower[axis], machine.volume.upper[axis]
         if low < found.lower[axis] - TOLERANCE or high > found.upper[axis] + TOLERANCE:
             text = (
@@ -198,9 +190,6 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine have the curves of its files, or report what is wrong with them."""
     problems, curves = references.problems, dict[str, Points]()
-    if references.dimension == 2:
-        text = 'kind "curves" has 3 dimensions, but machine.volume has 2; change one of the two'
-        problems.add(("true_machine", "kind"), text)
     for i, file in enumerate(truth.files):
         steps: Steps = ("true_machine", "files", i)
         try:
@@ -215,10 +204,14 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
                 f"{listing(twice)} is in an earlier file already; leave it out of one of the two",
             )
         curves |= found
-        if machine is None or machine.dimension != 3:
+        if machine is None:
+            continue
+        if machine.dimension == 2 and not any(AXIS_ERRORS[one].in_plane for one in found):
+            text = "has no error that moves points within the plane of x and y; leave it out"
+            problems.add(steps, text)
             continue
         name, points = next(iter(found.items()))
-        axis = "XYZ".index(name[2])
+        axis = AXIS_ERRORS[name].axis
         lower, upper = machine.volume.lower[axis], machine.volume.upper[axis]
         covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
         if covered < 0.5 * (upper - lower):

@@ -20,7 +20,7 @@ from ..inputs.tables import (
 )
 from ..inputs.yamltree import Mark
 from ..machines.curves import NAMES, Points
-from ..machines.kinematic import TRANSLATIONS
+from ..machines.error_names import AXIS_ERRORS, TRANSLATIONS
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
@@ -110,9 +110,9 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
             problem = "has no unit" if known else "is not an error of an axis"
             messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
             continue
-        units: Mapping[str, Fraction] = (
-            LENGTH_UNITS if name == POSITION or name[1] in TRANSLATIONS else ANGLE_UNITS
-        )
+        error = AXIS_ERRORS.get(name.removesuffix(BANDWIDTH))
+        is_angle = error is not None and error.is_rotation
+        units: Mapping[str, Fraction] = ANGLE_UNITS if is_angle else LENGTH_UNITS
         if unit not in units:
             messages.append(
                 place.message(
@@ -126,7 +126,13 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
             )
         names.append(name)
         factors.append(units[unit])
-    axes = sorted({name[2] for name in names if name != POSITION})
+    axes = sorted(
+        {
+            TRANSLATIONS[AXIS_ERRORS[name.removesuffix(BANDWIDTH)].axis]
+            for name in names
+            if name != POSITION
+        }
+    )
     if not messages and (POSITION not in names or not axes):
         messages.append(
             mark.message("", f"has no position, or no error; write columns as in {EXAMPLE}")

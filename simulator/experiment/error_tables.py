@@ -17,6 +17,7 @@ from ..inputs.yamltree import Mark, read_text
 from ..machines.arrangement import AXES
 from ..machines.curves import Points
 from ..machines.description import Three
+from ..machines.error_names import AXIS_ERRORS
 from ..machines.straightness import Criterion
 from .curve_files import BANDWIDTH, read_numbered_curves
 
@@ -123,7 +124,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
             values[key] = KEYS[key](text)
         except LineError as error:
             messages.append(mark.message("", str(error)))
-    line_of, along = values.get("line", {}), name[2].lower()
+    line_of, along = values.get("line", {}), AXES[AXIS_ERRORS[name].axis]
     if along in line_of:
         mark = stated["line"][0]
         messages.append(mark.message("", f"the line runs along {along}; leave it out"))
@@ -140,7 +141,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
             f" alone, but has {listing(others)}" if others else ""
         )
         messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
-    elif name[1] not in {"X", "Y", "Z"} - {name[2]}:
+    elif not AXIS_ERRORS[name].is_straightness:
         text = f"{name} is not a straightness error; remove this line"
         messages += [
             stated[key][0].message("", text)

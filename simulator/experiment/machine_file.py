@@ -20,6 +20,7 @@ from ..inputs.settings import describe, listing
 from ..inputs.wording import explain
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
+from ..machines.arrangement_settings import arrangement_of
 from ..machines.curves import NAMES, Points
 from ..machines.description import (
     AxisTemperature,
@@ -29,7 +30,6 @@ from ..machines.description import (
     Squareness,
     Three,
 )
-from ..machines.settings import arrangement_of
 from ..machines.volumetric import DROOP, SQUARENESS
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings

@@ -17,11 +17,10 @@ from ..inputs.quantities import (
     TemperatureDifference,
 )
 from ..inputs.settings import Forms, Settings, Text
-from ..machines.curves import NAMES, Interpolation
-from ..machines.kinematic import ROTATIONS, describe
-from ..machines.settings import ARRANGEMENT, ArrangementName, ArrangementSettings
+from ..machines.arrangement_settings import ARRANGEMENT, ArrangementName, ArrangementSettings
+from ..machines.curves import Interpolation
+from ..machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
 from ..machines.straightness import Criterion
-from ..machines.volumetric import SQUARENESS, meaning
 from .position_sections import Edges
 from .sections import Line, VolumeSettings
 
@@ -112,17 +111,20 @@ class RotationSettings(_ErrorSettings):
     bandwidth: PositiveAngle | None = Field(None, description=BANDWIDTH)
 
 
-def _form_of(name: str) -> type[_ErrorSettings]:
-    if name[1] in ROTATIONS:
+def _form_of(error: AxisError) -> type[_ErrorSettings]:
+    if error.is_rotation:
         return RotationSettings
-    return PositioningSettings if name[1] == name[2] else StraightnessSettings
+    return StraightnessSettings if error.is_straightness else PositioningSettings
 
 
 ErrorsSettings = create_model(
     "ErrorsSettings",
     __base__=Settings,
     __doc__="Errors of the axes by their ISO 230-1 names; those left out are zero.",
-    **{name: (_form_of(name) | None, Field(None, description=describe(name))) for name in NAMES},  # type: ignore[call-overload]
+    **{  # type: ignore[call-overload]
+        name: (_form_of(error) | None, Field(None, description=error.meaning))
+        for name, error in AXIS_ERRORS.items()
+    },
 )
 
 
@@ -149,7 +151,10 @@ SquarenessSettings = create_model(
     "SquarenessSettings",
     __base__=Settings,
     __doc__="Squareness errors by their ISO 230-1 names; those left out are zero.",
-    **{name: (_Squareness | None, Field(None, description=meaning(name))) for name in SQUARENESS},  # type: ignore[call-overload]
+    **{  # type: ignore[call-overload]
+        name: (_Squareness | None, Field(None, description=error.meaning))
+        for name, error in SQUARENESS_ERRORS.items()
+    },
 )
 
 

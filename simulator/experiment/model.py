@@ -51,12 +51,16 @@ class ReadingGroup:
 
 @dataclass(frozen=True, eq=False)
 class Position:
-    """A position of an artefact, its nominal pose in the machine and what is read in it."""
+    """A position of an artefact, its nominal pose in the machine and what is read in it.
+
+    ``description`` says in words what a short name does not, empty where nothing is said.
+    """
 
     name: str
     artefact: str
     pose: Pose
     readings: tuple[ReadingGroup, ...]
+    description: str = ""
 
     @property
     def count(self) -> int:

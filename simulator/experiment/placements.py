@@ -38,7 +38,7 @@ def resolve_position(
     ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
-    return Position(settings.name, artefact, pose, readings)
+    return Position(settings.name, artefact, pose, readings, settings.description or "")
 
 
 def _readings(

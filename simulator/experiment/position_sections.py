@@ -74,6 +74,9 @@ class PositionSettings(Settings):
     """One position of an artefact and what is read in it."""
 
     name: Name = Field(description="name of the position, used in tables and messages")
+    description: Name | None = Field(
+        None, description="what the position is, beside a short name; shown on run sheets"
+    )
     artefact: Name | None = Field(
         None, description="name of the artefact; optional if there is exactly one"
     )

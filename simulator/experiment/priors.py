@@ -14,7 +14,7 @@ from ..inputs.settings import hint, shorten
 from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
-from ..machines.settings import build_error_model, dimension_of
+from ..machines.settings import build_error_model, kind_of
 from .model import Position, Prior
 from .sections import PriorSettings
 from .structure import Sections
@@ -33,7 +33,7 @@ def resolve_priors(
     settings, entries = sections.get("error_model"), sections.entries("priors")
     if not entries or settings is None or machine is None:
         return ()
-    if dimension_of(settings) not in (machine.dimension, None):
+    if machine.dimension not in kind_of(settings).dimensions:
         return ()
     try:
         model = build_error_model(settings, *machine.volume.corners)

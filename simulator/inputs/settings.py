@@ -13,7 +13,7 @@ def _form(value: Any) -> str:
     # Tags in angle brackets are left out of paths in messages.
     return (
         "<mapping>"
-        if isinstance(value, dict)
+        if isinstance(value, dict | BaseModel)
         else "<list>"
         if isinstance(value, tuple)
         else "<one>"

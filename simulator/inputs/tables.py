@@ -88,6 +88,7 @@ def read_table(
     places, factors = _columns(
         Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
     )
+    _refuse_unfilled(file, places, lengths, lines)
     count = len(places)
     places += [name for name in defaults if name not in places]
     constants = [defaults[name] for name in places[count:]]
@@ -126,6 +127,25 @@ def read_table(
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
+
+
+def _refuse_unfilled(
+    file: str, places: Sequence[str], lengths: Sequence[str], lines: Sequence[tuple[int, str]]
+) -> None:
+    """Refuse a table in which no length is filled in, in one message instead of one for each cell.
+
+    :raises ExperimentError: all required lengths are empty, in all rows.
+    """
+    columns = [places.index(name) for name in lengths]
+    rows = (split_cells(line) for _, line in lines[1:])
+    is_empty = len(lines) > 1 and bool(columns)
+    if is_empty and all(
+        cells is not None and len(cells) == len(places) and not any(cells[k][1] for k in columns)
+        for cells in rows
+    ):
+        text = f"nothing is filled in: {listing(lengths)} are empty in all {len(lines) - 1} rows"
+        text += "; write in what was read, and remove the lines of what was not"
+        raise ExperimentError([Message(file, lines[1][0], 1, "", text)])
 
 
 def _lengths_of(

@@ -125,13 +125,13 @@ class GivenText:
         return self.name
 
 
-def read_text(path: Path | GivenText) -> str:
-    """Read a UTF-8 text file.
+def read_bytes(path: Path | GivenText) -> bytes:
+    """Read a file as it is.
 
-    :raises ExperimentError: the file is missing, is a directory, cannot be read or is not UTF-8.
+    :raises ExperimentError: the file is missing, is a directory, is too large or cannot be read.
     """
     if isinstance(path, GivenText):
-        return path.text
+        return path.text.encode("utf-8", errors="surrogatepass")
     file = str(path)
     try:
         kind = path.stat().st_mode
@@ -151,6 +151,17 @@ def read_text(path: Path | GivenText) -> str:
         raise refused(file, f"cannot be read ({reason}); check its name and permissions") from None
     if len(content) > MOST_BYTES:
         raise refused(file, f"has more than {MOST_BYTES // 10**6} MB; leave some of it out")
+    return content
+
+
+def read_text(path: Path | GivenText) -> str:
+    """Read a UTF-8 text file.
+
+    :raises ExperimentError: the file is missing, is a directory, cannot be read or is not UTF-8.
+    """
+    if isinstance(path, GivenText):
+        return path.text
+    file, content = str(path), read_bytes(path)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .bases import Basis, spline_containing
 from .empirical import FRAME, FUNCTIONS, USUAL_OFFSET, EmpiricalModel, empirical_model
+from .error_names import AxisError
 from .kinematic import KinematicModel
 from .protocol import Array, ErrorModel
 from .terms import sums
@@ -40,8 +41,9 @@ def containing(model: KinematicModel) -> EmpiricalModel:
     >>> linear_map(kinematic, containing(kinematic)).shape
     (141, 51)
     """
-    families = tuple(dict.fromkeys(_family(f.basis) for f in model.functions))
-    rotational = tuple(dict.fromkeys(_family(f.basis) for f in model.functions if f.rotation))
+    of_axes = [f for f in model.functions if isinstance(f.error, AxisError)]
+    families = tuple(dict.fromkeys(_family(f.basis) for f in of_axes))
+    rotational = tuple(dict.fromkeys(_family(f.basis) for f in of_axes if f.rotation))
     raised = rotational if model.arrangement.workpiece_side else ()
     basis = spline_containing((*families, *raised), len(raised))
     lower, upper = np.asarray(model.lower), np.asarray(model.upper)

@@ -16,11 +16,13 @@ import numpy as np
 
 from .arrangement import Arrangement
 from .bases import Basis, Quoted
-from .kinematic import ROTATIONS, TRANSLATIONS, KinematicModel, error_function
-from .protocol import Array
+from .error_names import AXIS_ERRORS
+from .kinematic import ErrorFunction, KinematicModel
+from .plane import PlaneModel, in_space
+from .protocol import Array, ErrorModel
 
 Interpolation = Literal["linear", "cubic", "monotone"]
-NAMES = tuple(f"E{kind}{axis}" for axis in TRANSLATIONS for kind in (*TRANSLATIONS, *ROTATIONS))
+NAMES = tuple(AXIS_ERRORS)
 
 
 @dataclass(frozen=True)
@@ -100,14 +102,19 @@ def curves_model(
     lower: tuple[float, ...],
     upper: tuple[float, ...],
     full_rotations: bool = False,
-) -> KinematicModel:
+) -> ErrorModel:
     """The machine with the given curves by ISO 230-1 name, each multiplied by a parameter; other
     functions are zero.
+
+    In a volume of two dimensions those count that move points of the plane of x and y within it.
     """
+    plane = len(lower) == 2
     functions = []
     for name, points in curves.items():
-        axis = TRANSLATIONS.index(name[2])
-        functions.append(
-            error_function(name, points.curve(interpolation, lower[axis], upper[axis]))
-        )
-    return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
+        error = AXIS_ERRORS[name]
+        if plane and not error.in_plane:
+            continue
+        curve = points.curve(interpolation, lower[error.axis], upper[error.axis])
+        functions.append(ErrorFunction(error, curve))
+    chain = KinematicModel(arrangement, tuple(functions), *in_space(lower, upper), full_rotations)
+    return PlaneModel(chain, 0.0) if plane else chain

@@ -16,7 +16,8 @@ import numpy as np
 from .arrangement import Arrangement
 from .bases import Basis, Polynomial, Spline
 from .curves import Curve, Interpolation, Points, SingleFunction
-from .kinematic import ROTATIONS, TRANSLATIONS, KinematicModel, carried_vectors, error_function
+from .error_names import AXIS_ERRORS, ROTATIONS, SQUARENESS_ERRORS, TRANSLATIONS, AxisError
+from .kinematic import KinematicModel, carried_vectors, error_function
 from .protocol import Array, TrueMachine
 from .straightness import Criterion, reference_line
 from .volumetric import DROOP, Field, VolumetricModel, droop_field, squareness_field, thermal_field
@@ -104,16 +105,21 @@ class ParametricError:
     on_table: bool = False
 
     @property
+    def error(self) -> AxisError:
+        """What the name stands for."""
+        return AXIS_ERRORS[self.name]
+
+    @property
     def axis(self) -> int:
-        return TRANSLATIONS.index(self.name[2])
+        return self.error.axis
 
     @property
     def is_rotation(self) -> bool:
-        return self.name[1] in ROTATIONS
+        return self.error.is_rotation
 
     @property
     def is_straightness(self) -> bool:
-        return not self.is_rotation and self.name[1] != self.name[2]
+        return self.error.is_straightness
 
 
 @dataclass(frozen=True)
@@ -208,8 +214,7 @@ def coupling(machine: MachineDescription, error: ParametricError) -> Array:
         offset[0] = np.subtract(error.line, machine.reference)
         offset[0, error.axis] = 0.0
     sign, vector = carried_vectors(machine.arrangement, offset, np.array([error.probe]))[error.axis]
-    component = TRANSLATIONS.index(error.name[1])
-    return sign * np.cross(np.eye(3), vector)[:, component]
+    return sign * np.cross(np.eye(3), vector)[:, error.error.component]
 
 
 def stated_function(
@@ -259,12 +264,12 @@ def _by_rotations(
     if error.is_rotation:
         return []
     own = np.eye(3)[error.axis]
-    turned = np.cross(np.eye(3), own)[:, TRANSLATIONS.index(error.name[1])]
+    turned = np.cross(np.eye(3), own)[:, error.error.component]
     length = machine.upper[error.axis] - machine.lower[error.axis]
     t0 = float(machine.scaled(error.axis, machine.reference[error.axis]))
     parts: list[tuple[float, Combination | Lever]] = []
     for letter, factor, lever in zip(ROTATIONS, coupling(machine, error), turned, strict=True):
-        rotation = known.get(f"E{letter}{error.name[2]}")
+        rotation = known.get(f"E{letter}{TRANSLATIONS[error.axis]}")
         if rotation is not None and factor:
             parts.append((-float(factor), rotation))
         if rotation is not None and error.on_table and lever:
@@ -287,7 +292,7 @@ def _by_droop(
     tilt = droop_field(machine.arrangement_name, "phi1", 1.0)
     ends = np.array([error.line, error.line])
     ends[:, error.axis] = machine.lower[error.axis], machine.upper[error.axis]
-    component = TRANSLATIONS.index(error.name[1])
+    component = error.error.component
     start, end = (
         machine.droop["phi1"] * tilt.values(ends - np.array(machine.reference))[:, component]
     ).tolist()
@@ -349,8 +354,8 @@ def _at_reference(
     """
     if squareness.at is None:
         return squareness.value
-    first, second = {"EC0Y": (0, 1), "EB0Z": (0, 2), "EA0Z": (1, 2)}[squareness.name]
-    sign = -1.0 if squareness.name == "EB0Z" else 1.0
+    error = SQUARENESS_ERRORS[squareness.name]
+    first, second, sign = error.to, error.axis, -error.sign
     a = np.array([float(f.rotation) for f in model.chain.functions] + values)
     a[len(model.chain.functions) :] *= [one.unit == "rad" for one in model.fields]
     tilt = 0.0
@@ -361,6 +366,17 @@ def _at_reference(
         tilted = model.error(x, a, np.zeros_like(x))[:, across]
         tilt += reference_line(x[:, along], tilted, machine.criterion)[1]
     return squareness.value + sign * tilt
+
+
+def fitted_in_plane(machine: MachineDescription) -> MachineDescription:
+    """The machine with those errors only that move points of the plane of x and y within it."""
+    return replace(
+        machine,
+        errors=tuple(one for one in machine.errors if one.error.in_plane),
+        squareness=tuple(one for one in machine.squareness if SQUARENESS_ERRORS[one.name].in_plane),
+        temperature={axis: one for axis, one in machine.temperature.items() if axis != "z"},
+        droop={},
+    )
 
 
 def fitted_volumetric(

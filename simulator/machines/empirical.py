@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from ..geometry.motions import cross_matrices
-from .kinematic import rotation_and_derivatives
 from .protocol import Array, Line, Parameter, Reported, Unit
+from .rigid_chain import rotation_and_derivatives
 from .terms import Terms
 
 FUNCTIONS = {
@@ -58,7 +58,7 @@ class FrameError(ValueError):
 @dataclass(frozen=True)
 class EmpiricalModel:
     """e(x, a, p) of six functions in the same `terms`, each with the `columns` of them that are
-    free.
+    free; the rotations are in terms `of_rotations` where these are given.
 
     `lower` and `upper` (3,) bound the volume in metres; the functions depend on the place scaled to
     [0, 1] in it. `full_rotations` turns the probe offset by rotation matrices instead of adding the
@@ -70,23 +70,35 @@ class EmpiricalModel:
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     full_rotations: bool = False
+    of_rotations: Terms | None = None
 
     @property
     def dimension(self) -> int:
         return 3
 
+    @property
+    def _terms(self) -> tuple[Terms, ...]:
+        """The terms of each function."""
+        return _of_six(self.terms, self.of_rotations)
+
+    def _values(self, t: Array) -> list[Array]:
+        """The free terms of each function at places t (m, 3), each (m, number)."""
+        displacing = self.terms.values(t)
+        turning = displacing if self.of_rotations is None else self.of_rotations.values(t)
+        return [(turning if k >= 3 else displacing)[:, own] for k, own in enumerate(self._chosen)]
+
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         grid = np.linspace(0.0, 1.0, 9)
         places = np.stack(np.meshgrid(grid, grid, grid, indexing="ij"), axis=-1).reshape(-1, 3)
-        peaks = np.abs(self.terms.values(places)).max(axis=0)
+        peaks = [np.abs(values).max(axis=0, initial=0.0) for values in self._values(places)]
         arm = USUAL_OFFSET * float(np.subtract(self.upper, self.lower).max())
-        names = self.terms.names
         found = []
         for k, (function, meaning) in enumerate(FUNCTIONS.items()):
             unit: Unit = "rad" if k >= 3 else "m"
-            for column in self.columns[k]:
-                effect = float(peaks[column]) * (arm if k >= 3 else 1.0)
+            names = self._terms[k].names
+            for column, peak in zip(self.columns[k], peaks[k].tolist(), strict=True):
+                effect = peak * (arm if k >= 3 else 1.0)
                 found.append(
                     Parameter(f"{function} {names[column]}", unit, function, meaning, effect)
                 )
@@ -111,10 +123,8 @@ class EmpiricalModel:
 
     def functions(self, x: Array, a: Array) -> Array:
         """The six functions at x (m, 3), as (m, 6)."""
-        values = self.terms.values(self.scaled(x))
-        parts = [
-            values[:, own] @ a[part] for own, part in zip(self._chosen, self.slices, strict=True)
-        ]
+        values = self._values(self.scaled(x))
+        parts = [own @ a[part] for own, part in zip(values, self.slices, strict=True)]
         return np.stack(parts, axis=1)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
@@ -126,7 +136,7 @@ class EmpiricalModel:
         return found[:, :3] + p + np.cross(found[:, 3:], p)
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        values = self.terms.values(self.scaled(x))
+        values = self._values(self.scaled(x))
         if self.full_rotations:
             angles = self.functions(x, a)[:, 3:]
             by_angle = [
@@ -135,19 +145,19 @@ class EmpiricalModel:
             by_rotation = np.stack(by_angle, axis=2)
         else:
             by_rotation = cross_matrices(p)
-        result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(values, a, p))
-        for k, (own, part) in enumerate(zip(self._chosen, self.slices, strict=True)):
+        result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(*values, a, p))
+        for k, (own, part) in enumerate(zip(values, self.slices, strict=True)):
             if k < 3:
-                result[:, k, part] = values[:, own]
+                result[:, k, part] = own
             else:
-                result[:, :, part] = by_rotation[:, :, k - 3, None] * values[:, None, own]
+                result[:, :, part] = by_rotation[:, :, k - 3, None] * own[:, None]
         return result
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
         """The function along lines parallel to the axes, those along the edges of the volume
         first.
         """
-        own = self._chosen[list(FUNCTIONS).index(function)]
+        index = list(FUNCTIONS).index(function)
         pairs = [(one, two) for one in LEVELS for two in LEVELS]
         pairs.sort(key=lambda pair: sum(level not in (0.0, 1.0) for level in pair))
         words, places = [], []
@@ -161,20 +171,20 @@ class EmpiricalModel:
                 line = np.zeros((len(t), 3))
                 line[:, axis], line[:, others] = t, pair
                 places.append(line)
-        values = self.terms.values(np.concatenate(places))[:, own].reshape(
-            len(words), len(t), len(own)
-        )
+        values = self._values(np.concatenate(places))[index].reshape(len(words), len(t), -1)
         return tuple(map(Line, words, values))
 
     def reported(self) -> Reported:
         """Coefficients of monomials where the terms are polynomials, otherwise the parameters
         themselves.
         """
-        quoted = self.terms.quoted()
+        displacing = self.terms.quoted()
+        turning = displacing if self.of_rotations is None else self.of_rotations.quoted()
         names: list[str] = []
         units: list[Unit] = []
         blocks = []
         for k, function in enumerate(FUNCTIONS):
+            quoted = turning if k >= 3 else displacing
             block = quoted.matrix[:, self._chosen[k]]
             used = np.flatnonzero(block.any(axis=1))
             blocks.append(block[used])
@@ -194,9 +204,10 @@ def empirical_model(
     upper: tuple[float, ...],
     full_rotations: bool = False,
     frame: Sequence[Condition] = FRAME,
+    of_rotations: Terms | None = None,
 ) -> EmpiricalModel:
     """The model whose functions vanish where `frame` says: the terms that are not zero there are
-    left out.
+    left out. The rotations have terms of their own where these are given.
 
     >>> from .bases import Polynomial
     >>> from .terms import sums
@@ -204,17 +215,22 @@ def empirical_model(
     87
     """
     columns = []
-    for function in FUNCTIONS:
-        left = list(range(len(terms.names)))
+    for function, own in zip(FUNCTIONS, _of_six(terms, of_rotations), strict=True):
+        left = list(range(len(own.names)))
         for name, corner in frame:
             if name == function:
-                at_corner = terms.values(np.array([corner]))[0, left]
+                at_corner = own.values(np.array([corner]))[0, left]
                 touched = np.flatnonzero(np.abs(at_corner) > 1e-9)
                 if len(touched) > 1:
                     raise FrameError(f"{len(touched)} terms of {function} are not zero at {corner}")
                 left = [column for k, column in enumerate(left) if k not in touched]
         columns.append(tuple(left))
-    return EmpiricalModel(terms, tuple(columns), lower, upper, full_rotations)
+    return EmpiricalModel(terms, tuple(columns), lower, upper, full_rotations, of_rotations)
+
+
+def _of_six(terms: Terms, of_rotations: Terms | None) -> tuple[Terms, ...]:
+    """The terms of each of the six functions."""
+    return (terms,) * 3 + (terms if of_rotations is None else of_rotations,) * 3
 
 
 def _level(fraction: float) -> str:

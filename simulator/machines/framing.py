@@ -21,7 +21,7 @@ from .protocol import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
 # metres.
 POINTS, OFFSET = 400, 0.1
 
-_MOTIONS: tuple[tuple[str, Unit], ...] = (
+_IN_SPACE: tuple[tuple[str, Unit], ...] = (
     ("shift along x", "m"),
     ("shift along y", "m"),
     ("shift along z", "m"),
@@ -29,15 +29,16 @@ _MOTIONS: tuple[tuple[str, Unit], ...] = (
     ("turn about y", "rad"),
     ("turn about z", "rad"),
 )
+_IN_PLANE: tuple[tuple[str, Unit], ...] = (*_IN_SPACE[:2], _IN_SPACE[-1])
 
 
 @dataclass(frozen=True)
 class FramedModel:
     """The errors of `model` in a frame that is shifted and turned, with offsets of probes as at
-    `corner` (3,).
+    `corner` (d,).
 
     e(x, a, p) = m(x, a, p) - (m(corner, a, p) - p) + shift + turn x (x - corner), where m is the
-    model's error and the last six parameters are the shift and the turn.
+    model's error and the last parameters are the shift and the turn: six, or in a plane three.
     """
 
     model: ErrorModel
@@ -45,30 +46,43 @@ class FramedModel:
 
     @property
     def dimension(self) -> int:
-        return 3
+        return len(self.corner)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        frame = (Parameter(name, unit, name, f"{name} of the frame") for name, unit in _MOTIONS)
+        motions = _IN_SPACE if self.dimension == 3 else _IN_PLANE
+        frame = (Parameter(name, unit, name, f"{name} of the frame") for name, unit in motions)
         return (*self.model.parameters, *frame)
 
     def _at_corner(self, x: Array) -> Array:
         return np.broadcast_to(np.asarray(self.corner), x.shape)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
-        own, shift, turn = a[:-6], a[-6:-3], a[-3:]
+        n, d = len(self.model.parameters), self.dimension
+        own, shift, turn = a[:n], a[n : n + d], a[n + d :]
         found = self.model.error(x, own, p) - self.model.error(self._at_corner(x), own, p) + p
-        return found + shift + np.cross(turn, x - self._at_corner(x))
+        from_corner = x - self._at_corner(x)
+        if d == 2:
+            return found + shift + (_by_turn(from_corner) @ turn)
+        return found + shift + np.cross(turn, from_corner)
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        own, corner = a[:-6], self._at_corner(x)
+        own, corner = a[: len(self.model.parameters)], self._at_corner(x)
         by_own = self.model.jacobian(x, own, p) - self.model.jacobian(corner, own, p)
-        shifts = np.broadcast_to(np.eye(3, dtype=by_own.dtype), (len(x), 3, 3))
-        return np.concatenate([by_own, shifts, cross_matrices(x - corner)], axis=2)
+        d = self.dimension
+        shifts = np.broadcast_to(np.eye(d, dtype=by_own.dtype), (len(x), d, d))
+        by_turn = cross_matrices(x - corner) if d == 3 else _by_turn(x - corner)
+        return np.concatenate([by_own, shifts, by_turn], axis=2)
 
     def reported(self) -> Reported:
         """As the model reports itself, with the frame's shift and turn."""
-        return self.model.reported().beside(Reported.as_is(self.parameters[-6:]))
+        of_frame = self.parameters[len(self.model.parameters) :]
+        return self.model.reported().beside(Reported.as_is(of_frame))
+
+
+def _by_turn(v: Array) -> Array:
+    """Derivative (m, 2, 1) of a turn of v (m, 2) in the plane."""
+    return np.stack([-v[:, 1], v[:, 0]], axis=1)[:, :, None]
 
 
 def in_frame_of(
@@ -82,12 +96,13 @@ def in_frame_of(
     """
     framed = FramedModel(machine.model, lower)
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    x = generator.uniform(lower, upper, (POINTS, 3))
-    p = generator.uniform(-OFFSET, OFFSET, (POINTS, 3))
-    a = np.concatenate([machine.a, np.zeros(6)])
+    x = generator.uniform(lower, upper, (POINTS, len(lower)))
+    p = generator.uniform(-OFFSET, OFFSET, x.shape)
+    own = len(machine.a)
+    a = np.concatenate([machine.a, np.zeros(len(framed.parameters) - own)])
     wanted = framed.error(x, a, p) - p
     by_model = fitted.jacobian(x, np.zeros(len(fitted.parameters)), p)
-    by_frame = framed.jacobian(x, a, p)[:, :, -6:]
+    by_frame = framed.jacobian(x, a, p)[:, :, own:]
     columns = np.concatenate([by_frame, by_model], axis=2).reshape(wanted.size, -1)
-    a[-6:] = -np.linalg.lstsq(columns, wanted.ravel(), rcond=None)[0][:6]
+    a[own:] = -np.linalg.lstsq(columns, wanted.ravel(), rcond=None)[0][: len(a) - own]
     return TrueMachine(framed, a)

@@ -1,4 +1,5 @@
-"""The kinematic error model: 18 functions of one variable on a chain of axes.
+"""The kinematic error model: 18 functions of one variable on a chain of axes, and perhaps three
+squareness errors.
 
 Sources: NPL Report CISE 15/98, section 2.2; Park, Burdekin and Peggs, Appendix A. Rotations are
 right-handed about the machine's axes (ISO 230-1: EAX, EBX, ECX about X, Y, Z as the X axis moves),
@@ -7,18 +8,16 @@ of opposite sign to those of the NPL report.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from .arrangement import AXES, Arrangement
-from .bases import Basis, Polynomial
+from .bases import Basis, Polynomial, Quoted
+from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
 from .protocol import Array, Line, Parameter, Reported, Unit
-
-# Translations along x, y, z and rotations about them, by the letters of ISO 230-1.
-TRANSLATIONS = ("X", "Y", "Z")
-ROTATIONS = ("A", "B", "C")
+from .rigid_chain import RigidChain
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
@@ -26,36 +25,68 @@ ROTATIONS = ("A", "B", "C")
 HELD_AT_FAR_END = ("EYX", "EZX", "EZY")
 
 
-def describe(function: str) -> str:
-    """Words for an ISO 230-1 name.
+@dataclass(frozen=True)
+class Slope:
+    """The one function `rise` t: the straight part of a straightness error, by its angle."""
 
-    >>> describe("EXX"), describe("EYX"), describe("ECZ")
-    ('positioning error of X', 'straightness of X in Y', 'yaw of Z about Z')
-    """
-    kind, axis = function[1], function[2]
-    if kind in TRANSLATIONS:
-        return (
-            f"positioning error of {axis}" if kind == axis else f"straightness of {axis} in {kind}"
-        )
-    about = TRANSLATIONS[ROTATIONS.index(kind)]
-    if about == axis:
-        word = "roll" if axis != "Z" else "yaw"
-    elif axis == "Z":
-        word = "tilt"
-    else:
-        word = "yaw" if about == "Z" else "pitch"
-    return f"{word} of {axis} about {about}"
+    rise: float
+
+    @property
+    def zero_at_one(self) -> bool:
+        return False
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def values(self, t: Array) -> Array:
+        """The line at t (m,), as (m, 1)."""
+        return self.rise * t[:, None]
+
+    def interior(self) -> Basis:
+        raise TypeError("a slope has no part that vanishes at both ends")
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """The angle as it is."""
+        return Quoted(("",), np.eye(1))
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        raise TypeError("a slope is a single function")
 
 
 @dataclass(frozen=True)
 class ErrorFunction:
-    """One of the 18 functions: `axis` moves, `component` (0 to 2) is displaced or turned about."""
+    """One of the 18 functions, or a squareness error, with the functions it is made of."""
 
-    name: str
-    axis: int
-    component: int
-    rotation: bool
+    error: AxisError | SquarenessError
     basis: Basis
+
+    @property
+    def name(self) -> str:
+        return self.error.name
+
+    @property
+    def axis(self) -> int:
+        """The axis (0 to 2) that moves."""
+        return self.error.axis
+
+    @property
+    def component(self) -> int:
+        """Along what (0 to 2) it displaces, or about what it turns."""
+        error = self.error
+        return error.to if isinstance(error, SquarenessError) else error.component
+
+    @property
+    def rotation(self) -> bool:
+        """Whether it turns what the axis carries."""
+        return isinstance(self.error, AxisError) and self.error.is_rotation
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of its coefficients; a squareness error is its own only one."""
+        if isinstance(self.error, SquarenessError):
+            return (self.name,)
+        return tuple(f"{self.name}[{k + 1}]" for k in range(self.basis.size))
 
 
 @dataclass(frozen=True)
@@ -86,17 +117,11 @@ class KinematicModel:
             grid = np.linspace(0.0, 1.0, 65)
             peaks = np.abs(function.basis.values(grid)).max(axis=0, initial=0.0)
             arm = float(span.max()) if function.rotation else 1.0
-            unit: Unit = "rad" if function.rotation else "m"
-            for k, peak in enumerate(peaks):
-                found.append(
-                    Parameter(
-                        f"{function.name}[{k + 1}]",
-                        unit,
-                        function.name,
-                        describe(function.name),
-                        arm * peak,
-                    )
-                )
+            error = function.error
+            found += [
+                Parameter(name, error.unit, error.name, error.meaning, arm * peak)
+                for name, peak in zip(function.parameter_names, peaks, strict=True)
+            ]
         return tuple(found)
 
     @cached_property
@@ -125,14 +150,15 @@ class KinematicModel:
         translation, rotation = np.zeros((m, 3, 3), a.dtype), np.zeros((m, 3, 3), a.dtype)
         for f in self.functions:
             target = rotation if f.rotation else translation
-            target[:, f.axis, f.component] = bases[f.axis, f.basis] @ a[self.slices[f.name]]
+            # A straightness error and a squareness error displace alike.
+            target[:, f.axis, f.component] += bases[f.axis, f.basis] @ a[self.slices[f.name]]
         return translation, rotation
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         translation, rotation = self._motions(self._bases(x), a, len(x))
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
-            return _Chain(self.arrangement, from_origin, translation, rotation, p).error()
+            return RigidChain(self.arrangement, from_origin, translation, rotation, p).error()
         carried = carried_vectors(self.arrangement, from_origin, p)
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
@@ -144,7 +170,7 @@ class KinematicModel:
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
             translation, rotation = self._motions(bases, a, len(x))
-            by_translation, by_rotation = _Chain(
+            by_translation, by_rotation = RigidChain(
                 self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
@@ -169,8 +195,15 @@ class KinematicModel:
         return result
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function along its axis."""
-        return tuple(Line("", f.basis.values(t)) for f in self.functions if f.name == function)
+        """The function along its axis; a squareness error is the same everywhere."""
+        return tuple(
+            Line(
+                "",
+                np.ones((len(t), 1)) if isinstance(f.error, SquarenessError) else f.basis.values(t),
+            )
+            for f in self.functions
+            if f.name == function
+        )
 
     def reported(self) -> Reported:
         """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or
@@ -186,22 +219,19 @@ class KinematicModel:
         matrix = np.zeros((sum(len(q.names) for q in quoted), len(self.parameters)))
         for f, q in zip(self.functions, quoted, strict=True):
             matrix[len(names) : len(names) + len(q.names), self.slices[f.name]] = q.matrix
-            names += [f"{f.name} {name}" for name in q.names]
-            units += ["rad" if f.rotation else "m"] * len(q.names)
+            names += [f"{f.name} {name}".rstrip() for name in q.names]
+            units += [f.error.unit] * len(q.names)
         return Reported(tuple(names), tuple(units), matrix)
 
 
 def error_function(name: str, basis: Basis) -> ErrorFunction:
     """One of the 18 functions by its ISO 230-1 name.
 
-    >>> from .bases import Polynomial
     >>> found = error_function("ECX", Polynomial(3))
     >>> found.axis, found.component, found.rotation
     (0, 2, True)
     """
-    rotation = name[1] in ROTATIONS
-    component = (ROTATIONS if rotation else TRANSLATIONS).index(name[1])
-    return ErrorFunction(name, TRANSLATIONS.index(name[2]), component, rotation, basis)
+    return ErrorFunction(AXIS_ERRORS[name], basis)
 
 
 def kinematic_model(
@@ -232,21 +262,37 @@ def kinematic_model_of(
     lower: tuple[float, ...],
     upper: tuple[float, ...],
     full_rotations: bool = False,
+    own: tuple[tuple[str, Basis | None], ...] = (),
+    squareness: bool = False,
 ) -> KinematicModel:
     """The model with functions of the two families for its positional and its rotational errors.
 
-    All 18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and
-    EZY at the far end too.
+    `own` has families of single functions by ISO 230-1 name, None for one that there is not. All
+    18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and EZY
+    at the far end too. With `squareness` all six straightness functions do, and the three
+    squareness errors are parameters besides: the 21-parameter form, which can do the same where
+    the families contain t.
     """
+    families = dict(own)
     functions = []
-    for letters, basis in ((TRANSLATIONS, position), (ROTATIONS, rotation)):
-        for axis in TRANSLATIONS:
-            for letter in letters:
-                name = f"E{letter}{axis}"
-                functions.append(
-                    error_function(name, basis.interior() if name in HELD_AT_FAR_END else basis)
-                )
+    for is_rotation, family in ((False, position), (True, rotation)):
+        for error in AXIS_ERRORS.values():
+            basis = families.get(error.name, family)
+            if error.is_rotation == is_rotation and basis is not None:
+                is_held = error.is_straightness if squareness else error.name in HELD_AT_FAR_END
+                functions.append(ErrorFunction(error, basis.interior() if is_held else basis))
+    span = np.subtract(upper, lower)
+    if squareness:
+        functions += [
+            ErrorFunction(error, Slope(error.sign * float(span[error.axis])))
+            for error in SQUARENESS_ERRORS.values()
+        ]
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
+
+
+def in_plane(model: KinematicModel) -> KinematicModel:
+    """The model with those errors only that move points of the plane of x and y within it."""
+    return replace(model, functions=tuple(f for f in model.functions if f.error.in_plane))
 
 
 def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[float, Array]]:
@@ -271,95 +317,3 @@ def _crossed(v: Array, w: Array) -> Array:
         j, k = (i + 1) % 3, (i + 2) % 3
         found[:, i] = v[:, j] * w[:, k] - v[:, k] * w[:, j]
     return found
-
-
-def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    matrix = np.zeros((len(angle), 3, 3), angle.dtype)
-    i, j = (about + 1) % 3, (about + 2) % 3
-    if derivative:
-        c, s = -s, c
-    else:
-        matrix[:, about, about] = 1.0
-    matrix[:, i, i], matrix[:, i, j], matrix[:, j, i], matrix[:, j, j] = c, -s, s, c
-    return matrix
-
-
-def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
-    """Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
-    plain = [_plane_rotation(angles[:, k], k) for k in range(3)]
-    derivatives = []
-    for k in range(3):
-        factors = list(plain)
-        factors[k] = _plane_rotation(angles[:, k], k, derivative=True)
-        derivatives.append(factors[2] @ factors[1] @ factors[0])
-    return plain[2] @ plain[1] @ plain[0], derivatives
-
-
-@dataclass(frozen=True)
-class _Chain:
-    """Rigid-body product of all axes: where the probe's tip lies in the frame of the workpiece
-    table.
-    """
-
-    arrangement: Arrangement
-    x: Array
-    translation: Array
-    rotation: Array
-    p: Array
-
-    def _walk(self) -> tuple[Array, list[Array], list[Array]]:
-        m = len(self.x)
-        dtype = np.result_type(self.x, self.translation, self.p)
-        by_translation: list[Array] = [np.zeros((0,))] * 3
-        by_rotation: list[Array] = [np.zeros((0,))] * 3
-
-        def step(axis: int) -> Array:
-            displaced = self.translation[:, axis].astype(dtype, copy=True)
-            displaced[:, axis] += self.x[:, axis]
-            return displaced
-
-        def turned(matrix: Array, vector: Array) -> Array:
-            return np.einsum("mij,mj->mi", matrix, vector)
-
-        tip = self.p.astype(dtype, copy=True)
-        on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]
-        for axis in reversed(on_probe_side):
-            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
-            by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
-            tip = step(axis) + turned(matrix, tip)
-        prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
-        for axis in on_probe_side:
-            by_translation[axis] = prefix
-            by_rotation[axis] = prefix @ by_rotation[axis]
-            prefix = prefix @ rotation_and_derivatives(self.rotation[:, axis])[0]
-
-        # The table moves the other way: going outwards, undo each axis's displacement, then its
-        # rotation.
-        passed = list(on_probe_side)
-        for name in self.arrangement.workpiece_side:
-            axis = AXES.index(name)
-            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
-            back = matrix.transpose(0, 2, 1)
-            outside = tip + step(axis)
-            by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
-            by_rotation[axis] = np.zeros((m, 3, 3), dtype)
-            for earlier in [*passed, axis]:
-                by_translation[earlier] = back @ by_translation[earlier]
-                by_rotation[earlier] = back @ by_rotation[earlier]
-            by_rotation[axis] = np.stack(
-                [turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2
-            )
-            tip = turned(back, outside)
-            passed.append(axis)
-        return tip, by_translation, by_rotation
-
-    def error(self) -> Array:
-        return self._walk()[0] - self.x
-
-    def sensitivities(self) -> tuple[list[Array], list[Array]]:
-        """Derivatives of the tip by each axis's translation and rotation, lists by axis of (m, 3,
-        3).
-        """
-        _, by_translation, by_rotation = self._walk()
-        return by_translation, by_rotation

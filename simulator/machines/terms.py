@@ -1,16 +1,17 @@
 """Functions of three variables on [0, 1]^3, from which the empirical error model is built.
 
-Products of one univariate function along each axis: redundancy-free sums, quadratics and full
-tensor products; and radial basis functions. All but the last are NPL Report CISE 15/98, sections
-2.1.2 and 5.3.
+Products of one univariate function along each axis: redundancy-free sums, plain sums of univariate
+functions, quadratics and full tensor products; and radial basis functions. They are those of NPL
+Report CISE 15/98, sections 2.1.1, 2.1.2 and 5.3, where the radial function is left open.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -98,7 +99,8 @@ class Products:
                     for one, power in zip(by_axis, powers, strict=True)
                 ]
                 rows["*".join(filter(None, names)) or "1"] = row
-        return Quoted(tuple(rows), np.array(list(rows.values())))
+        matrix = np.array(list(rows.values())).reshape(len(rows), len(self.factors))
+        return Quoted(tuple(rows), matrix)
 
 
 def sums(basis: Basis) -> Products:
@@ -119,6 +121,25 @@ def sums(basis: Basis) -> Products:
     return Products((basis, basis, basis), tuple(factors))
 
 
+def univariate(basis: Basis) -> Products:
+    """Plain sums of univariate functions without redundancy: 1, x, y, z and the interior functions
+    of each.
+
+    >>> univariate(Spline(3)).names
+    ('1', 'x', 'y', 'z', 's1(x)', 's1(y)', 's1(z)')
+    """
+    units = np.eye(3, dtype=int)
+    rows = [np.zeros(3, int), *units]
+    rows += [index * unit for unit in units for index in range(2, 2 + basis.interior().size)]
+    return Products((basis, basis, basis), tuple((int(i), int(j), int(k)) for i, j, k in rows))
+
+
+def no_terms() -> Products:
+    """No functions at all."""
+    basis = Monomial(2)
+    return Products((basis, basis, basis), ())
+
+
 def quadratic() -> Products:
     """All polynomials of degree 2: 1, x, y, z, xy, xz, yz and s(x) = x - x^2, s(y), s(z)."""
     basis = Monomial(3)
@@ -137,13 +158,38 @@ def _triples(count: int) -> list[tuple[int, int, int]]:
     return [(i, j, k) for i in range(count) for j in range(count) for k in range(count)]
 
 
+RadialName = Literal[
+    "multiquadric", "inverse multiquadric", "gaussian", "thin plate", "linear", "cubic"
+]
+
+
+def _thin_plate(squared: Array, constant: float) -> Array:
+    """r^2 log r, of r^2; zero where r is."""
+    return 0.5 * squared * np.log(np.where(squared == 0.0, 1.0, squared))
+
+
+RADIAL: dict[str, Callable[[Array, float], Array]] = {
+    "multiquadric": lambda squared, constant: np.sqrt(squared + constant**2),
+    "inverse multiquadric": lambda squared, constant: 1.0 / np.sqrt(squared + constant**2),
+    "gaussian": lambda squared, constant: np.exp(-squared / constant**2),
+    "thin plate": _thin_plate,
+    "linear": lambda squared, constant: np.sqrt(squared),
+    "cubic": lambda squared, constant: squared * np.sqrt(squared),
+}
+"""Radial functions of r^2 and a constant.
+
+Each is, up to sign, definite on coefficients that are orthogonal to linear polynomials, so that
+interpolation at any centres that do not all lie in a plane has one solution.
+"""
+WITH_CONSTANT = ("multiquadric", "inverse multiquadric", "gaussian")
+
+
 @dataclass(frozen=True)
 class Radial:
-    """Interpolants of multiquadrics sqrt(r^2 + constant^2) and a linear polynomial, by their values
-    at centres.
+    """Interpolants of radial functions and a linear polynomial, by their values at centres.
 
     The centres are a regular grid over the volume, corners included. A function's coefficients are
-    its values at the centres; the multiquadrics' own coefficients are orthogonal to linear
+    its values at the centres; the radial functions' own coefficients are orthogonal to linear
     polynomials, in the null space of those conditions, so that linear functions come out exactly.
     Distances and `constant` are in fractions of the volume.
 
@@ -153,6 +199,7 @@ class Radial:
 
     grid: tuple[int, int, int]
     constant: float
+    function: RadialName = "multiquadric"
 
     @cached_property
     def centres(self) -> Array:
@@ -170,11 +217,12 @@ class Radial:
 
     def _functions(self, t: Array) -> tuple[Array, Array]:
         distance = ((t[:, None, :] - self.centres) ** 2).sum(axis=2)
-        return np.sqrt(distance + self.constant**2), np.column_stack([np.ones(len(t)), t])
+        kernel = RADIAL[self.function](distance, self.constant)
+        return kernel, np.column_stack([np.ones(len(t)), t])
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """Coefficients of the multiquadrics (n, n) and of 1, x, y, z (4, n) for each value at a
+        """Coefficients of the radial functions (n, n) and of 1, x, y, z (4, n) for each value at a
         centre.
         """
         kernel, linear = self._functions(self.centres)

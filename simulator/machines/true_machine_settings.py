@@ -6,20 +6,21 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
-from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.quantities import Angle, Length, PositiveLength
 from ..inputs.settings import NonEmpty, Settings
-from .curves import Interpolation, Points, curves_model
-from .description import MachineDescription, true_volumetric
-from .protocol import ErrorModel, TrueMachine
-from .settings import (
+from .arrangement_settings import (
     ARRANGEMENT,
     ROTATIONS,
     ArrangementName,
     ArrangementSettings,
-    Corner,
-    ErrorModelSettings,
     arrangement_of,
 )
+from .curves import Interpolation, Points, curves_model
+from .description import MachineDescription, true_volumetric
+from .model_kinds import Corner
+from .plane import PlaneModel
+from .protocol import ErrorModel, TrueMachine
+from .settings import ErrorModelSettings
 
 
 class ZeroSettings(Settings):
@@ -107,6 +108,12 @@ class TrueMachineFileSettings(Settings):
 
     kind: Literal["machine"] = Field(description="the machine that a file describes")
     file: str = Field(description="Machine file (YAML), as for ballplate map.")
+    level: Length | None = Field(
+        default=None,
+        description=(
+            "In two dimensions the position of the z axis; default: that of the reference point."
+        ),
+    )
     random_part: Literal["omitted"] | None = Field(
         default=None,
         description=(
@@ -122,10 +129,14 @@ class TrueMachineFileSettings(Settings):
         """Take the machine that the file describes."""
         self._machine = machine
 
-    def machine(self) -> TrueMachine:
-        """The systematic errors of the machine."""
+    def machine(self, dimension: int = 3) -> TrueMachine:
+        """The systematic errors of the machine, of two dimensions those at the level."""
         assert self._machine is not None
-        return true_volumetric(self._machine)
+        found = true_volumetric(self._machine)
+        if dimension == 3:
+            return found
+        level = self._machine.reference[2] if self.level is None else self.level
+        return TrueMachine(PlaneModel(found.model, level), found.a)
 
 
 TrueMachineSettings = Annotated[

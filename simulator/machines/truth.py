@@ -4,13 +4,17 @@ estimated one, and its parameters.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import Settings, hint
+from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
 from .framing import in_frame_of
+from .model_kinds import Corner
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
-from .settings import Corner, build_error_model
+from .settings import build_error_model
 from .true_machine_settings import (
     CoefficientSettings,
     CurvesSettings,
@@ -53,7 +57,7 @@ def true_machine(
         curves = settings.model(lower, upper)
         return TrueMachine(curves, np.ones(len(curves.parameters)))
     if isinstance(settings, TrueMachineFileSettings):
-        return in_frame_of(fitted, settings.machine(), lower, upper)
+        return in_frame_of(fitted, settings.machine(len(lower)), lower, upper)
     other = getattr(settings, "error_model", None)
     model = fitted if other is None else build_error_model(other, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))
@@ -117,16 +121,20 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
         left = reported.matrix @ solution - wanted
         for row, (name, value) in given_quoted.items():
             if abs(left[row]) > 1e-9 * max(abs(value), np.abs(wanted).max()):
-                function = name.split()[0]
-                text = (
-                    f"{function} must be zero at both ends of its axis, where it fixes the"
-                    " machine's frame"
-                )
-                problems.append((name, f"{text}; let its coefficients add up to zero"))
+                problems.append((name, _held(name.split()[0], own)))
         if problems:
             raise TruthError(problems)
         a += solution
     return a
+
+
+def _held(function: str, parameters: Collection[str]) -> str:
+    """Why the coefficients of a function have to add up to zero, and what to do."""
+    text, error = f"{function} must be zero at both ends of its axis", AXIS_ERRORS.get(function)
+    for name, square in SQUARENESS_ERRORS.items():
+        if name in parameters and error == AxisError(square.axis, square.to, False):
+            return f"{text}; let its coefficients add up to zero, and state its slope as {name}"
+    return f"{text}, where it fixes the machine's frame; let its coefficients add up to zero"
 
 
 def _random(settings: RandomSettings, model: ErrorModel) -> Array:

@@ -14,7 +14,8 @@ from itertools import product
 import numpy as np
 
 from .arrangement import AXES
-from .kinematic import KinematicModel, describe
+from .error_names import ERRORS, SQUARENESS_ERRORS, AxisError
+from .kinematic import KinematicModel
 from .protocol import Array, Line, Parameter, Reported, Unit
 
 # Component, factor and exponents of x, y and z.
@@ -62,12 +63,7 @@ DROOP: dict[str, tuple[int, tuple[int, float], tuple[int, float]]] = {
 
 def squareness_field(name: str) -> Field:
     """A squareness error by its ISO 230-1 name, in radians."""
-    return Field(
-        name,
-        "rad",
-        f"squareness of {name[3]} to {'X' if name[1] in 'BC' else 'Y'}",
-        SQUARENESS[name],
-    )
+    return Field(name, "rad", SQUARENESS_ERRORS[name].meaning, SQUARENESS[name])
 
 
 def thermal_field(axis: int) -> Field:
@@ -157,11 +153,11 @@ def symbol(name: str) -> str:
     >>> symbol("EXX"), symbol("EZY"), symbol("EBX"), symbol("EB0Z")
     ('δx(x)', 'δz(y)', 'Ey(x)', '-β1')
     """
-    if "0" in name:
+    error = ERRORS[name]
+    if not isinstance(error, AxisError):
         return {"EC0Y": "α", "EB0Z": "-β1", "EA0Z": "β2"}[name]
-    if name[1] in "ABC":
-        return f"E{'xyz'['ABC'.index(name[1])]}({name[2].lower()})"
-    return f"δ{name[1].lower()}({name[2].lower()})"
+    axis, other = AXES[error.axis], AXES[error.component]
+    return f"E{other}({axis})" if error.is_rotation else f"δ{other}({axis})"
 
 
 def meaning(name: str) -> str:
@@ -170,4 +166,4 @@ def meaning(name: str) -> str:
     >>> meaning("EC0Y"), meaning("EXX")
     ('squareness of Y to X', 'positioning error of X')
     """
-    return squareness_field(name).meaning if "0" in name else describe(name)
+    return ERRORS[name].meaning

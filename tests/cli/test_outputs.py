@@ -72,6 +72,12 @@ WALK = {
     "simulate": Walk(
         EXPERIMENT, {"-o": "r.csv", "--certificate": "c.csv"}, also=("balls.csv",), prints=False
     ),
+    "import": Walk(
+        {"REPORT": "report.dmo", "--for": "design.yaml"},
+        {"-o": "i.csv"},
+        also=("balls.csv",),
+        prints=False,
+    ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
         {"--plot": "fit.svg"},
@@ -81,6 +87,11 @@ WALK = {
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
         ("--positions", "3", "--workers", "1"),
+    ),
+    "sheet": Walk(
+        EXPERIMENT,
+        {"-o": "sheet.html", "--readings": "table.csv", "--points": "points.csv"},
+        prints=False,
     ),
     "lengths": Walk(
         EXPERIMENT,
@@ -126,6 +137,8 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "design.yaml").write_text(DESIGN, encoding="utf-8")
     (folder / "balls.csv").write_text(BALLS, encoding="utf-8")
     (folder / "pool.yaml").write_text(POOL, encoding="utf-8")
+    sphere = "UNITS/MM\nFA(FIRST_A)=FEAT/SPHERE,CART,50,50,0,22\nENDFIL\n"
+    (folder / "report.dmo").write_text(sphere, encoding="utf-8")
     axes = "axes: {repeatability: {path: machine.repeatability, values: [1 um, 2 um]}}"
     (folder / "sweep.yaml").write_text(f"title: two\nbase: design.yaml\n{axes}\n", encoding="utf-8")
     for name in ("drawn.yaml", "done.csv"):

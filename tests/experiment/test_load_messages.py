@@ -302,8 +302,8 @@ CALIBRATION = [
         "14:63: calibration[0].dimensions: unknown key; known: values"]),
 ]  # fmt: skip
 PLANE_CASES = [
-    ("{kind: metric}", "{kind: kinematic}", [
-        '3:21: error_model.kind: kind "kinematic" has 3 dimensions, but machine.volume has 2; change '
+    ("{kind: metric}", "{kind: empirical}", [
+        '3:21: error_model.kind: kind "empirical" has 3 dimensions, but machine.volume has 2; change '
         'one of the two']),
     ("{kind: metric}", "{kind: metric, scale: each}", [
         "3:36: error_model.scale: has no meaning in 2 dimensions; choose from: none, x, y, split"]),

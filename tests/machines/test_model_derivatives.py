@@ -13,19 +13,31 @@ from ballplate.simulator.machines.framing import FramedModel
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.kinematic import (
     carried_vectors,
+    in_plane,
     kinematic_model,
     kinematic_model_of,
 )
 from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import ErrorModel, HasLines
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.machines.terms import Radial, quadratic, sums, tensor
+from ballplate.simulator.machines.terms import (
+    RADIAL,
+    Radial,
+    no_terms,
+    quadratic,
+    sums,
+    tensor,
+    univariate,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.reference.derivatives import assert_derivative, complex_step
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
+
+OWN = (("EXX", Spline(3, (0.4,))), ("EXY", Polynomial(2)), ("EAZ", None), ("EBX", Monomial(5)))
 
 MODELS: dict[str, ErrorModel] = {
     **{
@@ -61,6 +73,46 @@ MODELS: dict[str, ErrorModel] = {
         }.items()
         for full in (False, True)
     },
+    **{
+        f"{form} {'full' if full else 'linearised'}": kinematic_model_of(
+            ARRANGEMENTS[arrangement], Polynomial(4), Polynomial(3), LOWER, UPPER, full, own, square
+        )
+        for form, arrangement, own, square in (
+            ("21 parameters of MB2", "MB2", (), True),
+            ("21 parameters of CX1", "CX1", (), True),
+            ("own functions", "FB1", OWN, False),
+            ("21 parameters and own functions", "MB1", OWN, True),
+        )
+        for full in (False, True)
+    },
+    **{
+        f"empirical with other rotations {'full' if full else 'linearised'}": empirical_model(
+            univariate(Polynomial(4)), LOWER, UPPER, full, of_rotations=sums(Spline(3, (0.5,)))
+        )
+        for full in (False, True)
+    },
+    "empirical without rotations": empirical_model(
+        sums(Monomial(3)), LOWER, UPPER, of_rotations=no_terms()
+    ),
+    **{
+        f"radial {function}": empirical_model(Radial((3, 2, 2), 0.5, function), LOWER, UPPER)
+        for function in RADIAL
+    },
+    **{
+        f"plane of {name}": PlaneModel(
+            in_plane(
+                kinematic_model_of(
+                    ARRANGEMENTS[name], Polynomial(4), Polynomial(3), LOWER, UPPER, full, (), square
+                )
+            ),
+            0.0,
+        )
+        for name, full, square in (("MB2", False, True), ("MB1", True, False), ("CY1", True, True))
+    },
+    "plane of a machine file in another frame": FramedModel(
+        PlaneModel(true_volumetric(load_machine("designs/park/machines/npl-like.yaml")).model, 0.2),
+        LOWER[:2],
+    ),
     "joined": JoinedModel(
         kinematic_model(ARRANGEMENTS["MB2"], 3, 3, LOWER, UPPER),
         empirical_model(quadratic(), LOWER, UPPER, True),

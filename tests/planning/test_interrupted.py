@@ -213,7 +213,7 @@ def test_the_file_written_takes_the_complete_readings(
     told = capsys.readouterr().out
     assert "low was interrupted after 5 readings; 4 more complete it" in told
     assert (
-        "| low | as it stands: flat" in sheet.read_text()
+        "| low |  | as it stands: flat" in sheet.read_text()
         and "the rest, 4 of 9 readings: r2c3, r3c1" in sheet.read_text()
     )
     assert command("simulate", rest, "-o", data) == 0

@@ -18,9 +18,9 @@ from ballplate.planning.sheet_forms import (
     sheet_data,
     sheet_lines,
     sheet_markdown,
-    sheet_page,
-    summary,
 )
+from ballplate.planning.sheet_page import sheet_page
+from ballplate.planning.sheet_words import summary
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.positions import ball_coordinates
@@ -66,12 +66,14 @@ def test_csv_has_minutes_as_numbers(sheet: RunSheet) -> None:
     assert minutes == pytest.approx(60 * sheet.hours, rel=1e-9)
 
 
-def test_markdown_escapes_what_would_break_a_table(sheet: RunSheet) -> None:
-    text = sheet_markdown(sheet, "a | b\nc")
+def test_markdown_escapes_what_would_break_a_table(sheet: RunSheet, experiment: Experiment) -> None:
+    text = sheet_markdown(sheet, experiment, "a | b\nc")
     assert text.startswith("# a \\| b\\\\x0ac\n")
-    rows = [line for line in text.splitlines() if line.startswith("| ")]
-    assert len(rows) == 1 + len(sheet.steps) + 2
-    assert {line.replace("\\|", "").count("|") for line in rows[: 1 + len(sheet.steps)]} == {10}
+    tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("| ")]
+    for rows in tables:
+        assert len({line.replace("\\|", "").count("|") for line in rows}) == 1
+    # A line of headings and one of dashes.
+    assert 2 + len(sheet.steps) in [len(rows) for rows in tables]
 
 
 def test_data(sheet: RunSheet) -> None:
@@ -98,11 +100,13 @@ def test_page_stands_alone_and_has_a_box_for_each_position(
     tags = Tags()
     tags.feed(page)
     names = [tag for tag, _ in tags.seen]
-    assert names.count("section") == names.count("svg") == 4
+    assert names.count("section") == 4
+    # Of each position still to be read, of each artefact and of the volume.
+    assert names.count("svg") == 3 + 2 + 1
     assert "script" not in names and "link" not in names and "img" not in names
     boxes = [found for tag, found in tags.seen if tag == "input"]
-    # One for each position, and one for each probe where there are two.
-    assert len(boxes) == 4 + 2
+    # One for each position, and one for each probe of those that are still to be read.
+    assert len(boxes) == 4 + sum(len(step.probes) for step in sheet.steps if not step.done)
     assert "@media print" in page
 
 

@@ -17,6 +17,8 @@ KEPT = [
     ("quickstart.yaml", "quickstart", "9cce15c3e7bebae2bfb31f6733a7fd4ae6c88151"),
     ("npl/6.1.1.yaml", "6.1.1[B]", "a5208313a57c127131205ebe5cb1a564f817f9f2"),
     ("npl/6.2.5.yaml", "6.2.5[n=5 NDEL=5]", "9df3395e9ad26ce79e60821532715427f59e7a47"),
+    ("npl/5.3.yaml", "5.3[empirical fit]", "178497e70d875eda46d69c07cc550eaf69591ecc"),
+    ("park/plate.yaml", "plate", "f54163fb5d72db3120769349c7a54e720bf858d5"),
     (
         "hocken_borchardt/dummy.yaml",
         "dummy[with scale]",

@@ -9,12 +9,10 @@ from typing import Any
 
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
-from ballplate.simulator.machines.settings import (
-    EmpiricalSettings,
-    KinematicSettings,
-    MachineFileSettings,
-    SplineSettings,
-)
+from ballplate.simulator.machines.basis_settings import SplineSettings
+from ballplate.simulator.machines.empirical_settings import OF_BASIS, EmpiricalSettings
+from ballplate.simulator.machines.kinematic_settings import KinematicSettings
+from ballplate.simulator.machines.settings import MachineFileSettings
 
 from .changes import Change, ChangeKind, with_artefact
 
@@ -75,7 +73,7 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
             ("position_coefficients", 2, "coefficients of positional errors"),
             ("rotation_coefficients", 1, "coefficients of rotational errors"),
         )
-    elif isinstance(model, EmpiricalSettings) and model.terms in ("sums", "tensor"):
+    elif isinstance(model, EmpiricalSettings) and model.terms in tuple(OF_BASIS):
         keys = (
             ()
             if isinstance(model.basis, SplineSettings)

@@ -1,0 +1,92 @@
+"""Short names of planned positions, which a person can type at a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+
+from .done import base_name
+
+
+def short_names(
+    order: Iterable[Candidate], known: Mapping[str, str], taken: Collection[str]
+) -> dict[str, str]:
+    """Short names by the names of candidates, P1, P2 … by place in the order of measuring.
+
+    Positions that somebody named keep their names, and those `known` from an earlier plan keep what
+    they were called there. No name is `taken`, nor differs from another in capitals alone; a number
+    in use is passed over, so that no number means two places.
+    """
+    used = {name.casefold() for name in (*taken, *known.values())}
+    found: dict[str, str] = {}
+    number = 0
+    for place, candidate in enumerate(order, 1):
+        if candidate.name in known:
+            found[candidate.name] = known[candidate.name]
+        elif is_composed(candidate):
+            number = max(number + 1, place)
+            while f"p{number}" in used:
+                number += 1
+            found[candidate.name] = f"P{number}"
+            used.add(f"p{number}")
+    return found
+
+
+def is_composed(candidate: Candidate) -> bool:
+    """Whether the name of a candidate was composed of its place, not given by somebody."""
+    return (
+        isinstance(candidate.item, Position)
+        and not candidate.drawn
+        and candidate.group not in ("", base_name(candidate.name))
+    )
+
+
+def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) -> Candidate:
+    """A position under a short name, described by the name that it had, with its probes in the
+    order of measuring.
+
+    Probes of several groups of readings stay in the order of the groups.
+    """
+    item = candidate.item
+    assert isinstance(item, Position)
+    said = dict(candidate.settings)
+    description = item.description
+    if name != candidate.name:
+        description = candidate.name
+        said = {"name": name, "description": description} | {
+            key: value for key, value in said.items() if key not in ("name", "description")
+        }
+    readings = item.readings
+    if len(readings) == 1 and said.get("probes") and set(probes) == set(readings[0].probes):
+        said["probes"] = list(probes)
+        readings = (replace(readings[0], probes=probes),)
+    item = replace(item, name=name, description=description, readings=readings)
+    return replace(candidate, name=name, item=item, settings=said)
+
+
+def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
+    """The experiment with what it says of single positions under their short names."""
+    influences = tuple(
+        one.model_copy(update={"positions": renamed_keys(stated, names)})
+        if isinstance(stated := getattr(one, "positions", None), Mapping)
+        else one
+        for one in experiment.influences
+    )
+    return replace(experiment, influences=influences)
+
+
+def renamed_keys(stated: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """What is stated by position, by short names."""
+    return {names.get(name, name): one for name, one in stated.items()}
+
+
+def names_of_plan(chosen: Experiment, candidates: Collection[str]) -> dict[str, str]:
+    """What the file of an earlier plan calls candidates, by their names in the pool."""
+    return {
+        one.description: one.name
+        for one in chosen.positions
+        if one.description and one.name not in candidates
+    }

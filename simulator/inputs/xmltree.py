@@ -1,0 +1,174 @@
+"""An XML file as a tree of elements that know their line and column.
+
+Files come from elsewhere: a document type, which could declare entities that expand without bound
+or name other files, is refused, as is what is larger or deeper than any report of measurements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.parsers import expat
+
+from .messages import ExperimentError, Message, refused
+from .settings import shorten
+from .yamltree import GivenText, Mark, read_bytes
+
+MOST_XML_BYTES = 50_000_000
+MOST_ELEMENTS = 500_000
+DEEPEST = 100
+
+# Joins namespace and name; no part of either.
+_SEPARATOR = " "
+
+# What expat says → what the person who has the file can do about it.
+_REMEDIES = {
+    "no element found": "the file ends before its first element; it is empty or was cut off",
+    "unclosed token": "the file ends within a tag; it was cut off, take a whole copy",
+    "mismatched tag": "this tag closes another element than the one that is open",
+    "not well-formed (invalid token)": "a character that XML does not allow here",
+    "junk after document element": "the file goes on after its last element; remove what follows",
+    "undefined entity": "an entity that XML does not know; write the character itself",
+    "XML or text declaration not at start of entity": (
+        "the line <?xml …?> must be the very first; remove what is before it"
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Element:
+    """An element: its name without prefix, its namespace, and its own text without white space
+    about it.
+    """
+
+    mark: Mark
+    namespace: str
+    name: str
+    attributes: dict[str, str]
+    children: tuple[Element, ...]
+    text: str
+
+    def all(self, *names: str) -> Iterator[Element]:
+        """Elements at a path of names below this one, in their order."""
+        for one in self.children:
+            if one.name == names[0]:
+                if len(names) == 1:
+                    yield one
+                else:
+                    yield from one.all(*names[1:])
+
+    def first(self, *names: str) -> Element | None:
+        """The first element at a path of names below this one, or None."""
+        return next(self.all(*names), None)
+
+    def text_at(self, *names: str) -> str:
+        """The text of the first element at a path of names, empty where there is none."""
+        one = self.first(*names)
+        return "" if one is None else one.text
+
+    def walk(self) -> Iterator[Element]:
+        """This element and all below it, in their order."""
+        left = [self]
+        while left:
+            one = left.pop()
+            yield one
+            left += reversed(one.children)
+
+
+def read_xml(path: Path | GivenText) -> Element:
+    """The root of an XML file; see ``parse_xml``.
+
+    :raises ExperimentError: the file cannot be read or is refused.
+    """
+    encoding = "utf-8" if isinstance(path, GivenText) else None
+    return parse_xml(read_bytes(path), str(path), encoding)
+
+
+def parse_xml(content: bytes, file: str, encoding: str | None = None) -> Element:
+    """The root of an XML document in the encoding that it declares, or the one that is given;
+    ``file`` is named in messages.
+
+    :raises ExperimentError: it is not well-formed, has a document type, an encoding that is not
+        known, more than `MOST_XML_BYTES`, more than `MOST_ELEMENTS` or is deeper than `DEEPEST`.
+
+    >>> root = parse_xml(b'<a xmlns="urn:b"><c unit="mm"> 1 </c></a>', "example")
+    >>> root.namespace, root.text_at("c"), root.first("c").mark.column
+    ('urn:b', '1', 18)
+    """
+    if len(content) > MOST_XML_BYTES:
+        raise refused(file, f"has more than {MOST_XML_BYTES // 10**6} MB; leave some of it out")
+    builder = _Builder(file, encoding)
+    try:
+        builder.parser.Parse(content, True)
+    except expat.ExpatError as error:
+        words = expat.ErrorString(error.code)
+        text = f"not well-formed XML: {_REMEDIES.get(words, words)}"
+        if words == "no element found" and builder.open:
+            text = (
+                f"the file ends within <{shorten(builder.open[-1].name)}>; it was cut off, take a"
+                " whole copy"
+            )
+        raise ExperimentError([Message(file, error.lineno, error.offset + 1, "", text)]) from None
+    except (LookupError, ValueError) as error:
+        text = f"the encoding cannot be read ({error}); save the file with the encoding UTF-8"
+        raise ExperimentError([Message(file, 1, 1, "", text)]) from None
+    return builder.roots[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Open:
+    """An element whose end has not been seen."""
+
+    mark: Mark
+    namespace: str
+    name: str
+    attributes: dict[str, str]
+    children: list[Element]
+    texts: list[str]
+
+
+class _Builder:
+    """Makes the tree of what a parser says."""
+
+    def __init__(self, file: str, encoding: str | None) -> None:
+        self.file = file
+        self.open: list[_Open] = []
+        self.roots: list[Element] = []
+        self.count = 0
+        self.parser = expat.ParserCreate(encoding, _SEPARATOR)
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+        self.parser.StartDoctypeDeclHandler = self._refuse_type
+
+    def _mark(self) -> Mark:
+        return Mark(self.file, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
+
+    def _refuse(self, text: str) -> ExperimentError:
+        return ExperimentError([self._mark().message("", text)])
+
+    def _refuse_type(self, *_: object) -> None:
+        text = "a document type (<!DOCTYPE …>) is not read, nor any entity of it; remove it"
+        raise self._refuse(text)
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self.count += 1
+        if self.count > MOST_ELEMENTS:
+            raise self._refuse(f"more than {MOST_ELEMENTS} elements; leave some of them out")
+        if len(self.open) >= DEEPEST:
+            raise self._refuse(f"elements within each other more than {DEEPEST} deep")
+        namespace, _, local = name.rpartition(_SEPARATOR)
+        own = {key.rpartition(_SEPARATOR)[2]: value for key, value in attributes.items()}
+        self.open.append(_Open(self._mark(), namespace, local, own, [], []))
+
+    def _end(self, _: str) -> None:
+        one = self.open.pop()
+        text = "".join(one.texts).strip()
+        made = Element(one.mark, one.namespace, one.name, one.attributes, tuple(one.children), text)
+        (self.open[-1].children if self.open else self.roots).append(made)
+
+    def _text(self, text: str) -> None:
+        if self.open:
+            self.open[-1].texts.append(text)

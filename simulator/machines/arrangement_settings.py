@@ -1,0 +1,48 @@
+"""The keys of an arrangement of the axes."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..inputs.settings import Settings
+from .arrangement import ARRANGEMENTS, AXES, Arrangement
+
+AxisName = Literal["x", "y", "z"]
+
+
+class ArrangementSettings(Settings):
+    """An arrangement of the axes that has no name of its own."""
+
+    probe_side: tuple[AxisName, ...] = Field(
+        default=(), description="Axes that carry the probe, listed from the ground to the probe."
+    )
+    workpiece_side: tuple[AxisName, ...] = Field(
+        default=(),
+        description="Axes that carry the workpiece, listed from the ground to the table.",
+    )
+
+    @model_validator(mode="after")
+    def _each_axis_once(self) -> Self:
+        if sorted(self.probe_side + self.workpiece_side) != list(AXES):
+            raise ValueError(
+                "an axis is missing or named twice; name each of x, y and z exactly once on the"
+                " two sides together"
+            )
+        return self
+
+
+ArrangementName = Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"]
+ARRANGEMENT = (
+    "Which axis carries which: a named arrangement, or the axes on either side. "
+    "MB2 (x carries y carries z carries the probe) is NPL's kinematic model."
+)
+ROTATIONS = "Whether products of small errors are left out or multiplied out."
+
+
+def arrangement_of(settings: str | ArrangementSettings) -> Arrangement:
+    """The arrangement that settings name or list."""
+    if isinstance(settings, str):
+        return ARRANGEMENTS[settings]
+    return Arrangement(settings.probe_side, settings.workpiece_side)

@@ -1,0 +1,136 @@
+"""The errors of a machine of three axes and their ISO 230-1 names: 18 of the axes, 3 of squareness.
+
+What a name says is looked up here, and never read from its letters elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .protocol import Unit
+
+# Translations along x, y, z and rotations about them, by the letters of ISO 230-1.
+TRANSLATIONS = ("X", "Y", "Z")
+ROTATIONS = ("A", "B", "C")
+
+
+@dataclass(frozen=True)
+class AxisError:
+    """An error of an axis: as `axis` (0 to 2) moves, it displaces along `component` (0 to 2), or
+    turns about it.
+    """
+
+    axis: int
+    component: int
+    is_rotation: bool
+
+    @property
+    def name(self) -> str:
+        """ISO 230-1 name.
+
+        >>> AxisError(0, 0, False).name, AxisError(0, 2, True).name
+        ('EXX', 'ECX')
+        """
+        letters = ROTATIONS if self.is_rotation else TRANSLATIONS
+        return f"E{letters[self.component]}{TRANSLATIONS[self.axis]}"
+
+    @property
+    def unit(self) -> Unit:
+        return "rad" if self.is_rotation else "m"
+
+    @property
+    def is_straightness(self) -> bool:
+        return not self.is_rotation and self.axis != self.component
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether it moves points of the plane of x and y within that plane."""
+        return self.axis < 2 and self.is_rotation == (self.component == 2)
+
+    @property
+    def meaning(self) -> str:
+        """Words for it.
+
+        >>> [AXIS_ERRORS[name].meaning for name in ("EXX", "EYX", "ECZ")]
+        ['positioning error of X', 'straightness of X in Y', 'yaw of Z about Z']
+        """
+        axis, other = TRANSLATIONS[self.axis], TRANSLATIONS[self.component]
+        if not self.is_rotation:
+            if self.is_straightness:
+                return f"straightness of {axis} in {other}"
+            return f"positioning error of {axis}"
+        if axis == other:
+            word = "roll" if axis != "Z" else "yaw"
+        elif axis == "Z":
+            word = "tilt"
+        else:
+            word = "yaw" if other == "Z" else "pitch"
+        return f"{word} of {axis} about {other}"
+
+
+@dataclass(frozen=True)
+class SquarenessError:
+    """The turn of `axis` about `about` from its right angle to the axis `to`, each 0 to 2.
+
+    The turn is right-handed. To first order it displaces along `to`, by `sign` times the angle for
+    each metre of `axis`.
+    """
+
+    axis: int
+    to: int
+    about: int
+
+    @property
+    def name(self) -> str:
+        """ISO 230-1 name.
+
+        >>> list(SQUARENESS_ERRORS)
+        ['EC0Y', 'EB0Z', 'EA0Z']
+        """
+        return f"E{ROTATIONS[self.about]}0{TRANSLATIONS[self.axis]}"
+
+    @property
+    def unit(self) -> Unit:
+        return "rad"
+
+    @property
+    def sign(self) -> float:
+        """Component `to` of the vector about which is turned, crosswise with that of the axis.
+
+        >>> [one.sign for one in SQUARENESS_ERRORS.values()]
+        [-1.0, 1.0, -1.0]
+        """
+        return 1.0 if (self.about + 1) % 3 == self.axis else -1.0
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether it moves points of the plane of x and y within that plane."""
+        return self.about == 2
+
+    @property
+    def meaning(self) -> str:
+        """Words for it.
+
+        >>> SQUARENESS_ERRORS["EC0Y"].meaning
+        'squareness of Y to X'
+        """
+        return f"squareness of {TRANSLATIONS[self.axis]} to {TRANSLATIONS[self.to]}"
+
+
+AXIS_ERRORS = {
+    one.name: one
+    for axis in range(3)
+    for is_rotation in (False, True)
+    for component in range(3)
+    for one in (AxisError(axis, component, is_rotation),)
+}
+"""The 18 errors of the axes by name, all of X first, its displacements before its rotations."""
+
+SQUARENESS_ERRORS = {
+    one.name: one
+    for one in (SquarenessError(1, 0, 2), SquarenessError(2, 0, 1), SquarenessError(2, 1, 0))
+}
+"""The three squareness errors by name: of Y to X, of Z to X and of Z to Y."""
+
+ERRORS: dict[str, AxisError | SquarenessError] = {**AXIS_ERRORS, **SQUARENESS_ERRORS}
+"""All 21 by name."""

@@ -1,0 +1,132 @@
+"""The keys of the kinematic error model."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, create_model, model_validator
+
+from ..inputs.messages import Steps
+from ..inputs.settings import Forms, Settings
+from .arrangement_settings import (
+    ARRANGEMENT,
+    ROTATIONS,
+    ArrangementName,
+    ArrangementSettings,
+    arrangement_of,
+)
+from .bases import Basis
+from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
+from .error_names import AXIS_ERRORS
+from .kinematic import in_plane, kinematic_model_of
+from .model_kinds import Corner, ErrorModelKind
+from .plane import PlaneModel, in_space
+from .protocol import ErrorModel
+
+_Function = Forms[Annotated[int, Field(ge=1, le=30)], SplineSettings, SplineSettings]
+FunctionsSettings = create_model(
+    "FunctionsSettings",
+    __base__=Settings,
+    __doc__="Single error functions by their ISO 230-1 names.",
+    **{  # type: ignore[call-overload]
+        name: (_Function | None, Field(None, description=error.meaning))
+        for name, error in AXIS_ERRORS.items()
+    },
+)
+
+
+class KinematicSettings(Settings):
+    """Errors of each axis as polynomials or splines, superposed along the chain of axes."""
+
+    kind: Literal["kinematic"] = Field(
+        description="errors of each axis, superposed along the chain of axes"
+    )
+    arrangement: ArrangementName | ArrangementSettings = Field(
+        default="MB2", description=ARRANGEMENT
+    )
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
+    position_coefficients: int = Field(
+        default=5,
+        ge=2,
+        le=30,
+        description=(
+            "Coefficients of each positional error's polynomial, the constant included (NDEL); "
+            "the constant is held at zero, so 5 leaves 4 free."
+        ),
+    )
+    rotation_coefficients: int = Field(
+        default=5,
+        ge=1,
+        le=30,
+        description=(
+            "Coefficients of each rotational error's polynomial, the constant included (NEPS)."
+        ),
+    )
+    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
+    functions: FunctionsSettings | None = Field(  # type: ignore[valid-type]
+        default=None,
+        description=(
+            "Single functions by their ISO 230-1 names, as the others are where left out: numbers"
+            " of coefficients, the constant included, or B-splines as {order: 4, knots: [0.5]}."
+            " With 1 coefficient there is no such error."
+        ),
+    )
+    squareness: Literal["straightness", "parameters"] = Field(
+        default="straightness",
+        description=(
+            "Where squareness is: in the straightness errors EXY, EXZ and EYZ, which then do not"
+            " vanish at the upper end of their axis, or in parameters EC0Y, EB0Z and EA0Z of its"
+            " own (the 21-parameter form)."
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _coefficients_of_polynomials(self) -> Self:
+        if isinstance(self.basis, SplineSettings):
+            without(
+                self,
+                ("position_coefficients", "rotation_coefficients"),
+                "splines, which have an order and knots",
+            )
+        return self
+
+
+def _own(settings: KinematicSettings) -> tuple[tuple[str, Basis], ...]:
+    """The functions that have families of their own."""
+    stated: dict[str, Any] = {} if settings.functions is None else settings.functions.stated
+    polynomials = "monomial" if settings.basis == "monomial" else "chebyshev"
+    return tuple(
+        (
+            (name, one.spline())
+            if isinstance(one, SplineSettings)
+            else (name, basis_of(polynomials, one))
+        )
+        for name, one in stated.items()
+    )
+
+
+def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    model = kinematic_model_of(
+        arrangement_of(settings.arrangement),
+        basis_of(settings.basis, settings.position_coefficients),
+        basis_of(settings.basis, settings.rotation_coefficients),
+        *in_space(lower, upper),
+        settings.rotations == "full",
+        _own(settings),
+        settings.squareness == "parameters",
+    )
+    return model if len(lower) == 3 else PlaneModel(in_plane(model), 0.0)
+
+
+def _wrong(settings: KinematicSettings, dimension: int) -> list[tuple[Steps, str]]:
+    names = [name for name, _ in _own(settings)]
+    absent = [name for name in names if dimension == 2 and not AXIS_ERRORS[name].in_plane]
+    if absent:
+        text = "moves no point within the plane of x and y; remove it"
+        return [(("functions", name), text) for name in absent]
+    if not _kinematic(settings, (0.0,) * dimension, (1.0,) * dimension).parameters:
+        return [(("functions",), "leaves no error to be estimated; give one of them more than 1")]
+    return []
+
+
+KINEMATIC = ErrorModelKind(KinematicSettings, _kinematic, wrong=_wrong)

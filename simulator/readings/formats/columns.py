@@ -1,0 +1,37 @@
+"""Rows of printed tables: what the headings call the columns, and numbers in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number, with a point or a comma.
+
+    >>> [is_number(text) for text in ("-1,5", "+.5", "----#----", "1.2.3")]
+    [True, True, False, False]
+    """
+    return NUMBER.fullmatch(text) is not None
+
+
+def with_point(text: str) -> str:
+    """A number with a point in place of its comma."""
+    return text.replace(",", ".")
+
+
+def headings(cells: Sequence[str], known: Mapping[str, str]) -> dict[str, int]:
+    """Where each column is that is known by its heading; the first, if several are called so.
+
+    >>> headings(["Name", "Ist-Wert"], {"istwert": "actual"})
+    {'actual': 1}
+    """
+    found: dict[str, int] = {}
+    for i, cell in enumerate(cells):
+        plain = re.sub(r"[^a-z+\-]", "", cell.casefold())
+        name = known.get(plain) or known.get(plain.replace("-", ""))
+        if name:
+            found.setdefault(name, i)
+    return found

@@ -1,0 +1,48 @@
+"""All formats that are read, and which of them a file has."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+from ...inputs.messages import refused
+from ...inputs.settings import hint, listing
+from ...inputs.yamltree import GivenText, read_bytes
+from .calypso import CALYPSO
+from .dmis import DMIS
+from .pcdmis import PCDMIS
+from .qif import QIF
+from .report import Format, Report
+
+# Asked in this order: the first that recognises a file reads it.
+FORMATS: tuple[Format, ...] = (QIF, DMIS, PCDMIS, CALYPSO)
+
+# Bytes at the beginning of a file by which it is recognised.
+BEGINNING = 100_000
+
+
+def read_report(
+    path: Path | GivenText, name: str | None = None, unit: Fraction | None = None
+) -> Report:
+    """The report in a file, of the format with a name or of the one that recognises it.
+
+    `unit` is metres per unit for a file that states none.
+
+    :raises ExperimentError: the file cannot be read, is of no known format, or is wrong.
+    """
+    content, file = read_bytes(path), str(path)
+    if name is not None:
+        chosen = {one.name: one for one in FORMATS}
+        if name not in chosen:
+            raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
+        return chosen[name].read(content, file, unit)
+    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8"
+    beginning = content[:BEGINNING].decode(encoding, errors="replace").removeprefix("\ufeff")
+    beginning = "\n".join(beginning.splitlines())
+    for one in FORMATS:
+        if one.recognises(beginning):
+            return one.read(content, file, unit)
+    titles = listing(one.title for one in FORMATS)
+    names = ", ".join(one.name for one in FORMATS)
+    text = f"not recognised as {titles}; state its format with --from ({names})"
+    raise refused(file, text)

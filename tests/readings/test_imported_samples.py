@@ -1,0 +1,112 @@
+"""Samples of makers' formats, written by somebody who had not seen the readers, import to the same
+readings and estimates as the plain tables of the same campaign.
+"""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from ballplate.cli import main
+
+FOLDER = Path(__file__).parent / "samples"
+CAMPAIGN = FOLDER / "campaign.yaml"
+REPORTS = [
+    row
+    for row in csv.DictReader((FOLDER / "index.csv").read_text(encoding="utf-8").splitlines())
+    if Path(row["file"]).suffix in (".dmo", ".txt", ".qif")
+]
+KEYS = ["position", "ball", "probe"]
+AXES = ["x_mm", "y_mm", "z_mm"]
+
+
+def in_order(table: pd.DataFrame) -> pd.DataFrame:
+    return table.sort_values(KEYS).reset_index(drop=True)
+
+
+def scale_readings(centres: pd.DataFrame) -> pd.DataFrame:
+    """Centres less the offset of the tip that read them, from the experiment's text alone."""
+    texts = yaml.safe_load(CAMPAIGN.read_text(encoding="utf-8"))["probes"]
+    offsets = {name: [float(text.split()[0]) for text in one] for name, one in texts.items()}
+    found = centres.copy()
+    found[AXES] = centres[AXES] - np.array([offsets[probe] for probe in centres["probe"]])
+    return found
+
+
+def estimates(table: pd.DataFrame) -> dict[str, Any]:
+    return bp.fit(CAMPAIGN, table).to_dict()
+
+
+@cache
+def plain_estimates(name: str) -> dict[str, Any]:
+    return estimates(in_order(pd.read_csv(FOLDER / name)))
+
+
+def numbers(found: object) -> list[float]:
+    """All numbers of plain data, in its order."""
+    if isinstance(found, dict):
+        return [number for one in found.values() for number in numbers(one)]
+    if isinstance(found, list):
+        return [number for one in found for number in numbers(one)]
+    is_number = isinstance(found, int | float) and not isinstance(found, bool)
+    return [float(found)] if is_number else []  # type: ignore[arg-type]
+
+
+def test_there_are_reports_of_every_format() -> None:
+    told = " ".join(row["format"] for row in REPORTS)
+    assert len(REPORTS) >= 9
+    assert all(word in told for word in ("DMIS", "QIF 3", "QIF 2", "text report", "table"))
+
+
+@pytest.mark.parametrize("row", REPORTS, ids=lambda row: row["file"])
+def test_a_report_imports_to_the_readings_of_the_plain_table(
+    row: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, written = FOLDER / row["file"], tmp_path / "readings.csv"
+    assert main(["import", str(path), "--for", str(CAMPAIGN), "-o", str(written)]) == 0
+    said = capsys.readouterr().err
+    assert "taken: 112 " in said and "112 readings written" in said
+    assert "readings: {coordinates: ball centres}" in said
+    found = in_order(scale_readings(pd.read_csv(written, comment="#")))
+    expected = in_order(pd.read_csv(FOLDER / row["plain"]))
+    assert found[KEYS].equals(expected[KEYS])
+    # The plain table has the report's digits; points on the surface have rounding of their own.
+    unit = 25.4 if "inch" in row["unit"] else 1.0
+    tolerance = unit * 10.0 ** -int(row["digits"]) if "points" in row["file"] else 1e-8
+    assert np.abs(found[AXES] - expected[AXES]).to_numpy().max() < tolerance
+
+
+EXACT = [row for row in REPORTS if "points" not in row["file"]]
+
+
+@pytest.mark.parametrize("row", EXACT, ids=lambda row: row["file"])
+def test_a_report_fits_to_the_estimates_of_the_plain_table(row: dict[str, str]) -> None:
+    imported = bp.read_report(FOLDER / row["file"], CAMPAIGN).to_frame()
+    found = numbers(estimates(in_order(scale_readings(imported))))
+    expected = numbers(plain_estimates(row["plain"]))
+    assert len(found) == len(expected) > 100
+    # The plain tables are written in millimetres to 1e-11 m.
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=5e-11)
+
+
+def test_points_on_the_surface_fit_to_the_estimates_within_the_rounding_of_points() -> None:
+    (row,) = (row for row in REPORTS if row not in EXACT)
+    imported = bp.read_report(FOLDER / row["file"], CAMPAIGN).to_frame()
+    found = np.array(numbers(estimates(in_order(scale_readings(imported)))))
+    plain = in_order(pd.read_csv(FOLDER / row["plain"]))
+    expected, generator = np.array(numbers(estimates(plain))), np.random.default_rng(3)
+    spread = np.zeros(len(expected))
+    for _ in range(10):
+        rounded = plain.copy()
+        rounded[AXES] += generator.uniform(-0.5, 0.5, (len(plain), 3)) * 10.0 ** -int(row["digits"])
+        spread += (np.array(numbers(estimates(rounded))) - expected) ** 2 / 10
+    # Every number within five standard deviations of what rounding the readings alone would do.
+    assert (np.abs(found - expected) <= 5 * np.sqrt(spread) + 1e-12).all()
+    assert np.sqrt(spread).max() > 0.0
