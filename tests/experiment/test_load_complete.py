@@ -86,6 +86,7 @@ target_uncertainty: 0.5 um + L/1000000
 coverage_factor: 2
 sigma: given
 expected_rank_deficiency: 0
+noise: uniform
 seed: 7
 """
 
@@ -135,8 +136,9 @@ def test_the_file_uses_every_key(complete: Experiment) -> None:
         if isinstance(node, Mapping)
         for key in node.items
     }
-    # Pools have tests of their own.
-    assert set(ExperimentSettings.model_fields) - used == {"variants", "pool"}
+    # Pools and influence quantities, which go with no length standard, have tests of their own.
+    own = {"variants", "pool", "influences"}
+    assert set(ExperimentSettings.model_fields) - used == own
     for key in (
         "corner",
         "centre",
