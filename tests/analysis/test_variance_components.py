@@ -221,7 +221,7 @@ def ensure_tallied(left: Leftover, groups: tuple[Group, ...], ratios: Real, coun
 def test_intervals_hold_the_truth_and_alarms_are_as_rare_as_stated(
     design: Design, left: Leftover
 ) -> None:
-    ensure_tallied(left, groups_of(design, "calibration"), np.ones(2), 120)
+    ensure_tallied(left, groups_of(design, "calibration"), np.ones(2), 80)
 
 
 @pytest.mark.long

@@ -12,6 +12,8 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+import yaml
+from ballplate.cli import main
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.variance_components.components import AS_STATED, LARGER, variance_components
 from ballplate.simulator.design.arrays import Design, nominal_state
@@ -357,6 +359,30 @@ def test_intervals_of_stated_components_hold_them(
         ratios.append(one.ratio)
     assert abs(inside / count - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
     assert abs(np.mean(ratios) - 1.0) < 4.0 * np.std(ratios) / np.sqrt(count)
+
+
+def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
+    """Everything in the pool chosen is the design of all positions; its file reads again."""
+    told = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
+    told["artefacts"]["plate"]["balls"] = [3, 3]
+    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    told["evaluation"]["points"] = {"random": 20, "seed": 3}
+    settings = disturbance.settings
+    if settings["kind"] == "position scale":
+        settings = settings | {"positions": ["z low", "x high", "y low"]}
+    told["influences"] = [settings]
+    (tmp_path / "all.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
+    expected = bp.run(tmp_path / "all.yaml").quantities["U6"].average
+    first, *others = told["positions"]
+    pool = told | {"positions": [first], "pool": {"candidates": others}}
+    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(pool), encoding="utf-8")
+    plan = bp.plan(tmp_path / "pool.yaml", "U6", positions=6)
+    assert plan.to_dict()["value"] == pytest.approx(expected, rel=1e-6)
+    command = ["plan", str(tmp_path / "pool.yaml"), "--positions", "4", "-q"]
+    main([*command, "-o", str(tmp_path / "chosen.yaml")])
+    chosen = bp.load(tmp_path / "chosen.yaml")
+    assert len(chosen.positions) == 4
+    assert lay_out(chosen).influence_parameters
 
 
 def test_unknown_values_are_free_parameters(small: bp.Experiment) -> None:
