@@ -183,7 +183,8 @@ class ExperimentSettings(Settings):
         None, description="prior knowledge of machine errors and poses"
     )
     influences: NonEmpty[AnyInfluence] | None = Field(
-        None, description="what disturbs readings: temperature"
+        None,
+        description="what disturbs readings: temperature, probing, position scale, reproducibility",
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"
