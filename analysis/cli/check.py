@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
 from .outputs import UsageError
-from .telling import complain, warn
+from .telling import complain, tell_notes, warn
 
 if TYPE_CHECKING:
     from ..planning.repair.checked_files import CheckedFile
@@ -92,7 +92,10 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-modules",
         action="store_true",
-        help="refuse files with an error model in Python, because loading them runs its code",
+        help=(
+            "refuse files with an error model or a calibration in Python, because loading them runs"
+            " its code"
+        ),
     )
 
 
@@ -155,6 +158,7 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
     from .excerpts import print_errors
     from .github import annotation_lines
 
+    tell_notes(checked.notes)
     warn(checked.doubts)
     if options.format == "github":
         workspace = os.environ.get("GITHUB_WORKSPACE")

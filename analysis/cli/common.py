@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .outputs import PICTURE, add_output
-from .telling import warn
+from .telling import tell_notes, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
@@ -165,6 +165,7 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
         if unknown:
             raise ExperimentError(unknown)
         found = [experiment for experiment in found if experiment.name in options.variant]
+    tell_notes(dict.fromkeys(note for experiment in found for note in experiment.notes))
     warn(dict.fromkeys(doubt for experiment in found for doubt in experiment.doubts))
     return found
 

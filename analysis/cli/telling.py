@@ -45,6 +45,12 @@ def warn(doubts: Iterable[object]) -> None:
         complain(f"warning: {doubt}")
 
 
+def tell_notes(notes: Iterable[object]) -> None:
+    """Tell what was found by itself, each in one line."""
+    for note in notes:
+        complain(f"note: {note}")
+
+
 @contextmanager
 def told(options: Namespace) -> Iterator[None]:
     """Tell, where it is asked for, what a command works with before it does, and then how long it

@@ -218,11 +218,25 @@ def _refuse_many_terms(
         raise refused(experiment.source, text, "artefacts")
 
 
-def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
+def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
     """Refuse what estimators of distances alone cannot follow.
 
-    :raises ExperimentError: a Bryan gauge, or a length standard without a certificate.
+    :raises ExperimentError: a gauge, a length standard without a certificate, holes, a star, or
+        correlated values.
     """
+    if experiment.stars:
+        text = "estimators of distances alone cannot follow where a star points; use the full one"
+        raise refused(experiment.source, text, "stars")
+    if design.positions.across is not None:
+        text = "estimators of distances alone cannot follow what is read in plane; use the full one"
+        raise refused(experiment.source, text, "artefacts")
+    for k, item in enumerate(experiment.calibration):
+        if item.root is not None:
+            text = (
+                "estimators of distances alone take certified distances as independent; use the"
+                " full estimator for correlated values and functions of your own"
+            )
+            raise refused(experiment.source, text, f"calibration[{k}]")
     gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
     if gauges or unknown:
         what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
@@ -269,7 +283,7 @@ def fit_alternative(
     t, t^2, ...
     """
     design = observed.design
-    _refuse_unknown_lengths(experiment, design)
+    _refuse_unknown_places(experiment, design)
     _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
     chosen = ball_pairs(experiment, pair_set)
     solution = alternative_estimate(design, observed.x, chosen, estimator, across_probes)
@@ -318,7 +332,7 @@ def compare_estimators(
     if estimator == "length-equations" or estimator == "sphere-then-metric":
         _refuse_other_lengths(experiment, design)
     else:
-        _refuse_unknown_lengths(experiment, design)
+        _refuse_unknown_places(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
     on_truth, truth = on_true_machine(

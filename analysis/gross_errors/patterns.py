@@ -88,7 +88,9 @@ class Patterns:
         """Which patterns (k,) are of rows that come together: of one ball at the most, or one
         kind.
         """
-        return np.isin(self.kind, [*single_kinds(self.design), "ball", "moved", "length value"])
+        wide = [one.word for one in self.design.observations if one.is_joint]
+        local = [*single_kinds(self.design), "ball", "moved", "length value"]
+        return np.isin(self.kind, local) & ~np.isin(self.kind, wide)
 
     def of_kind(self, *kinds: str) -> Integers:
         """Indices of the patterns of some kinds."""
@@ -204,14 +206,9 @@ def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integer
 
 
 def _single_readings(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    m, d = at.weight.shape
-    rows = np.arange(m * d)
-    yield _block(
-        "reading",
-        (rows, rows, at.weight.ravel()),
-        np.repeat(at.chosen, d),
-        np.tile(np.arange(d), m),
-    )
+    row, axis = np.nonzero(at.weight)
+    entries = at.weight.shape[1] * row + axis, np.arange(len(row)), at.weight[row, axis]
+    yield _block("reading", entries, at.chosen[row], axis)
 
 
 def _single_lengths(at: LinearisedDesign) -> Iterator[BiasPatterns]:
@@ -269,10 +266,17 @@ def _single_items(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Certified values and priors: what is stated too large makes residuals smaller."""
     # What is known of the machine first, then of artefacts.
     for one in reversed(at.design.observations):
-        if not isinstance(one, Lengths):
-            every = np.arange(len(one))
-            entries = (at.places[one.word].start + every, every, -1.0 / one.uncertainty)
-            yield _block(one.word, entries, every, one.along)
+        if isinstance(one, Lengths):
+            continue
+        # What is stated as exact is not tested.
+        chosen = np.flatnonzero(~one.is_exact)
+        first, every = at.places[one.word].start, np.arange(len(chosen))
+        entries = (first + chosen, every, -1.0 / one.uncertainty[chosen])
+        if one.is_joint:
+            white = -one.whitened(np.eye(len(one))[:, chosen])
+            row, column = np.nonzero(white)
+            entries = (first + row, column, white[row, column])
+        yield _block(one.word, entries, chosen, one.along[chosen])
 
 
 def _dirty_balls(at: LinearisedDesign) -> Iterator[BiasPatterns]:
@@ -415,7 +419,7 @@ def _scales(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     design = at.design
     lengths = design.of(Lengths)
     of_length = design.balls.artefact[design.readings.ball[lengths.first]]
-    scaled = [one for one in design.observations if one.scales]
+    scaled = [one for one in design.observations if one.scales and len(one)]
     for artefact in range(len(design.artefacts.names)):
         mine = [
             np.flatnonzero(design.balls.artefact[one.balls[:, 0]] == artefact) for one in scaled
@@ -423,14 +427,13 @@ def _scales(at: LinearisedDesign) -> Iterator[BiasPatterns]:
         of_lengths = lengths.is_known & (of_length == artefact)
         if sum(map(len, mine)) + len(np.unique(lengths.certificate[of_lengths])) < 2:
             continue
-        parts = [
-            (
-                at.places[one.word].start + rows,
-                np.zeros(len(rows), np.int64),
-                -one.value[rows] / one.uncertainty[rows],
-            )
-            for one, rows in zip(scaled, mine, strict=True)
-        ]
+        parts = []
+        for one, rows in zip(scaled, mine, strict=True):
+            bias = np.zeros(len(one))
+            bias[rows] = one.scaled()[rows]
+            white = -one.whitened(bias)
+            row = np.flatnonzero(white)
+            parts.append((at.places[one.word].start + row, np.zeros_like(row), white[row]))
         columns = -np.where(of_lengths, lengths.value, 0.0)[:, None]
         yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
 

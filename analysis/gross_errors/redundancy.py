@@ -11,7 +11,7 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.arrays import Design, measured
 from ballplate.simulator.estimation.functions import Parameters
 from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.estimation.linearisation import linearise
@@ -120,10 +120,20 @@ def reliability_of(
         for symbol, groups in changes.items():
             for among in groups:
                 _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
+    readings = design.readings.select(design.plate_readings)
+    is_read = measured(design, readings)
+    # Co-ordinates that are not read are no observations.
+    redundancy[places["reading"]][~is_read.ravel()] = 0.0
+    joint = [one.word for one in design.observations if one.is_joint]
+    # Of standards' lengths those that share no reading come first, and have a pattern each.
     for kind, rows in places.items():
-        own = np.flatnonzero(given.kind == kind)
-        left[own] = redundancy[rows][: len(own)]
-    repeats = design.readings.repeats[design.plate_readings]
+        own, of_kind = np.flatnonzero(given.kind == kind), redundancy[rows]
+        if kind == "reading":
+            left[own] = of_kind[is_read.ravel()][: len(own)]
+        elif kind == "length":
+            left[own] = of_kind[: len(own)]
+        elif kind not in joint:
+            left[own] = of_kind[given.subject[own]]
     every = patterns(design, at.state, None, every_start=True)
     tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
     across = effects.pop(ACROSS).change if mixed is not None else np.zeros(len(given))
@@ -136,7 +146,7 @@ def reliability_of(
         given,
         redundancy,
         left,
-        design.dimension * int((repeats - 1).sum()),
+        int(((readings.repeats - 1)[:, None] * is_read).sum()),
         information,
         effects,
         across,

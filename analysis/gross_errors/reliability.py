@@ -277,7 +277,7 @@ def _positions(result: Reliability) -> list[str]:
         rows.append(
             [
                 design.positions.names[k],
-                str(len(own) // design.dimension),
+                str(len(np.unique(given.subject[own]))),
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
                 _shown(result.minimal_detectable[by_bias]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, reading_uncertainties
+from ballplate.simulator.design.arrays import Design, measured, reading_uncertainties
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .leftover import Leftover
@@ -27,11 +27,12 @@ def scatters(design: Design) -> list[Scatter]:
     """All positions, and all probes that share positions with others, with readings of plates."""
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
-    d = design.dimension
+    d, is_read = design.dimension, measured(design, readings)
 
     def of(position: int, probe: int, which: Array) -> Scatter:
         rows = np.flatnonzero(which)
-        return Scatter(position, probe, chosen[rows], (d * rows[:, None] + np.arange(d)).ravel())
+        among = (d * rows[:, None] + np.arange(d))[is_read[rows]]
+        return Scatter(position, probe, chosen[rows], among)
 
     found = [of(int(k), -1, readings.position == k) for k in np.unique(readings.position)]
     found += [of(-1, int(k), readings.probe == k) for k in np.unique(readings.probe)]

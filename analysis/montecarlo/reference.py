@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, Rows, State
+from ballplate.simulator.design.arrays import Design, Rows, State, reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.covariance import Spectrum
@@ -28,6 +28,9 @@ READINGS_AT_ONCE = 512
 # How well, in standard uncertainties of a reading, the expansion of a model must agree with the
 # model itself.
 FAITHFUL = 1e-8
+# What is more certain than this share of the repeatability is taken to be as certain: replicates
+# are solved by their gradients, which rounding spoils where weights differ more.
+EXACT_ENOUGH = 1e-4
 
 
 class RankDeficientError(ValueError):
@@ -137,6 +140,8 @@ def reference(design: Design, truth: Truth) -> Reference:
         location.
     """
     observed = _observed(design)
+    least = EXACT_ENOUGH * float(observed.machine.repeatability.min())
+    observed = observed.observed(*(one.loosened(least) for one in observed.observations))
     # As drawn, because a small machine error makes a direction that is open merely all but open.
     deficiency = linearise(observed).deficiency
     if deficiency:
@@ -161,6 +166,7 @@ def reference(design: Design, truth: Truth) -> Reference:
 
     blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
     weight = reading_weights(observed, readings.select(plates))
+    noise = reading_noise(observed, readings.select(plates))
     groups, at = [], 0
     for chosen in _groups(observed):
         rows = readings.select(plates[chosen])
@@ -171,14 +177,14 @@ def reference(design: Design, truth: Truth) -> Reference:
                 position,
                 _as_slice(rows.ball),
                 np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
-                np.ascontiguousarray((blocks.residual / weight)[chosen].T),
+                np.ascontiguousarray((blocks.residual * noise)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
                 local(exact[plates[chosen]], p[plates[chosen]]),
                 rows.probe if observed.probes.free.any() else None,
                 None
                 if blocks.by_influence is None
                 else np.ascontiguousarray(
-                    (blocks.by_influence / weight[:, :, None])[chosen].transpose(2, 1, 0)
+                    (blocks.by_influence * noise[:, :, None])[chosen].transpose(2, 1, 0)
                 ),
             )
         )
@@ -201,7 +207,7 @@ def reference(design: Design, truth: Truth) -> Reference:
             difference[of_end] += sign * (
                 exact[end] + observed.model.error(exact[end], start.a, p[end])
             )
-        end_noise.append((1.0 / reading_weights(observed, readings.select(end))).T)
+        end_noise.append(reading_noise(observed, readings.select(end)).T)
     difference[~read] -= start.origins[readings.position[given.first[~read]]]
     return Reference(
         observed,
@@ -209,7 +215,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         start,
         solution.factor,
         solution.spectrum,
-        np.ascontiguousarray((1.0 / weight)[order].T),
+        np.ascontiguousarray(noise[order].T),
         tuple(groups),
         ends,
         (end_noise[0], end_noise[1]),
@@ -273,7 +279,7 @@ def _is_faithful(
     """Whether an expansion of the model tells the same as the model itself."""
     p = start.probes[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    noise = 1.0 / reading_weights(design, design.readings).T
+    noise = reading_noise(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, spectrum.root.shape[1])) @ spectrum.root[columns].T
     offsets = 1e-6 * generator.standard_normal(moved.shape) if design.probes.free.any() else None

@@ -229,7 +229,14 @@ def _gradient(
     position, parameter = np.nonzero(layout.pose_columns >= 0)
     by_shared[:, layout.pose_columns[position, parameter]] += by_pose[:, position, parameter]
     among = Replicates(
-        shared.start, shared.truth.state, at.balls, at.shared, squares, by_ball, by_shared
+        shared.start,
+        shared.truth.state,
+        at.balls,
+        at.shared,
+        squares,
+        by_ball,
+        by_shared,
+        layout.offset_columns,
     )
     for one, rows, errors in zip(
         shared.design.observations, shared.rows, drawn.errors, strict=True

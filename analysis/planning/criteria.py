@@ -540,7 +540,7 @@ def _of_points(information: Information, places: MeasuredPoints) -> tuple[Array,
     drawn, (n, d) = information.drawn, places.points.shape
     rows = np.zeros((n * d, drawn.shared))
     for some, found in point_rows(drawn.design, drawn.layout, drawn.state, places):
-        own = found[:, :, drawn.own].reshape(-1, drawn.own.stop - drawn.own.start)
+        own = found[:, :, drawn.columns].reshape(-1, len(drawn.columns))
         rows[some.start * d : some.start * d + len(own), : own.shape[1]] = own
     rows *= drawn.scale
     return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.whitening import CovarianceRoot
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
@@ -88,9 +89,16 @@ def _same_place(one: Position, other: object) -> bool:
 
 def _equal(one: Calibration, other: Calibration) -> bool:
     return type(one) is type(other) and all(
-        np.array_equal(getattr(one, field.name), getattr(other, field.name))
+        np.array_equal(_plain(getattr(one, field.name)), _plain(getattr(other, field.name)))
         for field in fields(cast(Any, one))
     )
+
+
+def _plain(value: Any) -> Any:
+    """What a field of an item states: of a covariance the root, of a user's functions the names."""
+    if isinstance(value, CovarianceRoot):
+        return value.drawn(np.eye(len(value.own)))
+    return value.names if hasattr(value, "derivatives") else value
 
 
 def begun(

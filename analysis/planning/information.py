@@ -191,9 +191,8 @@ def pool_information(
         text = "has no position to choose; add candidates"
         raise refused(experiment.source, text, "pool")
     drawn = draw(experiment, positions)
-    some = replace(experiment, positions=tuple(positions[:1]))
     items: dict[int, list[CandidateRows]] = {
-        k: calibration_rows(drawn, some, candidate.item, candidate.name)
+        k: calibration_rows(drawn, experiment, candidate.item, candidate.name)
         for k, candidate in enumerate(candidates)
         if not isinstance(candidate.item, Position)
     }
@@ -541,7 +540,9 @@ def _unplaced(
         # taken for it.
         by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
         by_length = np.eye(drawn.shared)[
-            drawn.layout.lengths.start - drawn.own.start + design.unknown_lengths.of(number)
+            drawn.layout.lengths.start
+            - drawn.layout.model.start
+            + design.unknown_lengths.of(number)
         ]
         rows = np.concatenate(
             [

@@ -10,17 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.lengths import (
     Lengths,
     length_derivative,
     length_whitening,
 )
-from ballplate.simulator.design.observations.priors import no_priors
 from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.observations.whitening import EXACT
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
@@ -58,18 +59,27 @@ class PoolDesign:
     """All positions that may be chosen, laid out as one design, and the columns of shared
     parameters.
 
-    Shared columns are those of the layout less poses, then the error of each certificate of a
-    length, in its standard uncertainty.
+    Shared columns are those of the layout less poses and less the influence quantities of single
+    positions, then the error of each certificate of a length, in its standard uncertainty.
     """
 
     design: Design
     layout: SharedLayout
     state: State
 
-    @property
-    def own(self) -> slice:
+    @cached_property
+    def columns(self) -> Integers:
         """Columns of the layout that positions share."""
-        return slice(self.layout.model.start, len(self.layout))
+        start = self.layout.influences.start
+        place = np.array([one.position for one in self.design.influence_parameters], np.int64)
+        before = np.arange(self.layout.model.start, start)
+        return np.concatenate([before, start + np.flatnonzero(place < 0)])
+
+    def influences_of(self, position: int) -> tuple[Integers, Array]:
+        """The influence quantities of a position alone, with their standard uncertainties."""
+        every = self.design.influence_parameters
+        own = np.array([k for k, one in enumerate(every) if one.position == position], np.int64)
+        return own, np.array([every[k].uncertainty for k in own], float)
 
     @property
     def certificates(self) -> int:
@@ -78,12 +88,12 @@ class PoolDesign:
     @property
     def shared(self) -> int:
         """Number of shared columns."""
-        return self.own.stop - self.own.start + self.certificates
+        return len(self.columns) + self.certificates
 
     @property
     def scale(self) -> Array:
         """Size of a unit step of each shared column (shared,)."""
-        return np.concatenate([self.layout.scale[self.own] * STEP, np.ones(self.certificates)])
+        return np.concatenate([self.layout.scale[self.columns] * STEP, np.ones(self.certificates)])
 
 
 def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
@@ -146,15 +156,13 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
         by_shared = np.zeros((len(index), d, drawn.shared))
         by_shared[:, :, : blocks.by_model.shape[2]] = blocks.by_model
         if blocks.by_offset is not None:
-            columns = drawn.layout.offset_columns[readings.probe] - drawn.own.start
+            columns = drawn.layout.offset_columns[readings.probe] - drawn.layout.model.start
             for axis in range(d):
                 free = np.flatnonzero(columns[:, axis] >= 0)
                 by_shared[free, :, columns[free, axis]] = blocks.by_offset[free, :, axis]
         if blocks.by_influence is not None:
-            first_of = drawn.layout.influences.start - drawn.own.start
-            by_shared[:, :, first_of : first_of + blocks.by_influence.shape[2]] = (
-                blocks.by_influence
-            )
+            at = drawn.columns - drawn.layout.influences.start
+            by_shared[:, :, np.flatnonzero(at >= 0)] = blocks.by_influence[:, :, at[at >= 0]]
         by_shared *= drawn.scale
         for k in range(first, last):
             if k in lengths:
@@ -162,13 +170,37 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
                 continue
             own = slice(end[k] - count[k] - start, end[k] - start)
             balls = np.repeat(readings.ball[own], d)[:, None]
-            yield CandidateRows(
+            found = CandidateRows(
                 balls,
                 STEP * blocks.by_ball[own].reshape(len(balls), 1, d),
                 by_shared[own].reshape(len(balls), drawn.shared),
                 blocks.by_pose[own].reshape(len(balls), blocks.by_pose.shape[2]),
             )
+            if blocks.by_influence is not None:
+                found = _with_influences(drawn, k, found, blocks.by_influence[own])
+            yield found
         first = last
+
+
+def _with_influences(
+    drawn: PoolDesign, position: int, rows: CandidateRows, by_influence: Array
+) -> CandidateRows:
+    """Rows of a position with its own influence quantities, which count with its pose, and what is
+    known of them.
+    """
+    own, uncertainty = drawn.influences_of(position)
+    q, count = rows.by_pose.shape[1], len(own)
+    by_own = by_influence[:, :, own].reshape(len(rows), count)
+    by_pose = np.zeros((len(rows) + count, q + count))
+    by_pose[: len(rows)] = np.concatenate([rows.by_pose, by_own], axis=1)
+    by_pose[len(rows) + np.arange(count), q + np.arange(count)] = 1.0 / uncertainty
+    none = np.zeros((count, *rows.by_ball.shape[1:]))
+    return CandidateRows(
+        np.concatenate([rows.balls, rows.balls[np.zeros(count, np.int64)]]),
+        np.concatenate([rows.by_ball, none]),
+        np.concatenate([rows.by_shared, np.zeros((count, drawn.shared))]),
+        by_pose,
+    )
 
 
 def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
@@ -180,7 +212,9 @@ def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
         design.of(Lengths), length_derivative(design, drawn.state, None)
     )
     derivative = by_position.rows
-    shared = np.concatenate([derivative[:, drawn.own], by_position.by_error], axis=1) * drawn.scale
+    shared = (
+        np.concatenate([derivative[:, drawn.columns], by_position.by_error], axis=1) * drawn.scale
+    )
     place = design.readings.position[design.of(Lengths).first[by_position.length]]
     found = {}
     for k in np.unique(place).tolist():
@@ -204,7 +238,7 @@ def always(drawn: PoolDesign) -> list[CandidateRows]:
     certificates.
     """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
-    return [*_of_observations(drawn, drawn.design), _of_shared(drawn, unit)]
+    return [*_of_observations(drawn, drawn.design.observations), _of_shared(drawn, unit)]
 
 
 def calibration_rows(
@@ -212,15 +246,14 @@ def calibration_rows(
 ) -> list[CandidateRows]:
     """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
-    `experiment` has some position, whichever.
-
     :raises ExperimentError: it is of a length standard that has a certificate already, or more than
         one length.
     """
+    artefact = drawn.design.artefacts.names.index(item.artefact)
     if experiment.artefacts[item.artefact].role == "plate":
-        design = lay_out(replace(experiment, calibration=(item,), priors=()))
-        return _of_observations(drawn, design.observed(no_priors()))
-    named = drawn.design.unknown_lengths.of(drawn.design.artefacts.names.index(item.artefact))
+        first = int(drawn.design.balls.of(artefact)[0])
+        return _of_observations(drawn, [item.observed(first)])
+    named = drawn.design.unknown_lengths.of(artefact)
     if len(named) != 1:
         text = (
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
@@ -229,30 +262,30 @@ def calibration_rows(
         raise refused(experiment.source, text, "pool.calibration")
     stated = next(item.certified_values(experiment.layouts[item.artefact]))
     row = np.zeros((1, drawn.shared))
-    row[0, drawn.layout.lengths.start - drawn.own.start + named[0]] = (
-        1.0 / stated.standard_uncertainty
+    row[0, drawn.layout.lengths.start - drawn.layout.model.start + named[0]] = 1.0 / max(
+        stated.standard_uncertainty, EXACT
     )
     return [_of_shared(drawn, row * drawn.scale)]
 
 
-def _of_observations(drawn: PoolDesign, design: Design) -> list[CandidateRows]:
-    """Rows of all observations that are not formed of readings, of a design with the same balls and
-    parameters.
-    """
+def _of_observations(
+    drawn: PoolDesign, observations: Sequence[Observations]
+) -> list[CandidateRows]:
+    """Rows of observations that are not formed of readings."""
     found = []
-    for one in design.observations:
+    for one in observations:
         if len(one) and not isinstance(one, Lengths):
-            rows = one.rows(design, drawn.state, None)
+            rows = one.rows(drawn.design, drawn.state, None)
             by_shared = np.zeros((len(one), drawn.shared))
             if rows.by_shared is not None:
-                own = rows.by_shared[:, design.once(shared_layout).model.start :]
-                by_shared[:, : own.shape[1]] = own
+                by_shared[:, : len(drawn.columns)] = rows.by_shared[:, drawn.columns]
+            is_shared = by_shared.any(axis=1) | rows.by_ball.any(axis=(1, 2))
             found.append(
                 CandidateRows(
-                    one.balls,
-                    STEP * rows.by_ball,
-                    by_shared * drawn.scale,
-                    np.zeros((len(one), 0)),
+                    one.balls[is_shared],
+                    STEP * rows.by_ball[is_shared],
+                    by_shared[is_shared] * drawn.scale,
+                    np.zeros((int(is_shared.sum()), 0)),
                     len(one.fixing()[0]) > 0,
                 )
             )

@@ -59,7 +59,7 @@ def styli(sheet: RunSheet, experiment: Experiment) -> list[Stylus]:
 
 def offsets(experiment: Experiment) -> Mapping[str, Array]:
     """The tips' offsets (d,) in metres by the names of probes."""
-    return {name: np.asarray(offset, float) for name, offset in experiment.probes.items()}
+    return {name: probe.offset for name, probe in experiment.probes.items()}
 
 
 def _stylus(name: str, offset: Array) -> Stylus:

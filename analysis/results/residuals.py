@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.arrays import Design, Readings, reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
-from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
+from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.machines.protocol import Array
 
@@ -42,7 +42,7 @@ def reading_residuals(
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
     standardised = reading_blocks(design, solution.state, readings, x[chosen]).residual
-    return readings, standardised / reading_weights(design, readings), standardised
+    return readings, standardised * reading_noise(design, readings), standardised
 
 
 def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:

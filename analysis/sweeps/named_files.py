@@ -22,7 +22,7 @@ MODULE = ".py"
 YAML = (".yaml", ".yml")
 
 # Keys of experiment and machine files whose text is a path, as their schemas say.
-PATH_KEYS = ("file", "files", "values")
+PATH_KEYS = ("file", "files", "values", "covariance")
 
 MEND = "move it there, or allow its folder with --folder"
 

@@ -7,7 +7,7 @@ same ratio give the same readings, so that some knowledge of a length must say h
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -122,34 +122,44 @@ def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
         yield f"certificates of {listing(some, 3)}", replace(experiment, calibration=rest)
     if experiment.priors:
         yield "priors", replace(experiment, priors=())
-    unknown = np.full(experiment.dimension, np.inf)
-    stated = {
-        name: u for name, u in experiment.offset_uncertainties.items() if np.isfinite(u).any()
-    }
-    if stated:
-        freed = {**experiment.offset_uncertainties, **dict.fromkeys(stated, unknown)}
+    certified = [probe.name for probe, *_ in experiment.certified_offsets]
+    if certified:
         yield (
             "probe offsets with a standard uncertainty",
-            replace(experiment, offset_uncertainties=freed),
+            _with_offsets(experiment, certified, np.inf),
         )
+    if experiment.stars:
+        yield "tips of stars", _without_stars(experiment)
     if exact_offsets(experiment):
         yield EXACT_OFFSETS, with_offsets(experiment, np.inf)
 
 
 def exact_offsets(experiment: Experiment) -> tuple[str, ...]:
     """Probes whose offsets are held exact, but for one: what the others are relative to."""
-    return tuple(name for name in experiment.probes if name not in experiment.offset_uncertainties)[
-        1:
-    ]
+    return tuple(name for name, one in experiment.probes.items() if not one.is_estimated)[1:]
 
 
 def with_offsets(experiment: Experiment, uncertainty: float) -> Experiment:
     """The experiment with a standard uncertainty, in metres, of the offsets that are held exact,
     but for one.
     """
-    own = np.full(experiment.dimension, uncertainty)
-    offsets = {**experiment.offset_uncertainties, **dict.fromkeys(exact_offsets(experiment), own)}
-    return replace(experiment, offset_uncertainties=offsets)
+    return _with_offsets(experiment, exact_offsets(experiment), uncertainty)
+
+
+def _with_offsets(experiment: Experiment, names: Iterable[str], uncertainty: float) -> Experiment:
+    own, probes = np.full(experiment.dimension, uncertainty), dict(experiment.probes)
+    for name in names:
+        probes[name] = replace(probes[name], standard_uncertainty=own)
+    return replace(experiment, probes=probes)
+
+
+def _without_stars(experiment: Experiment) -> Experiment:
+    """The experiment with unknown offsets in place of stars, but for one that is the reference."""
+    probes = dict(experiment.probes)
+    if all(probe.is_estimated for probe in probes.values()):
+        first = next(iter(probes.values()))
+        probes[first.name] = replace(first, standard_uncertainty=None)
+    return replace(experiment, probes=probes, stars=())
 
 
 def scale_uncertainty(experiment: Experiment) -> float:

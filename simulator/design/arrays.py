@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
@@ -19,6 +20,7 @@ from .objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
+    Flags,
     Machine,
     Positions,
     Probes,
@@ -118,8 +120,9 @@ class Design:
 
         Of lengths that are read together only those count that do not follow from the others.
         """
-        count = int(self.readings.repeats[self.plate_readings].sum())
-        return self.dimension * count + sum(one.count(self) for one in self.observations)
+        readings = self.readings.select(self.plate_readings)
+        count = int((readings.repeats[:, None] * measured(self, readings)).sum())
+        return count + sum(one.count(self) for one in self.observations)
 
     @property
     def parameter_count(self) -> int:
@@ -175,6 +178,22 @@ def reading_uncertainties(design: Design, readings: Readings) -> Array:
     if readings.uncertainty is not None:
         return readings.uncertainty
     return np.broadcast_to(design.machine.repeatability, (len(readings), design.dimension))
+
+
+def measured(design: Design, readings: Readings) -> Flags:
+    """Which co-ordinates (m, d) are read: all but those across artefacts that are read in their
+    plane.
+    """
+    shape = (len(readings), design.dimension)
+    if design.positions.across is None:
+        return np.broadcast_to(True, shape)
+    return np.arange(shape[1]) != design.positions.across[readings.position][:, None]
+
+
+def reading_noise(design: Design, readings: Readings) -> Array:
+    """Standard uncertainties (m, d) of the mean of each reading's repeats, in metres."""
+    times = np.sqrt(readings.repeats)[:, None]
+    return np.asarray(reading_uncertainties(design, readings) / times)
 
 
 def nominal_state(design: Design) -> State:
@@ -251,13 +270,15 @@ class Observations(ABC):
     """All observations (m,) of one kind in a design; a frozen dataclass of arrays.
 
     `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
-    too long by one ratio where its scale is wrong. `words` tell what is wrong with a wrong one.
+    too long by one ratio where its scale is wrong; where they are `is_joint`, a row is a
+    combination of several values. `words` tell what is wrong with a wrong one.
     Values are in `measured_in`, unless `unit` says otherwise of each.
     """
 
     word: ClassVar[str]
     measured_in: ClassVar[Unit] = "m"
     scales: ClassVar[bool] = False
+    is_joint: ClassVar[bool] = False
     words: ClassVar[Words] = Words()
     value: Array
     uncertainty: Array
@@ -277,6 +298,11 @@ class Observations(ABC):
     def along(self) -> Integers:
         """The axis (m,) that each is along, -1 without one."""
         return np.full(len(self), -1)
+
+    @property
+    def is_exact(self) -> NDArray[np.bool_]:
+        """Which values (m,) are stated without any uncertainty, and cannot be wrong."""
+        return np.full(len(self), False)
 
     def count(self, design: Design) -> int:
         """Number of independent rows."""
@@ -316,13 +342,46 @@ class Observations(ABC):
         """The same observations with other values or uncertainties (m,)."""
         return cast(Self, replace(cast(Any, self), **changed))
 
-    def fixing(self) -> tuple[Integers, Integers]:
-        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter."""
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    def enlarged(self, times: Array) -> Self:
+        """The same observations with uncertainties so many `times` (rows,) as large; of rows that
+        share errors, all the same.
+        """
+        return self.given(uncertainty=self.uncertainty * times)
+
+    def whitened(self, rows: Array) -> Array:
+        """What changes (m, ...) of the values are in uncorrelated rows (count, ...) of unit
+        variance.
+        """
+        return rows / self.uncertainty.reshape(-1, *[1] * (rows.ndim - 1))
+
+    def scaled(self) -> Array:
+        """What the values (m,) change by, per ratio, where the scale of their certificate is
+        wrong.
+        """
+        return self.value if self.scales else np.zeros(len(self))
+
+    def loosened(self, least: float) -> Self:
+        """The same with standard uncertainties of `least` at the least, where smaller ones stand
+        for none.
+        """
+        return self
+
+    def fixing(self) -> tuple[Integers, Integers, Array]:
+        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter, and
+        the co-ordinates (f,).
+        """
+        none = np.zeros(0, np.int64)
+        return none, none, np.zeros(0)
 
     def started(self, design: Design, x: Array, state: State) -> State:
         """Starting values with what these observations tell of them."""
         return state
+
+    def as_read(self, design: Design, x: Array) -> Design:
+        """The design with probe offsets that readings tell, for these observations, by far better
+        than the drawing.
+        """
+        return design
 
     def reread(self, design: Design, place: Integers) -> Self:
         """The same where the design's readings stand at other places (readings,)."""
@@ -354,6 +413,7 @@ class Replicates:
 
     `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
     S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
+    `offsets` (l, d) are the columns of probe offsets, -1 where they are held.
     """
 
     start: State
@@ -363,6 +423,7 @@ class Replicates:
     squares: Array
     by_ball: Array
     by_shared: Array
+    offsets: Integers
 
     def pull(self, balls: Integers, forces: Array) -> None:
         """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""

@@ -105,7 +105,9 @@ class Positions:
     y + o with `rotations` (k, d, d) and `origins` (k, d).
 
     `held` (k, pose size) marks the pose parameters (origin, then rotation about the machine's axes)
-    that fix a frame or that turn an artefact of collinear balls about its own axis.
+    that fix a frame or that turn an artefact of collinear balls about its own axis. `across` (k,)
+    is the machine's axis across an artefact of which only co-ordinates in its plane are read, -1
+    elsewhere; None where all co-ordinates are read.
     """
 
     names: tuple[str, ...]
@@ -113,6 +115,7 @@ class Positions:
     rotations: Array
     origins: Array
     held: Flags
+    across: Integers | None = None
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ import numpy as np
 
 from ..computing.rounding import comparable
 from ..design.arrays import Design, State, nominal_state
+from ..design.objects import Flags
 from ..design.observations.readings import seen_places
-from ..geometry.motions import fit_motion
+from ..geometry.motions import fit_motion, rotation_from_vector, vector_from_rotation
 from ..machines.protocol import Array, Integers
 from .spheres import fit_sphere
 
@@ -28,6 +29,8 @@ def initial_state(design: Design, x: Array) -> State:
 
     Where too few balls join a position to the others, the nominal geometry closes the gap.
     """
+    for one in design.observations:
+        design = one.as_read(design, x)
     d = design.dimension
     balls = design.balls.places.copy()
     rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
@@ -54,6 +57,13 @@ def initial_state(design: Design, x: Array) -> State:
         for place, (rotation, origin) in zip(places, poses, strict=True):
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
+    if design.positions.across is not None:
+        # Out of the plane nothing is read that could tell poses from the drawing's.
+        read = design.positions.across >= 0
+        rotations[read] = _in_plane(design, rotations, read)
+        origins = np.where(
+            read[:, None] & design.positions.held[:, :d], design.positions.origins, origins
+        )
     readings = design.readings
     for k in design.gauge_positions:
         rows = readings.position == k
@@ -65,6 +75,15 @@ def initial_state(design: Design, x: Array) -> State:
     for one in design.observations:
         state = one.started(design, x, state)
     return state
+
+
+def _in_plane(design: Design, rotations: Array, read: Flags) -> Array:
+    """The rotations (k, 3, 3) of positions that are `read` in their plane, without tilts against
+    the drawing.
+    """
+    drawn = design.positions.rotations[read]
+    turns = vector_from_rotation(rotations[read] @ drawn.transpose(0, 2, 1))
+    return rotation_from_vector(np.where(design.positions.held[read, 3:], 0.0, turns)) @ drawn
 
 
 def _mean_locations(design: Design, x: Array) -> Array:
@@ -144,9 +163,9 @@ def _into_frame(
         )
     target, certified = design.balls.places.copy(), np.zeros(len(members), bool)
     for one in design.observations:
-        ball, axis = one.fixing()
+        ball, axis, value = one.fixing()
         if len(ball):
-            target[ball, axis] = one.value
+            target[ball, axis] = value
             certified |= np.isin(members, ball)
     known = ~np.isnan(shape[:, 0])
     chosen = certified & known

@@ -36,7 +36,7 @@ from ..machines.true_machine_settings import CurvesSettings, RandomSettings, Tru
 from ..machines.truth import TruthError, true_machine
 from .curve_files import read_curves
 from .machine_file import load_machine
-from .model import Evaluation, Position
+from .model import Evaluation, Position, Probe
 from .structure import Sections
 
 TOLERANCE = 1e-9
@@ -248,21 +248,20 @@ def check_inside(
     position: Position,
     steps: Steps,
     volume: Volume,
-    offsets: Mapping[str, Floats],
+    probes: Mapping[str, Probe],
     references: References,
 ) -> None:
-    """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those
-    of the probes.
+    """Report readings with scale readings outside the measuring volume.
 
     Error models are functions of the scale readings, where the ball is less the probe's offset.
     Balls may be outside, and scale readings by a thousandth of the volume.
     """
     layout = references.layouts[position.artefact]
     rows = [
-        (group.ball_indices, probe, offsets[probe])
+        (group.ball_indices, probe, probes[probe].offset)
         for group in position.readings
         for probe in group.probes
-        if probe in offsets and offsets[probe].shape == volume.lower.shape
+        if probe in probes and probes[probe].offset.shape == volume.lower.shape
     ]
     if not rows:
         return
@@ -277,7 +276,7 @@ def check_inside(
     # The first of those furthest outside, whatever rounding makes of equal ones.
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
-    offset, place = float(offsets[probe][axis]), float(places[balls[worst], axis])
+    offset, place = float(probes[probe].offset[axis]), float(places[balls[worst], axis])
     others = (
         f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}"
         if len(outside) > 1
@@ -428,7 +427,7 @@ def check_size(
     machine: Machine | None,
     positions: dict[int, Position],
     calibrations: Mapping[int, Calibration],
-    offset_uncertainties: Mapping[str, Floats],
+    probes: Mapping[str, Probe],
     references: References,
 ) -> None:
     """Report what would take more memory than a computer usually has, or hours."""
@@ -442,11 +441,12 @@ def check_size(
     }
     pivots = [one for one in positions.values() if one.artefact in gauges]
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
-    shared = errors + pose_size(d) * poses + d * (len(pivots) + len(offset_uncertainties))
+    offsets = sum(probe.is_estimated for probe in probes.values())
+    shared = errors + pose_size(d) * poses + d * (len(pivots) + offsets)
     if shared > MOST_SHARED:
         text = (
-            f"{poses + len(pivots)} poses, {errors} machine errors and {len(offset_uncertainties)}"
-            f" probe offsets make {shared} parameters besides the balls; at most {MOST_SHARED} are"
+            f"{poses + len(pivots)} poses, {errors} machine errors and {offsets} probe"
+            f" offsets make {shared} parameters besides the balls; at most {MOST_SHARED} are"
             " possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)

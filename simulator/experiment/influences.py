@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -44,7 +45,7 @@ def resolve_influences(
 def with_influences(design: Design, experiment: Experiment) -> Design:
     """The design with the influence quantities of its experiment, and what is known of them.
 
-    :raises ExperimentError: they have more parameters than there is memory for.
+    :raises ExperimentError: they have more parameters than there is memory for, or one twice.
     """
     if not experiment.influences:
         return design
@@ -66,6 +67,10 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
             raise ExperimentError([experiment.message(("influences", i), str(error))]) from None
     disturbed = replace(design, readings=readings, influences=tuple(influences))
     parameters = disturbed.influence_parameters
+    twice = [name for name, count in Counter(one.name for one in parameters).items() if count > 1]
+    if twice:
+        text = f"{twice[0]} is stated by two of them; remove it from one"
+        raise ExperimentError([experiment.message(("influences",), text)])
     shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
     if shared > MOST_SHARED:
         text = (

@@ -22,10 +22,12 @@ from ..design.objects import (
     Volume,
 )
 from ..design.observations.balls import BallObservations
-from ..design.observations.coordinates import CalibratedCoordinates, no_coordinates
+from ..design.observations.coordinates import CalibratedCoordinates, flat, no_coordinates
 from ..design.observations.distances import CalibratedDistances, no_distances
+from ..design.observations.joint_values import JointValues
 from ..design.observations.priors import Priors
 from ..design.observations.radius import RadiusCalibration
+from ..design.observations.star import Stars, observed_stars
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
@@ -90,7 +92,13 @@ def lay_out(experiment: Experiment) -> Design:
         np.repeat(np.arange(len(artefacts)), sizes),
         balls,
     )
+    across = _across(experiment, rotations, position_artefact)
     held = _held(laid, position_artefact, rotations, of_balls)
+    if across is not None:
+        read = np.flatnonzero(across >= 0)
+        # Nothing is read of a shift across the plane and, of what is in it, of tilts.
+        held[read, across[read]] = True
+        held[read, d:] |= np.arange(d) != across[read][:, None]
     # A pivot has a place; how the bar turns about it is what the readings say.
     held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     priors = _priors(experiment, held, len(model.parameters))
@@ -98,15 +106,22 @@ def lay_out(experiment: Experiment) -> Design:
         model,
         machine,
         Probes(
-            tuple(experiment.probes), np.array(list(experiment.probes.values())), _free(experiment)
+            tuple(experiment.probes),
+            np.array([probe.offset for probe in experiment.probes.values()]),
+            _free(experiment),
         ),
         Artefacts(tuple(artefacts), is_plate, is_gauge),
         laid,
         Positions(
-            tuple(place.name for place in places), position_artefact, rotations, origins, held
+            tuple(place.name for place in places),
+            position_artefact,
+            rotations,
+            origins,
+            held,
+            across,
         ),
         readings,
-        (distances, coordinates, lengths, priors, *others),
+        (distances, coordinates, lengths, priors, *others, *_stars(experiment)),
         unknown,
         EvaluationPoints(points, probe_index[experiment.evaluation.probe]),
         Tasks(
@@ -124,7 +139,7 @@ def lay_out(experiment: Experiment) -> Design:
 
 def _free(experiment: Experiment) -> Flags:
     """Which probe offsets are parameters (l, d)."""
-    free = [name in experiment.offset_uncertainties for name in experiment.probes]
+    free = [probe.is_estimated for probe in experiment.probes.values()]
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
@@ -146,13 +161,9 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     if messages:
         raise ExperimentError(messages)
     nowhere = Mark(str(experiment.source), 0, 0)
-    for name, uncertainty in experiment.offset_uncertainties.items():
-        for axis in np.flatnonzero(np.isfinite(uncertainty)):
-            value, u = float(experiment.probes[name][axis]), float(uncertainty[axis])
-            label = f"probe {name}: offset {'xyz'[axis]}"
-            given.append(
-                Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere)
-            )
+    for probe, axis, value, u in experiment.certified_offsets:
+        label = f"probe {probe.name}: offset {'xyz'[axis]}"
+        given.append(Prior(label, None, probe.name, axis, np.zeros(parameters), value, u, nowhere))
     probes = list(experiment.probes)
     return Priors(
         tuple(prior.name for prior in given),
@@ -163,6 +174,25 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
         np.array([p.value for p in given], float),
         np.array([p.standard_uncertainty for p in given], float),
     )
+
+
+def _across(
+    experiment: Experiment, rotations: Array, position_artefact: NDArray[np.int64]
+) -> NDArray[np.int64] | None:
+    """The machine's axis (k,) across artefacts that are read in their plane, -1 for others; None
+    where there are no such artefacts.
+    """
+    in_plane = [one.reads == "in plane" for one in experiment.artefacts.values()]
+    if not any(in_plane):
+        return None
+    axis = np.abs(rotations[:, :, -1]).argmax(axis=1)
+    return np.where(np.array(in_plane)[position_artefact], axis, -1)
+
+
+def _stars(experiment: Experiment) -> list[Stars]:
+    if not experiment.stars:
+        return []
+    return [observed_stars(experiment.stars, list(experiment.probes))]
 
 
 def random_points(volume: Volume, count: int, seed: int) -> Array:
@@ -210,11 +240,22 @@ def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallOb
         CalibratedDistances: [no_distances()],
         CalibratedCoordinates: [no_coordinates()],
     }
+    joint = []
     for item in experiment.calibration:
         if experiment.artefacts[item.artefact].role == "plate":
             one = item.observed(int(first_ball[item.artefact]))
-            parts.setdefault(type(one), []).append(one)
-    return [kind.joined(own) for kind, own in parts.items()]
+            root = item.root
+            if root is None:
+                parts.setdefault(type(one), []).append(one)
+            else:
+                joint.append((one, root))
+    for name, artefact in experiment.artefacts.items():
+        if artefact.flatness is not None:
+            parts[CalibratedCoordinates].append(
+                flat(experiment.layouts[name], int(first_ball[name]), artefact.flatness)
+            )
+    found = [kind.joined(own) for kind, own in parts.items()]
+    return [*found, JointValues.of(joint)] if joint else found
 
 
 def _held(
@@ -232,7 +273,7 @@ def _held(
     """
     d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
-    ball, axis = (
+    ball, axis, _ = (
         np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
     )
     for artefact in np.unique(position_artefact):

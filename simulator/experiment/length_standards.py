@@ -13,6 +13,7 @@ from ..design.objects import UnknownLengths
 from ..design.observations.distances import DistanceCalibration
 from ..design.observations.lengths import Lengths
 from ..design.observations.radius import RadiusCalibration
+from ..design.observations.whitening import at_least_exact
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..machines.protocol import Array, Integers
 from .model import Experiment
@@ -94,10 +95,11 @@ def standard_lengths(
             isinstance(item, DistanceCalibration)
             and experiment.artefacts[item.artefact].role == "length_standard"
         ):
-            given = zip(
-                item.pairs, item.values.tolist(), item.standard_uncertainties.tolist(), strict=True
-            )
             is_projected, scatters = item.form == "projection", item.repeatability == "included"
+            uncertainty = item.standard_uncertainties
+            if not scatters:
+                uncertainty = at_least_exact(uncertainty)
+            given = zip(item.pairs, item.values.tolist(), uncertainty.tolist(), strict=True)
             kinds = [
                 (_Row(value, (i, j), u, is_projected, scatters), first_ball[item.artefact] + pair)
                 for j, (pair, value, u) in enumerate(given)

@@ -35,7 +35,8 @@ from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
-from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
+from .probes import resolve_probes, resolve_stars
+from .references import resolve_references
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
@@ -205,11 +206,11 @@ def _build(
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, references)
     influences = resolve_influences(sections, named, references)
-    offset_uncertainties = resolve_offset_uncertainties(sections, references)
-    check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
+    check_size(sections, machine, positions, calibrations, probes, references)
     noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
+    stars = resolve_stars(sections, probes, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
     experiment = Experiment(
@@ -237,9 +238,10 @@ def _build(
         priors=priors,
         influences=influences,
         noise=noise,
-        offset_uncertainties=offset_uncertainties,
+        stars=stars,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
+        notes=tuple(str(note) for note in problems.notes),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

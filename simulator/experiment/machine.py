@@ -19,7 +19,7 @@ from ..inputs.quantities import LengthFunction, Target, format_length, typed_len
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
-from .model import Evaluation, Task
+from .model import Evaluation, Probe, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 
@@ -100,12 +100,10 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
 def resolve_evaluation(
     sections: Sections,
     machine: Machine | None,
-    offsets: Mapping[str, Floats],
+    probes: Mapping[str, Probe],
     references: References,
 ) -> Evaluation | None:
-    """Return where to evaluate, or None after saying what is wrong; ``offsets`` (d,) are those of
-    the probes.
-    """
+    """Return where to evaluate, or None after saying what is wrong."""
     settings = sections.get("evaluation")
     probe = references.probes[0] if references.probes else ""
     nowhere = frozen(np.zeros((0, references.dimension or 0)))
@@ -121,7 +119,7 @@ def resolve_evaluation(
         references.problems.add(("evaluation",), text)
         return None
     tasks = [
-        _task(i, one, probe, machine, offsets, sections, references)
+        _task(i, one, probe, machine, probes, sections, references)
         for i, one in enumerate(settings.tasks or ())
     ]
     points = nowhere if settings.points is None else _points(settings.points, machine, references)
@@ -138,7 +136,7 @@ def _task(
     settings: TaskSettings,
     probe: str,
     machine: Machine | None,
-    offsets: Mapping[str, Floats],
+    probes: Mapping[str, Probe],
     sections: Sections,
     references: References,
 ) -> Task | None:
@@ -157,9 +155,9 @@ def _task(
         problems.add(
             (*steps, "probe"), 'does not go with "probes"; remove one of the two', of_key=True
         )
-    probes = settings.probes or (settings.probe or probe,) * 2
+    used = settings.probes or (settings.probe or probe,) * 2
     if settings.probe is not None or settings.probes is not None:
-        for k, name in enumerate(probes):
+        for k, name in enumerate(used):
             where = ("probe",) if settings.probes is None else ("probes", k)
             references.require(
                 name in references.probes, (*steps, *where), _unknown(name, references)
@@ -168,14 +166,15 @@ def _task(
         is_right = references.has_dimension(point, (*steps, key))
         if is_right and machine is not None and machine.dimension == len(point):
             check_points(np.array([point]), (*steps, key), machine.volume, problems, of_one=True)
-    if len(problems.messages) > before or dimension is None or not set(probes) <= set(offsets):
+    if len(problems.messages) > before or dimension is None or not set(used) <= set(probes):
         return None
     points = np.array([settings.start, settings.to])
-    if np.linalg.norm(np.diff(points + [offsets[name] for name in probes], axis=0)) <= TOLERANCE:
+    ends = points + [probes[name].offset for name in used]
+    if np.linalg.norm(np.diff(ends, axis=0)) <= TOLERANCE:
         problems.add((*steps, "to"), "is where the length begins; give two points")
         return None
     return Task(
-        settings.name, frozen(points), probes, target_of(sections, settings.target_uncertainty)
+        settings.name, frozen(points), used, target_of(sections, settings.target_uncertainty)
     )
 
 

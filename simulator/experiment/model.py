@@ -5,7 +5,7 @@ resolved.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,6 +17,7 @@ from ..design.lookup import Floats, Indices
 from ..design.noise import Noise
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
+from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
@@ -26,6 +27,31 @@ from .changes import changed_tree
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """A probe: the ``offset`` (d,) of its tip from the machine's reference point, in metres.
+
+    ``standard_uncertainty``: (d,) of the offset where it is estimated, infinite where nothing is
+    known of it, None where the offset is as stated.
+    """
+
+    name: str
+    offset: Floats
+    standard_uncertainty: Floats | None = None
+
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the offset is a parameter."""
+        return self.standard_uncertainty is not None
+
+    @property
+    def certified(self) -> list[tuple[int, float, float]]:
+        """Axis, value and standard uncertainty where an estimated offset has one."""
+        u = self.standard_uncertainty
+        axes = [] if u is None else np.flatnonzero(np.isfinite(u)).tolist()
+        return [(k, float(self.offset[k]), float(u[k])) for k in axes if u is not None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,15 +212,13 @@ class Pool:
 class Experiment:
     """A complete experiment, or one variant of it.
 
-    ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres.
-    ``layouts``: name of an artefact → its balls. ``target_uncertainty`` and
-    ``expected_rank_deficiency`` are None where nothing was stated. ``coverage_factor`` times the
-    standard uncertainty is what targets are meant for. ``offset_uncertainties``: standard
-    uncertainties (d,) of the offsets that are estimated, by the probe's name, infinite where the
-    offset is unknown; other offsets are as stated. ``noise``: of simulated readings. ``pool``: what
-    a plan may choose from. ``doubts``: what of the file is possible, and unlikely to be meant.
-    ``tree``: what was written, without variants, ``mark``: where the experiment itself stands, and
-    ``builder``: what makes an experiment of a tree.
+    ``name``: of the variant, None without variants. ``probes``: by name. ``layouts``: name of an
+    artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency`` are None where
+    nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
+    meant for. ``noise``: of simulated readings. ``pool``: what a plan may choose from. ``doubts``:
+    what of the file is possible, and unlikely to be meant. ``notes``: what was found in its tables
+    by itself. ``tree``: what was written, without variants, ``mark``: where the experiment itself
+    stands, and ``builder``: what makes an experiment of a tree.
     """
 
     title: str
@@ -204,7 +228,7 @@ class Experiment:
     machine: Machine
     error_model: Any
     true_machine: Any
-    probes: Mapping[str, Floats]
+    probes: Mapping[str, Probe]
     artefacts: Mapping[str, ArtefactSettings]
     layouts: Mapping[str, BallLayout]
     positions: tuple[Position, ...]
@@ -221,14 +245,22 @@ class Experiment:
     priors: tuple[Prior, ...] = ()
     influences: tuple[InfluenceSettings, ...] = ()
     noise: Noise = Noise()
-    offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
+    stars: tuple[Star, ...] = ()
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
         """Number of co-ordinates, 2 or 3."""
         return self.machine.dimension
+
+    @property
+    def certified_offsets(self) -> list[tuple[Probe, int, float, float]]:
+        """Probes, axes, values and standard uncertainties of offsets that are estimated and have
+        any.
+        """
+        return [(probe, *one) for probe in self.probes.values() for one in probe.certified]
 
     @property
     def label(self) -> str:

@@ -1,4 +1,6 @@
-"""Modules that an experiment runs: an error model in Python is code that loading the file runs."""
+"""Modules that an experiment runs: an error model, or a calibration, in Python is code that loading
+the file runs.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from ..inputs.yamltree import Mapping, Node, Scalar, walk
 
 
 def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
-    """Settings of error models in Python in a tree, each with its path."""
+    """Settings of error models and calibrations in Python in a tree, each with its path."""
     for steps, node in walk(root):
         if isinstance(node, Mapping):
             kind = node.items.get("kind")
@@ -18,14 +20,17 @@ def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
 
 
 def refused_modules(root: Node) -> list[Message]:
-    """A message for each error model in Python, for files that nobody has looked at."""
+    """A message for each error model or calibration in Python, for files that nobody has looked
+    at.
+    """
     text = (
         "is code that loading the file would run, and modules are not allowed here; allow them if"
         " you trust the file"
     )
     return [
         model.items["kind"].mark.message(
-            format_path((*steps, "kind")), f"an error model in Python {text}"
+            format_path((*steps, "kind")),
+            f"{'a calibration' if 'calibration' in steps else 'an error model'} in Python {text}",
         )
         for steps, model in python_models(root)
     ]

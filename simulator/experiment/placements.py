@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+import numpy as np
+
 from ..design.lookup import References, lengths_per_axis
 from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
@@ -16,6 +18,9 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
+
+# A plane of holes is across an axis if its normal has that axis' direction to within this.
+OBLIQUE = 1e-12
 
 PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
@@ -38,6 +43,14 @@ def resolve_position(
     ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
+    in_plane = references.artefacts[artefact].reads == "in plane"
+    text = (
+        f'"{artefact}" is read in its plane, which has to be across an axis of the machine;'
+        " correct the pose, or say reads: in space of the artefact"
+    )
+    is_across = float(np.abs(pose.rotation[:, -1]).max()) > 1.0 - OBLIQUE
+    if not references.require(is_across or not in_plane, (*steps, "pose"), text):
+        return None
     return Position(settings.name, artefact, pose, readings, settings.description or "")
 
 

@@ -27,7 +27,7 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from ..inputs.quantities import length_text, typed_length
 from ..inputs.yamltree import to_python, written
-from .model import Position, ReadingGroup
+from .model import Position, Probe, ReadingGroup
 from .placements import check_turns
 from .pool_sections import (
     GroupSettings,
@@ -47,13 +47,13 @@ TOLERANCE = 1e-9
 class Bounds:
     """Where artefacts may be.
 
-    The scale readings of balls, which are where they are less the probe's offset of `offsets` (d,),
-    have to be in `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by
-    probe. `edge` is what a plate needs around it.
+    The scale readings of balls, which are where they are less the probe's offset, have to be in
+    `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by probe. `edge`
+    is what a plate needs around it.
     """
 
     volume: Volume
-    offsets: Mapping[str, Floats]
+    probes: Mapping[str, Probe]
     reach: Mapping[str, Floats]
     edge: float | None
 
@@ -190,7 +190,7 @@ def _reasons(
     by_probes = {}
     for probes in group.probes[plane]:
         one = found.copy()
-        for offset in (bounds.offsets[probe] for probe in probes if probe in bounds.offsets):
+        for offset in (bounds.probes[one].offset for one in probes if one in bounds.probes):
             one[~is_within(read - offset, *bounds.volume.of_readings)] = "outside the volume"
         for probe in probes:
             if probe in bounds.reach:

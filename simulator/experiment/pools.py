@@ -26,7 +26,7 @@ from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
-from .model import AtMost, Candidate, ChangeTimes, Pool, Position
+from .model import AtMost, Candidate, ChangeTimes, Pool, Position, Probe
 from .placements import resolve_position
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (
@@ -90,12 +90,11 @@ def resolve_candidates(
     sections: Sections,
     positions: AnyMapping[int, Position],
     machine: Machine | None,
-    offsets: AnyMapping[str, Floats],
+    probes: AnyMapping[str, Probe],
     references: References,
 ) -> Candidates:
-    """Return the positions to choose from, none without a pool; what is wrong goes to the problems.
-
-    ``offsets`` (d,) are those of the probes.
+    """Return the positions to choose from, none without a pool; what is wrong goes to the
+    problems.
     """
     problems = references.problems
     root, result = problems.root, Candidates()
@@ -114,7 +113,7 @@ def resolve_candidates(
     reach = _reach(limits, references)
     bounds = None
     if machine is not None and machine.dimension == references.dimension:
-        bounds = Bounds(machine.volume, offsets, reach, limits.edge)
+        bounds = Bounds(machine.volume, probes, reach, limits.edge)
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
@@ -140,7 +139,7 @@ def resolve_candidates(
                 continue
             if bounds is not None:
                 before = len(problems.messages)
-                check_inside(listed, steps, bounds.volume, offsets, references)
+                check_inside(listed, steps, bounds.volume, probes, references)
                 if len(problems.messages) == before:
                     _check_bounds(listed, steps, bounds, references)
             stated = to_python(written(root, *steps))  # type: ignore[arg-type]

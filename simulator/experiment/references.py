@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..design.lookup import Floats, References, lengths_per_axis
+from ..design.lookup import References
 from ..geometry.artefacts import BallsSettings, BryanGaugeSettings
 from ..geometry.ball_layouts import (
     MOST_BALLS,
@@ -14,7 +14,6 @@ from ..geometry.ball_layouts import (
     BallLayout,
     LayoutError,
     coincident_balls,
-    frozen,
 )
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems, written_keys
@@ -23,7 +22,6 @@ from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
 from ..inputs.yamltree import Mapping, Node, written
 from ..inputs.yamltree import Sequence as SequenceNode
-from .sections import ProbeSettings
 from .structure import Sections
 
 DEFAULT_PROBE = "probe"
@@ -80,6 +78,10 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
             problems.add(where, text)
         elif not twins:
             artefacts[name], layouts[name] = listed, layout
+        if listed.reads == "in plane":
+            text = "what is read in its plane is a plate in space; remove it, and flatness"
+            if listed.role != "plate" or dimension == 2:
+                problems.add((*steps, "reads"), text)
         if listed.axes is not None:
             _check_axes(listed, layout, (*steps, "axes"), dimension, problems)
     return References(
@@ -110,73 +112,6 @@ def _check_axes(
             problems.add(
                 (*steps, key), f'unknown ball "{shorten(name)}"; {hint(name, layout.names)}'
             )
-
-
-def resolve_probes(sections: Sections, references: References) -> dict[str, Floats]:
-    """Return the offsets of the probes that are right."""
-    problems, dimension = references.problems, references.dimension
-    if written(problems.root, "probes") is None:
-        if dimension == 3:
-            text = (
-                'missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: offsets from the'
-                " reference point"
-            )
-            problems.add(("probes",), text)
-        return {DEFAULT_PROBE: frozen(np.zeros(dimension))} if dimension == 2 else {}
-    offsets = {}
-    for name, settings in sections.entries("probes").items():
-        offset = settings.offset if isinstance(settings, ProbeSettings) else settings
-        if references.has_dimension(offset, ("probes", name)):
-            offsets[str(name)] = frozen(offset)
-    return offsets
-
-
-def resolve_offset_uncertainties(sections: Sections, references: References) -> dict[str, Floats]:
-    """Return standard uncertainties (d,) of the offsets that are estimated, infinite where they are
-    unknown.
-    """
-    problems, dimension = references.problems, references.dimension
-    listed = {
-        str(name): s
-        for name, s in sections.entries("probes").items()
-        if isinstance(s, ProbeSettings)
-    }
-    named = [name for name, settings in listed.items() if settings.reference]
-    for name in named[1:]:
-        problems.add(
-            ("probes", name, "reference"),
-            f'"{named[0]}" is the reference already; remove one of the two',
-        )
-    reference = named[0] if named else references.probes[0] if references.probes else ""
-    found: dict[str, Floats] = {}
-    for name, settings in listed.items():
-        steps: Steps = ("probes", name)
-        stated = settings.standard_uncertainty
-        if settings.unknown and stated is not None:
-            problems.add(
-                (*steps, "unknown"),
-                'does not go with "standard_uncertainty"; remove one of the two',
-                True,
-            )
-        if settings.reference and (settings.unknown or stated is not None):
-            key = "unknown" if settings.unknown else "standard_uncertainty"
-            problems.add(
-                (*steps, key), "the offset of the reference is held as stated; remove it", True
-            )
-        if name == reference and not named and (settings.unknown or stated is not None):
-            text = (
-                "its offset is held as stated, as the first probe is the reference where none has"
-                " reference: true"
-            )
-            problems.doubt(steps, f"{text}; its stated uncertainty is ignored")
-        uncertainty, is_right = lengths_per_axis(
-            stated, (*steps, "standard_uncertainty"), references
-        )
-        if settings.unknown and dimension is not None:
-            uncertainty = frozen([np.inf] * dimension)
-        if uncertainty is not None and is_right and name != reference:
-            found[name] = uncertainty
-    return found
 
 
 def _with_coordinates(

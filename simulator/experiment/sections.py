@@ -19,6 +19,7 @@ from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from .pool_sections import PoolSettings
 from .position_sections import Edges, LengthPerAxis, PositionSettings
+from .probe_sections import AnyProbe, HeadSettings, StarSettings
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
@@ -64,30 +65,6 @@ class PriorSettings(Settings):
         description="value with unit; default 0, of a position's origin the nominal co-ordinate",
     )
     standard_uncertainty: Text = Field(description="standard uncertainty of the value, with unit")
-
-
-class ProbeSettings(Settings):
-    """A probe whose offset is estimated."""
-
-    offset: Coordinates = Field(
-        description="offset from the machine's reference point, as far as it is known"
-    )
-    standard_uncertainty: LengthPerAxis | None = Field(
-        None,
-        description="of the stated offset, one length or per axis; the offset is then estimated",
-    )
-    unknown: bool = Field(
-        False, description="whether the offset is estimated without prior knowledge of it"
-    )
-    reference: bool = Field(
-        False,
-        description=(
-            "whether this probe's offset is held as the reference of the others; default: first"
-        ),
-    )
-
-
-AnyProbe = Forms[Coordinates, Coordinates, ProbeSettings]
 
 
 class PointsSettings(Settings):
@@ -165,6 +142,12 @@ class ExperimentSettings(Settings):
             "name → offset of the probe from the machine's reference point, or {offset: …, "
             "standard_uncertainty: …} where it is estimated; optional in 2-D"
         ),
+    )
+    head: HeadSettings | None = Field(
+        None, description="articulating head, whose angles A and B probes may be stated by"
+    )
+    stars: NonEmpty[StarSettings] | None = Field(
+        None, description="probes whose tips are known among one another, as one body"
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
         description=f"name → artefact: {', '.join(ARTEFACTS)}"

@@ -20,7 +20,8 @@ from ..inputs.wording import explain
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import PositionSettings
-from .sections import AnyProbe, ExperimentSettings, PriorSettings
+from .probe_sections import AnyProbe, StarSettings
+from .sections import ExperimentSettings, PriorSettings
 from .variants import ALIASES
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
@@ -30,6 +31,7 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
     "positions": (Sequence, PositionSettings),
     "calibration": (Sequence, CalibrationSettings),
     "priors": (Sequence, PriorSettings),
+    "stars": (Sequence, StarSettings),
     "influences": (Sequence, AnyInfluence),
 }
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
-from ..inputs.quantities import Length
+from ..inputs.quantities import Length, PositiveLength
 from ..inputs.settings import NonEmpty, Settings, listing, nearest, shorten
 
 MOST_BALLS = 40_000
@@ -167,6 +167,19 @@ class ArtefactSettings(Settings):
             "plate: its ball co-ordinates are estimated; length_standard: it only carries distances"
         ),
     )
+    reads: Literal["in space", "in plane"] = Field(
+        "in space",
+        description=(
+            "in space: every co-ordinate of a ball is read; in plane: only the two in the"
+            " artefact's plane, as of holes"
+        ),
+    )
+    flatness: PositiveLength | None = Field(
+        None,
+        description=(
+            "with reads: in plane, standard uncertainty of each hole's co-ordinate out of the plane"
+        ),
+    )
     axes: AxesSettings | None = Field(
         None,
         description=(
@@ -174,6 +187,12 @@ class ArtefactSettings(Settings):
             " from the first ball through the farthest one that nominally lies on its x axis"
         ),
     )
+
+    @model_validator(mode="after")
+    def _flat_if_in_plane(self) -> Self:
+        if (self.reads == "in plane") != (self.flatness is not None):
+            raise ValueError('"reads: in plane" and "flatness" go together; give both or neither')
+        return self
 
     def layout(self) -> BallLayout:
         """Return the balls of the artefact in its own frame."""

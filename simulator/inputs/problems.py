@@ -15,7 +15,7 @@ from .yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python,
 @dataclass(eq=False)
 class Problems:
     """Messages about the tree below ``root``; ``doubts`` are about what is possible, and unlikely
-    to be meant.
+    to be meant, ``notes`` about what was found by itself.
 
     Adding one too many raises an ``ExperimentError`` with all of them: each takes time to word, and
     a file may have hundreds of thousands.
@@ -24,6 +24,7 @@ class Problems:
     root: Node
     messages: list[Message] = field(default_factory=list)
     doubts: list[Message] = field(default_factory=list)
+    notes: list[Message] = field(default_factory=list)
     _known: set[Message] = field(default_factory=set)
 
     def add(self, steps: Steps, text: str, of_key: bool = False) -> None:
@@ -33,6 +34,10 @@ class Problems:
     def doubt(self, steps: Steps, text: str) -> None:
         """Add a doubt about a path."""
         self.doubts.append(mark_of(self.root, steps).message(format_path(steps), text))
+
+    def note(self, steps: Steps, text: str) -> None:
+        """Add a note about a path."""
+        self.notes.append(mark_of(self.root, steps).message(format_path(steps), text))
 
     def add_at(self, mark: Mark, steps: Steps, text: str) -> None:
         """Add a message about a path, placed elsewhere, such as in a table that the path names."""

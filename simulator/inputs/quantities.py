@@ -214,6 +214,15 @@ def parse_positive_length(value: object) -> float:
     return _positive(value, parse_length(value))
 
 
+def parse_length_uncertainty(value: object) -> float:
+    """Read a standard uncertainty of a length, which is zero where it is exact, in metres.
+
+    :raises QuantityError: not a number with a unit of length, or below zero.
+    """
+    found = parse_length(value)
+    return found if found == 0.0 else _positive(value, found)
+
+
 def parse_angle(value: object) -> float:
     """Read an angle and return it in radians.
 
@@ -385,20 +394,7 @@ class LengthFunction:
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
-        units = f"({'|'.join(_unit_patterns('length'))})"
-        growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
-        stated = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
-        return {
-            "type": "string",
-            "pattern": f"^({growing}|{stated})$",
-            "examples": [
-                "0.2 um",
-                LENGTH_FUNCTION_EXAMPLE,
-                "0.9 um + 2.5 um/m",
-                "(0.9 + L/400) um with L in mm",
-            ],
-        }
+        return _length_function_schema("0.2 um")
 
 
 @dataclass(frozen=True)
@@ -464,6 +460,20 @@ def parse_length_function(value: object) -> LengthFunction:
             ' um with L in mm"'
         )
     return _growing(value, match[1], _inverse(value, match[2]), in_metres=True)
+
+
+def parse_uncertainty_function(value: object) -> LengthFunction:
+    """Read a standard uncertainty that may depend on the measured length; "0 um" where it is exact.
+
+    :raises QuantityError: as for `parse_length_function`, but zero is allowed.
+
+    >>> parse_uncertainty_function("0 um")
+    LengthFunction(constant=0.0, slope=0.0)
+    """
+    is_zero = isinstance(value, str) and "L" not in value and "+" not in value.strip()[1:]
+    if is_zero and parse_length(value) == 0.0:
+        return LengthFunction(0.0)
+    return parse_length_function(value)
 
 
 def exact_ratio(value: str) -> Fraction:
@@ -632,6 +642,23 @@ def _pattern(kind: str) -> str:
     return f"^ *{NUMBER} *({'|'.join(_unit_patterns(kind))})$"
 
 
+def _length_function_schema(*examples: str) -> dict[str, Any]:
+    constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
+    units = f"({'|'.join(_unit_patterns('length'))})"
+    growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
+    stated = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
+    return {
+        "type": "string",
+        "pattern": f"^({growing}|{stated})$",
+        "examples": [
+            *examples,
+            LENGTH_FUNCTION_EXAMPLE,
+            "0.9 um + 2.5 um/m",
+            "(0.9 + L/400) um with L in mm",
+        ],
+    }
+
+
 def _schema(kind: str, *examples: str) -> WithJsonSchema:
     return WithJsonSchema({"type": "string", "pattern": _pattern(kind), "examples": list(examples)})
 
@@ -641,6 +668,14 @@ Length = Annotated[
 ]
 PositiveLength = Annotated[
     float, PlainValidator(parse_positive_length), _schema("length", "750 mm", "0.2 um")
+]
+LengthUncertainty = Annotated[
+    float, PlainValidator(parse_length_uncertainty), _schema("length", "0.2 um", "0 um")
+]
+UncertaintyFunction = Annotated[
+    LengthFunction,
+    PlainValidator(parse_uncertainty_function),
+    WithJsonSchema(_length_function_schema("0.2 um", "0 um")),
 ]
 Angle = Annotated[
     float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")

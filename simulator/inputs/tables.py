@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice, pairwise
@@ -64,15 +64,17 @@ def read_table(
     defaults: Mapping[str, str] = MappingProxyType({}),
     absent: float = 0.0,
     units: Mapping[str, Mapping[str, Fraction]] = MappingProxyType({}),
+    empty: Collection[str] = (),
 ) -> tuple[FileRow, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
     unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are
     ``absent``; those of ``units`` are no lengths and have units of their own; ``defaults`` tell
-    what required columns of text say where they are missing. Empty lines and lines that begin with
-    # are skipped. Messages about rows are added to ``problems`` if it is given, so that the caller
-    can say more at once; a length that is wrong is then NaN.
+    what required columns of text say where they are missing; lengths in columns ``empty`` are NaN
+    where their cells are empty. Empty lines and lines that begin with # are skipped. Messages about
+    rows are added to ``problems`` if it is given, so that the caller can say more at once; a length
+    that is wrong is then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
         a number, there are no rows; all problems of the file at once.
@@ -89,7 +91,7 @@ def read_table(
         Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
     )
     _refuse_unfilled(file, places, lengths, lines)
-    count = len(places)
+    count, names = len(places), (*lengths, *optional)
     places += [name for name in defaults if name not in places]
     constants = [defaults[name] for name in places[count:]]
     rows = []
@@ -112,7 +114,12 @@ def read_table(
             if not by_name[name][1]:
                 place = Mark(file, number, by_name[name][0])
                 messages.append(place.message("", f"no {name}; write its name"))
-        values = _lengths_of(mark, by_name, (*lengths, *optional), factors, absent, messages)
+        given = {name: cell for name, cell in by_name.items() if cell[1] or name not in empty}
+        left_out = [name in empty and name in by_name and name not in given for name in names]
+        values = _lengths_of(mark, given, names, factors, absent, messages)
+        values = tuple(
+            math.nan if out else value for out, value in zip(left_out, values, strict=True)
+        )
         rows.append(FileRow(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), values))
     if len(lines) == 1:
         messages.append(

@@ -62,26 +62,30 @@ def custom_model(
 
     :raises CustomModelError: no such object, or what it returns is no error model.
     """
-    build = _named(name, folder)
+    build = named_object(name, folder)
     key = "options" if options else "object"
-    model = _attempt(
+    model = attempt(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
     )
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
     return model
 
 
-def _named(name: str, folder: Path | None) -> Callable[..., Any]:
+def named_object(name: str, folder: Path | None, group: str = GROUP) -> Callable[..., Any]:
+    """The object `name`, module:function or an entry point's name of a `group`.
+
+    :raises CustomModelError: there is none, or it cannot be called.
+    """
     module_name, colon, path = name.partition(":")
     if not colon:
         from importlib.metadata import entry_points
 
-        found = entry_points(group=GROUP)
+        found = entry_points(group=group)
         if name not in found.names:
             known = sorted(found.names)
-            text = f'no entry point "{name}" of the group {GROUP} is installed; {hint(name, known)}'
+            text = f'no entry point "{name}" of the group {group} is installed; {hint(name, known)}'
             raise CustomModelError(f"{text}; for an object of a module write module:name")
-        built = _attempt(f'the entry point "{name}" cannot be loaded', found[name].load)
+        built = attempt(f'the entry point "{name}" cannot be loaded', found[name].load)
     else:
         built = _imported(module_name, folder)
         for part in path.split("."):
@@ -105,7 +109,7 @@ def _imported(name: str, folder: Path | None) -> Any:
         # A file may be newer than what was listed of the folder.
         importlib.invalidate_caches()
     try:
-        module = _attempt(f"{name} cannot be imported", lambda: importlib.import_module(name))
+        module = attempt(f"{name} cannot be imported", lambda: importlib.import_module(name))
     except CustomModelError as error:
         absent = error.__cause__.name if isinstance(error.__cause__, ModuleNotFoundError) else None
         if absent is not None and absent.partition(".")[0] in FORMER_PACKAGES:
@@ -135,7 +139,11 @@ def module_file(folder: Path, name: str) -> Path | None:
     return None
 
 
-def _attempt(what: str, call: Callable[[], Result], key: str = "object") -> Result:
+def attempt(what: str, call: Callable[[], Result], key: str = "object") -> Result:
+    """The result of a call of a user's code.
+
+    :raises CustomModelError: it fails; says where.
+    """
     try:
         with np.errstate(all="ignore"):
             return call()
@@ -165,12 +173,12 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
             f"what {name} returns, {type(model).__name__}, has no {listing(missing)}; add them"
         )
     d = len(lower)
-    dimension = _attempt(f"{name}: dimension has failed", lambda: model.dimension)
+    dimension = attempt(f"{name}: dimension has failed", lambda: model.dimension)
     if dimension != d:
         raise CustomModelError(
             f"{name}: dimension is {dimension}, but machine.volume has {d} dimensions"
         )
-    parameters = _attempt(f"{name}: parameters has failed", lambda: tuple(model.parameters))
+    parameters = attempt(f"{name}: parameters has failed", lambda: tuple(model.parameters))
     _check_parameters(name, parameters)
     generator = np.random.default_rng(np.random.SeedSequence(1))
     x = lower + (upper - lower) * generator.random((7, d))
@@ -179,7 +187,7 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
     n = len(parameters)
 
     def values(what: str, call: Callable[[], Any], shape: tuple[int, ...]) -> Array:
-        found = np.asarray(_attempt(f"{name}: {what} has failed", call))
+        found = np.asarray(attempt(f"{name}: {what} has failed", call))
         if found.shape != shape:
             raise CustomModelError(
                 f"{name}: {what} returns the shape {found.shape}; {shape} is needed"
@@ -196,7 +204,7 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
     a = USUAL_ERROR / effect * generator.standard_normal(n)
     jacobian = values("jacobian(x, a, p)", lambda: model.jacobian(x, a, p), (7, d, n))
     one, other = (
-        _attempt(f"{name}: jacobian has failed", lambda: model.jacobian(x, a, p)) for _ in range(2)
+        attempt(f"{name}: jacobian has failed", lambda: model.jacobian(x, a, p)) for _ in range(2)
     )
     if (
         not isinstance(one, np.ndarray)
@@ -221,7 +229,7 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
                 f"instead of {quotient[worst]:.6g} in {'xyz'[int(worst[1])]}, at x ="
                 f" {x[worst[0]].round(4).tolist()}"
             )
-    reported = _attempt(f"{name}: reported has failed", model.reported)
+    reported = attempt(f"{name}: reported has failed", model.reported)
     shape = np.asarray(getattr(reported, "matrix", 0.0)).shape
     if (
         shape != (len(getattr(reported, "names", ())), n)

@@ -49,12 +49,13 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
         for k, item in enumerate(experiment.calibration)
         for one in item.certified_values(experiment.layouts[item.artefact])
     ]
-    for name, axis in _certified_offsets(experiment):
-        value, u = (
-            float(experiment.probes[name][axis]),
-            float(experiment.offset_uncertainties[name][axis]),
-        )
-        found.append(CertifiedValue(format_path(("probes", name)), "offset", AXES[axis], value, u))
+    for probe, axis, value, u in experiment.certified_offsets:
+        item = format_path(("probes", probe.name))
+        found.append(CertifiedValue(item, "offset", AXES[axis], value, u))
+    for k, star in enumerate(experiment.stars):
+        item, u = format_path(("stars", k)), star.standard_uncertainty
+        for (tip, letter), value in zip(star.names, star.coordinates.ravel().tolist(), strict=True):
+            found.append(CertifiedValue(item, tip, letter, value, u))
     for prior in experiment.priors:
         item = prior.path.rpartition(".")[0]
         found.append(
@@ -63,13 +64,6 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
             )
         )
     return found
-
-
-def _certified_offsets(experiment: Experiment) -> Iterator[tuple[str, int]]:
-    """Probes and axes whose offsets are estimated and have a standard uncertainty."""
-    for name, uncertainty in experiment.offset_uncertainties.items():
-        for axis in np.flatnonzero(np.isfinite(uncertainty)).tolist():
-            yield name, axis
 
 
 def with_values(experiment: Experiment, values: Array) -> Experiment:
@@ -89,11 +83,13 @@ def with_values(experiment: Experiment, values: Array) -> Experiment:
         item.with_values(taken(len(list(item.certified_values(experiment.layouts[item.artefact])))))
         for item in experiment.calibration
     )
-    probes = {name: np.array(offset) for name, offset in experiment.probes.items()}
-    for name, axis in _certified_offsets(experiment):
-        probes[name][axis] = taken(1)[0]
+    probes = dict(experiment.probes)
+    for probe, axis, _, _ in experiment.certified_offsets:
+        offset = np.where(np.arange(len(probe.offset)) == axis, taken(1), probes[probe.name].offset)
+        probes[probe.name] = replace(probe, offset=offset)
+    stars = tuple(star.with_values(taken(star.coordinates.size)) for star in experiment.stars)
     priors = tuple(replace(prior, value=float(taken(1)[0])) for prior in experiment.priors)
-    return replace(experiment, calibration=calibration, probes=probes, priors=priors)
+    return replace(experiment, calibration=calibration, probes=probes, stars=stars, priors=priors)
 
 
 def drawn_values(
@@ -120,11 +116,21 @@ def drawn_values(
     # Those of offsets come last in the design, and first here.
     priors = design.of(Priors).true_values(design, truth, model)
     priors = priors[design.of(Priors).of_influence < 0]
-    true += [*priors[len(experiment.priors) :], *priors[: len(experiment.priors)]]
+    true += priors[len(experiment.priors) :].tolist()
+    for star in experiment.stars:
+        own = [design.probes.names.index(name) for name in star.probes]
+        true += star.true_values(truth.probes[own]).tolist()
+    true += priors[: len(experiment.priors)].tolist()
     if generator is None:
         return np.array(true, float)
     uncertainty = np.array([one.standard_uncertainty for one in certified_values(experiment)])
-    return np.asarray(np.array(true, float) + uncertainty * generator.standard_normal(len(true)))
+    normal = generator.standard_normal(len(true))
+    errors, at = uncertainty * normal, 0
+    for item in experiment.calibration:
+        part = slice(at, at + len(item.true_values(truth.balls, first_ball[item.artefact])))
+        errors[part] = item.drawn_errors(normal[part], uncertainty[part])
+        at = part.stop
+    return np.asarray(np.array(true, float) + errors)
 
 
 def certificate_rows(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:

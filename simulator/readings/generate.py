@@ -17,6 +17,7 @@ from ..design.arrays import (
 )
 from ..design.observations.joint_lengths import FLAT
 from ..design.observations.lengths import Lengths
+from ..design.observations.whitening import at_least_exact
 from ..machines.protocol import Array, ErrorModel, Integers
 from ..machines.truth import TrueMachine
 
@@ -157,7 +158,8 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     if shared.any():
         of_shared = given.select(first[shared])
         wanted = of_shared.value + of_shared.uncertainty * generator.standard_normal(len(of_shared))
-        balls += _moved_by_lengths(balls, pairs[:, shared], wanted, of_shared.uncertainty)
+        uncertainty = at_least_exact(of_shared.uncertainty)
+        balls += _moved_by_lengths(balls, pairs[:, shared], wanted, uncertainty)
         pairs, first = pairs[:, ~shared], first[~shared]
     for (one, other), k in zip(pairs.T.tolist(), first.tolist(), strict=True):
         between = balls[other] - balls[one]

@@ -13,8 +13,9 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Readings, measured, nominal_state
 from ..design.observations.lengths import Lengths
+from ..design.observations.readings import expected_readings
 from ..estimation.spheres import fit_sphere
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from ..inputs.settings import hint, listing
@@ -65,24 +66,25 @@ class ObservedReadings:
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
     """Readings in millimetres as the columns of their file: position, ball, probe, x_mm, y_mm and
-    z_mm.
+    z_mm, NaN where a co-ordinate is not read.
     """
     names = {
         "position": [design.positions.names[k] for k in readings.position],
         "ball": [design.balls.names[k] for k in readings.ball],
         "probe": [design.probes.names[k] for k in readings.probe],
     }
+    x = np.where(measured(design, readings), x, np.nan)
     lengths = zip(AXES[: design.dimension], (1e3 * x).T.tolist(), strict=True)
     return names | {f"{axis}_mm": column for axis, column in lengths}
 
 
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
-    """Write the columns of readings with all digits."""
+    """Write the columns of readings with all digits, empty where a co-ordinate is not read."""
     writer = CsvWriter(stream)
     columns = reading_columns(design, readings, x)
     writer.writerow(list(columns))
     for row in zip(*columns.values(), strict=True):
-        writer.writerow([*row[:3], *map(repr, row[3:])])
+        writer.writerow([*row[:3], *("" if v != v else repr(v) for v in row[3:])])
 
 
 def read_readings(
@@ -105,8 +107,9 @@ def read_readings(
     defaults = {"probe": design.probes.names[0]} if len(design.probes.names) == 1 else {}
     messages: list[Message] = []
     units = {name: one for kind in design.influences for name, one in kind.columns.items()}
+    empty = AXES[:d] if design.positions.across is not None else ()
     rows = read_table(
-        path, texts, AXES[:d], ["u", *units], messages, defaults, absent=np.nan, units=units
+        path, texts, AXES[:d], ["u", *units], messages, defaults, np.nan, units, empty
     )
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
@@ -122,8 +125,9 @@ def read_readings(
     if design.influences:
         order = {"order": np.arange(len(rows), dtype=float)}
         beside = order | dict(zip(units, lengths[:, d + 1 :].T, strict=True))
-    _refuse_far_outside(rows, x, design)
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
+    x = _where_not_read(rows, x, design, readings)
+    _refuse_far_outside(rows, x, design)
     uncertainty = (
         np.repeat(stated[:, None], d, axis=1)
         if has_uncertainty
@@ -215,6 +219,30 @@ def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> 
         messages.append(rows[i].mark.message("", text))
     if messages:
         raise ExperimentError(messages)
+
+
+def _where_not_read(
+    rows: tuple[FileRow, ...], x: Array, design: Design, readings: Readings
+) -> Array:
+    """Scale readings (n, d) with those of the drawing in place of co-ordinates that are not read.
+
+    :raises ExperimentError: a co-ordinate is missing, or stands where it is not read.
+    """
+    is_read = measured(design, readings)
+    messages: list[Message] = []
+    for i, axis in np.argwhere(np.isnan(x) == is_read)[:MOST_MESSAGES].tolist():
+        position = design.positions.names[readings.position[i]]
+        text = f"no {AXES[axis]}; write a number, or remove the line"
+        if not is_read[i, axis]:
+            text = (
+                f'{AXES[axis]} is across the plane of "{position}", which is read in its plane;'
+                " leave the cell empty"
+            )
+        messages.append(rows[i].mark.message("", text))
+    if messages:
+        raise ExperimentError(messages)
+    drawn = expected_readings(design, nominal_state(design), readings)
+    return np.where(is_read, x, drawn)
 
 
 def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Design) -> None:

@@ -18,7 +18,7 @@ from ballplate.planning import criteria, information
 from ballplate.planning.requirements import root_search as search
 from ballplate.results.variance_components import components
 from ballplate.simulator.design import lookup
-from ballplate.simulator.design.observations import distances
+from ballplate.simulator.design.observations import distances, joint_values
 from ballplate.simulator.experiment import (
     checks,
     machine_sections,
@@ -52,6 +52,7 @@ LIMITS = {
     "balls of an artefact": (artefacts.MOST_BALLS, references.MOST_BALLS_OF_ALL),
     "parameters besides": (checks.MOST_SHARED,),
     "balls that calibrated": (distances.MOST_TIED_BALLS,),
+    "correlated values": (joint_values.MOST_JOINT_VALUES,),
     "lengths of standards": (checks.MOST_LENGTHS,),
     "lengths of one standard": (checks.MOST_JOINT_LENGTHS,),
     "directions of a gauge": (directions.MOST_DIRECTIONS,),

@@ -99,4 +99,4 @@ def test_names_that_a_person_chose_stay(tmp_path: Path) -> None:
     assert first.positions[0].name == OLD and first.positions[0].readings[0].repeats == 2
     assert first.evaluation.tasks[0].name == OLD
     assert first.evaluation.tasks[0].target.stated.constant == pytest.approx(3e-7)
-    assert second.probes[OLD][2] == pytest.approx(-0.06)
+    assert second.probes[OLD].offset[2] == pytest.approx(-0.06)

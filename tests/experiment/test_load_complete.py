@@ -25,6 +25,10 @@ true_machine: {kind: zero}
 probes:
   down: [0 mm, 0 mm, -50 mm]
   side: [50 mm, 0 mm, -50 mm]
+  turned: {A: 90 deg, B: 180 deg}
+head: {tip: [0 mm, 0 mm, -60 mm]}
+stars:
+  - {probes: [side, turned], standard_uncertainty: 0.5 um, place: unknown}
 artefacts:
   plate: {kind: grid, balls: [7, 7], size: [750 mm, 750 mm]}
   frame: {kind: square, balls: 3, size: 500 mm, role: plate}
@@ -136,9 +140,9 @@ def test_the_file_uses_every_key(complete: Experiment) -> None:
         if isinstance(node, Mapping)
         for key in node.items
     }
-    # Pools and influence quantities, which go with no length standard, have tests of their own.
-    own = {"variants", "pool", "influences"}
-    assert set(ExperimentSettings.model_fields) - used == own
+    # Pools and influence quantities, which a length standard does not go with, have tests of their
+    # own.
+    assert set(ExperimentSettings.model_fields) - used == {"variants", "pool", "influences"}
     for key in (
         "corner",
         "centre",
@@ -171,9 +175,9 @@ def test_machine(complete: Experiment) -> None:
     np.testing.assert_array_equal(complete.machine.volume.lower, [0.0, -1.0, 0.0])
     np.testing.assert_array_equal(complete.machine.volume.upper, [1.0, 1.0, 1.0])
     np.testing.assert_array_equal(complete.machine.repeatability, [2e-7, 2e-7, 3e-7])
-    assert list(complete.probes) == ["down", "side"]
-    np.testing.assert_array_equal(complete.probes["side"], [0.05, 0.0, -0.05])
-    assert not complete.probes["side"].flags.writeable
+    assert list(complete.probes) == ["down", "side", "turned"]
+    np.testing.assert_array_equal(complete.probes["side"].offset, [0.05, 0.0, -0.05])
+    assert not complete.probes["side"].offset.flags.writeable
 
 
 def test_artefacts(complete: Experiment) -> None:
@@ -251,7 +255,7 @@ def test_evaluation_points_of_a_file(tmp_path: Path) -> None:
 def test_plane_experiment_with_defaults(plane: Experiment) -> None:
     assert plane.dimension == 2
     np.testing.assert_array_equal(plane.machine.repeatability, [2e-7, 3e-7])
-    np.testing.assert_array_equal(plane.probes["probe"], [0.0, 0.0])
+    np.testing.assert_array_equal(plane.probes["probe"].offset, [0.0, 0.0])
     assert plane.evaluation.points.shape == (0, 2) and plane.evaluation.probe == "probe"
     assert (plane.description, plane.sigma, plane.seed) == ("", "estimated", 1)
     assert plane.target_uncertainty is None and plane.expected_rank_deficiency is None

@@ -267,9 +267,9 @@ CALIBRATION = [
         '"corners"? choose from: corner sides, corner diagonals, corners, neighbours, braced, all, '
         "or list pairs of balls",
     ]),
-    (SIDES, "pairs: corners, standard_uncertainty: 0 um", [
-        '14:78: calibration[0].standard_uncertainty: "0 um" must be above zero; give a small one, '
-        'such as 1 nm',
+    (SIDES, "pairs: corners, standard_uncertainty: -1 um", [
+        '14:78: calibration[0].standard_uncertainty: "-1 um" must be above zero; write for example '
+        '"0.2 um"',
     ]),
     (SIDES, SIDES.replace("corner sides", "[[r1c1, r1c9], [r1c1, r1c1], [r1c1, r1c2], [r1c2, r1c1]]"), [
         '14:55: calibration[0].pairs[0][1]: unknown ball "r1c9"; did you mean "r1c3"?',
@@ -299,7 +299,8 @@ CALIBRATION = [
         "{x: 0.2 um}"]),
     ("kind: distances, artefact: plate, pairs: corner sides",
      "kind: coordinates, artefact: plate, balls: [r1c1, r9c9], dimensions: 3", [
-        "14:63: calibration[0].dimensions: unknown key; known: values"]),
+        "14:63: calibration[0].dimensions: unknown key; known: covariance, result, coverage_factor, "
+        "axes, values"]),
 ]  # fmt: skip
 PLANE_CASES = [
     ("{kind: metric}", "{kind: empirical}", [

@@ -69,10 +69,14 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
         for factor in (0.5, 0.1):
             better, layout = item.times_as_uncertain(factor), experiment.layouts[item.artefact]
             least = min(one.standard_uncertainty for one in better.certified_values(layout))
+            if not least:
+                # What is exact cannot be calibrated better.
+                break
             what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
             words = format_length(least)
             if isinstance(better, DistanceCalibration):
                 what = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
+                assert better.standard_uncertainty is not None
                 words = length_words(better.standard_uncertainty)
             told = (
                 f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard"
@@ -86,6 +90,7 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
 
 def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
     """The change of calibrating distances."""
+    assert item.standard_uncertainty is not None
     u = length_words(item.standard_uncertainty)
     told = f"calibrate the {words.replace('{}', artefact)} to {u}"
     touched = frozenset(
@@ -106,7 +111,9 @@ def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration
     own = [
         c
         for c in experiment.calibration
-        if isinstance(c, DistanceCalibration) and c.artefact == artefact
+        if isinstance(c, DistanceCalibration)
+        and c.artefact == artefact
+        and c.standard_uncertainty not in (None, LengthFunction(0.0))
     ]
     uncertainty = (
         own[0].standard_uncertainty

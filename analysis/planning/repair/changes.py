@@ -14,7 +14,7 @@ from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
+from ballplate.simulator.experiment.model import Experiment, Position, Probe, ReadingGroup
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, pairs
 from ballplate.simulator.geometry.positions import Pose, ball_coordinates
 from ballplate.simulator.machines.protocol import Array
@@ -86,16 +86,14 @@ def go_together(changes: Sequence[Change]) -> bool:
 
 
 def is_inside(
-    position: Position, layout: BallLayout, volume: Volume, offsets: Mapping[str, Array]
+    position: Position, layout: BallLayout, volume: Volume, probes: Mapping[str, Probe]
 ) -> bool:
-    """Whether all scale readings of a position are in the volume, as in a file, with the `offsets`
-    (d,) of probes.
-    """
+    """Whether all scale readings of a position are in the volume, as in a file."""
     places = ball_coordinates(position.pose, layout)
     lower, upper = volume.of_readings
     for group in position.readings:
         for name in group.probes:
-            read = places[group.ball_indices] - offsets[name]
+            read = places[group.ball_indices] - probes[name].offset
             if (read < lower).any() or (read > upper).any():
                 return False
     return True
@@ -135,7 +133,7 @@ def further(position: Position, probe: str) -> Position:
 
 
 def with_further(
-    experiment: Experiment, name: str, more: Position, probes: Mapping[str, Array]
+    experiment: Experiment, name: str, more: Position, probes: Mapping[str, Probe]
 ) -> Experiment:
     """The experiment with the readings of `more` in the position `name` besides, with probes that
     may be new.
@@ -230,7 +228,12 @@ def with_artefact(
 def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibration | None:
     if isinstance(item, DistanceCalibration):
         chosen = pair_set(old, item.pairs)
-        if chosen is None or chosen not in (*new.pair_sets, "all") or item.certified:
+        if (
+            chosen is None
+            or chosen not in (*new.pair_sets, "all")
+            or item.certified
+            or item.standard_uncertainty is None
+        ):
             return None
         return distances(item, new, pairs(new, chosen))
     if isinstance(item, CoordinateCalibration):
@@ -245,7 +248,10 @@ def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibr
 def distances(
     like: DistanceCalibration, layout: BallLayout, chosen: Indices
 ) -> DistanceCalibration:
-    """Calibrated distances between pairs (m, 2) of balls, otherwise like others."""
+    """Calibrated distances between pairs (m, 2) of balls, otherwise like others that state one
+    standard uncertainty.
+    """
+    assert like.standard_uncertainty is not None
     ends = layout.coordinates[chosen][:, :, : like.dimensions]
     values = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     return replace(
@@ -254,4 +260,5 @@ def distances(
         values=values,
         certified=False,
         standard_uncertainties=like.standard_uncertainty.at(values),
+        root=None,
     )

@@ -75,13 +75,15 @@ class CheckedFile:
     """What came of a file: its designs, each variant one of its own, or the reasons why it cannot
     be used.
 
-    `doubts` are about what is possible, and unlikely to be meant.
+    `doubts` are about what is possible, and unlikely to be meant, `notes` about what was found by
+    itself.
     """
 
     file: str
     designs: tuple[CheckedDesign, ...]
     messages: tuple[Message, ...]
     doubts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def as_expected(self) -> bool:
@@ -111,13 +113,14 @@ def check_files(
             # What a plan may choose from is loaded where it is asked for only.
             pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
             doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
+            notes = tuple(dict.fromkeys(note for one in chosen for note in one.notes))
             is_single = len(chosen) == 1
             designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
             of_search = within if is_single else unreported
             judged = tuple(
                 checked_design(one, pools.get(one.name), wanted, of_search) for one in designs
             )
-            yield CheckedFile(str(path), judged, (), doubts)
+            yield CheckedFile(str(path), judged, (), doubts, notes)
         except ExperimentError as error:
             complete = False
             yield CheckedFile(str(path), (), error.messages)

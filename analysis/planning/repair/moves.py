@@ -10,6 +10,7 @@ import numpy as np
 from ballplate.simulator.experiment.model import (
     Experiment,
     Position,
+    Probe,
 )
 from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
 from ballplate.simulator.geometry.positions import AXIS_INDEX, QUARTER_TURNS
@@ -108,7 +109,7 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
     ones.
     """
     tips = new_tips(experiment)
-    for name, offset in {**experiment.probes, **tips}.items():
+    for name, probe in {**experiment.probes, **tips}.items():
         for place in experiment.positions:
             if (
                 name in place.probes
@@ -117,17 +118,15 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
             ):
                 continue
             more, layout = further(place, name), experiment.layouts[place.artefact]
-            if not is_inside(more, layout, experiment.machine.volume, {name: offset}):
+            if not is_inside(more, layout, experiment.machine.volume, {name: probe}):
                 continue
             cost = float(more.count)
             words = f'read position "{place.name}" with probe {name} too'
             if name in tips:
                 # A stylus has to be made.
                 cost *= NEW_TIP
-                words = (
-                    f'read position "{place.name}" with a new probe too, {_tip_words(name, offset)}'
-                )
-            new = {name: offset} if name in tips else {}
+                words = f'read position "{place.name}" with a new probe too, {_tip_words(probe)}'
+            new = {name: probe} if name in tips else {}
             apply = partial(with_further, name=place.name, more=more, probes=new)
             touched = frozenset({f"position {place.name} with {name}"})
             yield Change(ChangeKind.READ_MORE, words, cost, touched, apply, more, place.name)
@@ -144,16 +143,17 @@ def repeats(experiment: Experiment) -> Iterator[Change]:
             yield Change(ChangeKind.READ_MORE, words, cost, touched, apply)
 
 
-def new_tips(experiment: Experiment) -> dict[str, Array]:
-    """Offsets opposite and perpendicular to those there are, where all of them lie on one line."""
-    if experiment.dimension == 2 or experiment.offset_uncertainties:
+def new_tips(experiment: Experiment) -> dict[str, Probe]:
+    """Probes opposite and perpendicular to those there are, where all of them lie on one line."""
+    probes = experiment.probes.values()
+    if experiment.dimension == 2 or any(probe.is_estimated for probe in probes):
         return {}
-    offsets = np.array(list(experiment.probes.values()))
+    offsets = np.array([probe.offset for probe in probes])
     values = np.linalg.svd(offsets - offsets.mean(axis=0), compute_uv=False)
     if len(values) > 1 and values[1] > 1e-6:
         return {}
     size = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) or TIP
-    tips: dict[str, Array] = {}
+    tips: dict[str, Probe] = {}
     for sign, axis in product((1.0, -1.0), range(3)):
         offset = np.zeros(3)
         offset[axis] = sign * size
@@ -161,11 +161,10 @@ def new_tips(experiment: Experiment) -> dict[str, Array]:
             name = f"{'minus ' if sign < 0 else ''}{AXES[axis]}"
             while name in experiment.probes:
                 name += " new"
-            tips[name] = offset
+            tips[name] = Probe(name, offset)
     return tips
 
 
-def _tip_words(name: str, offset: Array) -> str:
-    return (
-        f"{name}, its offset ({', '.join(format_length(v).removesuffix(' mm') for v in offset)}) mm"
-    )
+def _tip_words(probe: Probe) -> str:
+    lengths = (format_length(v).removesuffix(" mm") for v in probe.offset)
+    return f"{probe.name}, its offset ({', '.join(lengths)}) mm"

@@ -141,7 +141,7 @@ def _probes_across(experiment: Experiment, artefact: str, plane: Axis | None) ->
     normal = AXIS_INDEX[plane or "z"]
     across = [
         name
-        for name, p in experiment.probes.items()
-        if abs(p[normal]) > 0.7 * float(np.linalg.norm(p))
+        for name, probe in experiment.probes.items()
+        if abs(probe.offset[normal]) > 0.7 * float(np.linalg.norm(probe.offset))
     ]
     return tuple(across) or (next(iter(experiment.probes)),)

@@ -11,6 +11,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.observations.whitening import at_least_exact
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import placed_only
@@ -60,7 +61,10 @@ def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
     ]
     along = design.balls.places[own[:, 0]] - design.balls.places[own[:, 1]]
     along[:, item.dimensions :] = 0.0
-    along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]
+    along /= (
+        np.linalg.norm(along, axis=1)[:, None]
+        * at_least_exact(item.standard_uncertainties)[:, None]
+    )
     moved = base.at.ball_null[own]
     return _triangle(np.einsum("md,mdk->mk", along, moved[:, 0] - moved[:, 1]))
 

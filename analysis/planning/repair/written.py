@@ -58,9 +58,9 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
     for name, artefact in after.artefacts.items():
         found += _fields(("artefacts", name), before.artefacts[name], artefact)
     found += _fields(("error_model",), before.error_model, after.error_model)
-    for name, offset in after.probes.items():
+    for name, probe in after.probes.items():
         if name not in before.probes:
-            found.append(Edit(("probes", name), [written_length(v) for v in offset]))
+            found.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
     known = {place.name: position_settings(before, place) for place in before.positions}
     for place in after.positions:
         settings = position_settings(after, place)
@@ -178,7 +178,12 @@ def _group(experiment: Experiment, position: Position, group: ReadingGroup) -> d
 
 def can_be_written(item: Calibration) -> bool:
     """Whether `calibration_settings` tell all of an item but its certified values."""
-    return isinstance(item, DistanceCalibration | CoordinateCalibration | RadiusCalibration)
+    if isinstance(item, DistanceCalibration):
+        return item.standard_uncertainty is not None
+    if isinstance(item, CoordinateCalibration):
+        # A file states those of each ball.
+        return item.standard_uncertainties.ndim == 1
+    return isinstance(item, RadiusCalibration)
 
 
 def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str, Any]:
@@ -192,6 +197,7 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
         said["pairs"] = pair_set(layout, item.pairs) or named
         if item.dimensions == 2 and experiment.dimension == 3:
             said["dimensions"] = 2
+        assert item.standard_uncertainty is not None
         said["standard_uncertainty"] = length_function(item.standard_uncertainty)
     elif isinstance(item, CoordinateCalibration):
         balls = ball_set(layout, item.balls)

@@ -96,7 +96,7 @@ def reweighted(design: Design, groups: Sequence[Group], ratios: Array) -> Design
             own = np.full(len(one), own[0] if len(own) else 1.0)
             others = np.setdiff1d(np.arange(len(design.readings)), chosen)
             uncertainty[others] *= own[0] if len(own) else 1.0
-        changed.append(one.given(uncertainty=one.uncertainty * own))
+        changed.append(one.enlarged(own))
     return replace(design, readings=replace(design.readings, uncertainty=uncertainty)).observed(
         *changed
     )

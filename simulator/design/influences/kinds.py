@@ -13,6 +13,7 @@ from pydantic import Field
 from .position_scale import PositionScaleSettings
 from .probing import ProbingSettings
 from .protocol import InfluenceSettings
+from .reindexing import ReindexingSettings
 from .reproducibility import ReproducibilitySettings
 from .temperature import TemperaturesSettings
 
@@ -22,6 +23,7 @@ INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     ProbingSettings,
     PositionScaleSettings,
     ReproducibilitySettings,
+    ReindexingSettings,
 )
 """Settings class of every kind of influence quantity."""
 

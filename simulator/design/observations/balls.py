@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...machines.protocol import Array, ErrorModel
 from ..arrays import Design, Observations, Replicates, Rows, State
+from .whitening import EXACT
 
 
 class BallObservations(Observations):
@@ -22,6 +24,17 @@ class BallObservations(Observations):
         """Values (..., m) where the balls of a design are at `balls` (..., n, d), and their
         derivatives (..., m, k, d) by the balls of each.
         """
+
+    @property
+    def is_exact(self) -> NDArray[np.bool_]:
+        return self.uncertainty <= EXACT
+
+    def errors(self, generator: np.random.Generator, count: int) -> Array:
+        uncertainty = np.where(self.is_exact, 0.0, self.uncertainty)
+        return uncertainty * generator.standard_normal((count, len(self)))
+
+    def loosened(self, least: float) -> Self:
+        return self.given(uncertainty=np.maximum(self.uncertainty, least))
 
     @classmethod
     def joined(cls, parts: Sequence[BallObservations]) -> Self:

@@ -7,13 +7,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, cast
 
+import numpy as np
+
 from ...geometry.ball_layouts import BallLayout
 from ...machines.protocol import Array, Unit
 from .balls import BallObservations
+from .whitening import CovarianceRoot, at_least_exact
 
 # A certified distance that differs from the drawing by more than this fraction is a slip of the
 # pen.
 FAR_FROM_DRAWING = 0.1
+
+# Balls tied to one another by distances are estimated together, with memory that grows as the
+# square of their number.
+MOST_TIED_BALLS = 3000
 
 
 @dataclass(frozen=True)
@@ -45,12 +52,14 @@ class Calibration(ABC):
     """An item of calibration of one `kind`; a frozen dataclass with the `values` (m, ...) that it
     states, nominal unless `certified`.
 
-    `are_lengths`: values are distances between two balls, named in either order.
+    `are_lengths`: values are distances between two balls, named in either order. `root` is that of
+    the covariance of its values, None where they are uncorrelated.
     """
 
     artefact: str
     kind: str
     are_lengths: ClassVar[bool] = False
+    root: CovarianceRoot | None = None
 
     @property
     def _values(self) -> Array:
@@ -78,8 +87,10 @@ class Calibration(ABC):
         """What it states, beside what the drawing has for lengths."""
         given = self.observed(0)
         drawn = given.values(layout.coordinates)[0].tolist()
+        # What counts as something in an adjustment is exact in a certificate.
+        uncertainty = np.where(given.is_exact, 0.0, given.uncertainty).tolist()
         for (first, second), value, u, length in zip(
-            self.names(layout), given.value.tolist(), given.uncertainty.tolist(), drawn, strict=True
+            self.names(layout), given.value.tolist(), uncertainty, drawn, strict=True
         ):
             of_drawing = length if self.are_lengths else None
             yield CertifiedValue(
@@ -101,9 +112,15 @@ class Calibration(ABC):
         changed = {
             name: factor * value
             for name, value in vars(self).items()
-            if name.startswith("standard_uncertaint")
+            if name.startswith("standard_uncertaint") and value is not None
         }
+        if self.root is not None:
+            changed["root"] = replace(self.root, own=at_least_exact(factor * self.root.own))
         return cast(Self, replace(cast(Any, self), **changed))
+
+    def drawn_errors(self, normal: Array, uncertainty: Array) -> Array:
+        """Errors (m,) of its values from standard normal numbers (m,)."""
+        return uncertainty * normal if self.root is None else self.root.drawn(normal)
 
 
 def far_from_drawing(certified: float, drawn: float) -> str:

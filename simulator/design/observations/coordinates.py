@@ -11,15 +11,18 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
-from ...inputs.messages import ExperimentError, Steps
-from ...inputs.quantities import PositiveLength
+from ...inputs.messages import Steps
+from ...inputs.quantities import LengthUncertainty
 from ...inputs.settings import Forms, Settings, Text, hint, listing
-from ...inputs.tables import read_table
 from ...machines.protocol import Array, Integers
 from ..arrays import Design
 from ..lookup import References
 from .balls import BallObservations
-from .calibration import FAR_FROM_DRAWING, Calibration
+from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration
+from .certificate_tables import read_rows
+from .digital_values import read_digital
+from .stated_values import CertificateSettings, check_keys, is_digital, uncertainties_of
+from .whitening import CovarianceRoot, at_least_exact
 
 # What balls may be off a plane that they are drawn in, in metres.
 HARDLY_FLAT = 1e-3
@@ -51,8 +54,8 @@ class CalibratedCoordinates(BallObservations):
     def name(self, design: Design, k: int) -> str:
         return f"{AXIS_NAMES[self.axis[k]]} of ball {design.ball_label(int(self.ball[k]))}"
 
-    def fixing(self) -> tuple[Integers, Integers]:
-        return self.ball, self.axis
+    def fixing(self) -> tuple[Integers, Integers, Array]:
+        return self.ball, self.axis, self.value
 
 
 def no_coordinates() -> CalibratedCoordinates:
@@ -61,12 +64,23 @@ def no_coordinates() -> CalibratedCoordinates:
     return CalibratedCoordinates(none, none, empty, empty)
 
 
+def flat(layout: BallLayout, first: int, uncertainty: float) -> CalibratedCoordinates:
+    """Co-ordinates out of the plane as drawn, of an artefact whose balls begin at `first` and of
+    which nothing else tells them.
+    """
+    count = len(layout.names)
+    drawn = layout.coordinates[:, 2]
+    balls = first + np.arange(count, dtype=np.int64)
+    return CalibratedCoordinates(balls, np.full(count, 2), drawn, np.full(count, uncertainty))
+
+
 @dataclass(frozen=True, eq=False)
 class CoordinateCalibration(Calibration):
     """Calibrated ball co-ordinates in the artefact's frame.
 
     ``balls``: (k,) indices. ``axes``: the a calibrated axes, 0 to 2. ``values``: (k, a) metres,
-    nominal unless ``certified``. ``standard_uncertainties``: (a,) metres.
+    nominal unless ``certified``. ``standard_uncertainties``: (a,) metres, or (k, a) where a file
+    states them.
     """
 
     artefact: str
@@ -76,14 +90,16 @@ class CoordinateCalibration(Calibration):
     certified: bool
     standard_uncertainties: Array
     kind: Literal["coordinates"] = "coordinates"
+    root: CovarianceRoot | None = None
 
     def observed(self, first: int) -> CalibratedCoordinates:
         count = len(self.axes)
+        shape = (len(self.balls), count)
         return CalibratedCoordinates(
             np.repeat(first + self.balls, count),
             np.tile(np.array(self.axes, np.int64), len(self.balls)),
             self.values.ravel(),
-            np.tile(self.standard_uncertainties, len(self.balls)),
+            at_least_exact(np.broadcast_to(self.standard_uncertainties, shape)).ravel(),
         )
 
     def names(self, layout: BallLayout) -> list[tuple[str, str]]:
@@ -97,14 +113,14 @@ CalibratedBalls = Forms[Literal["all", "corners"], BallNames, BallNames]
 
 
 class SomeAxisLengthsSettings(Settings):
-    """A length above zero for some axes."""
+    """A standard uncertainty for some axes."""
 
-    x: PositiveLength | None = Field(None, description="along x; omitted: x is not calibrated")
-    y: PositiveLength | None = Field(None, description="along y; omitted: y is not calibrated")
-    z: PositiveLength | None = Field(None, description="along z; omitted: z is not calibrated")
+    x: LengthUncertainty | None = Field(None, description="along x; omitted: x is not calibrated")
+    y: LengthUncertainty | None = Field(None, description="along y; omitted: y is not calibrated")
+    z: LengthUncertainty | None = Field(None, description="along z; omitted: z is not calibrated")
 
 
-class CoordinatesSettings(Settings):
+class CoordinatesSettings(CertificateSettings):
     """Calibrated co-ordinates of balls in their artefact's frame."""
 
     kind: Literal["coordinates"] = Field(description="calibrated co-ordinates of balls")
@@ -112,12 +128,29 @@ class CoordinatesSettings(Settings):
         None, description="name of the artefact; optional if there is exactly one"
     )
     balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
-    standard_uncertainty: Forms[PositiveLength, PositiveLength, SomeAxisLengthsSettings] = Field(
-        description="of every co-ordinate, or per axis of the artefact: {x: …, y: …}"
+    standard_uncertainty: (
+        Forms[LengthUncertainty, LengthUncertainty, SomeAxisLengthsSettings] | None
+    ) = Field(
+        None,
+        description=(
+            "of every co-ordinate, or per axis of the artefact: {x: …, y: …}; 0 um where they are"
+            " exact; left out where values or covariance state it"
+        ),
+    )
+    axes: tuple[Literal["x", "y", "z"], ...] | None = Field(
+        None,
+        min_length=1,
+        description=(
+            "calibrated axes where values or covariance state the uncertainties; default: all"
+        ),
     )
     values: Text | None = Field(
         None,
-        description="CSV file with columns ball, x_mm, y_mm, z_mm; default: nominal co-ordinates",
+        description=(
+            "CSV file with columns ball, x_mm, y_mm, z_mm, and standard_uncertainty_um (of all"
+            " axes, or x_standard_uncertainty_um, …), or expanded_uncertainty_um and k; or a DCC"
+            " (XML); default: nominal co-ordinates"
+        ),
     )
 
 
@@ -125,35 +158,73 @@ def read_coordinates(
     settings: CoordinatesSettings, artefact: str, steps: Steps, references: References
 ) -> CoordinateCalibration | None:
     layout, dimension = references.layouts[artefact], references.dimension
-    uncertainty = settings.standard_uncertainty
-    by_axis: dict[str, float] = (
-        dict.fromkeys(AXIS_NAMES[:dimension], uncertainty)
-        if isinstance(uncertainty, float)
-        else uncertainty.stated
-    )
-    place = (*steps, "standard_uncertainty")
-    is_right = references.require(
-        bool(by_axis), place, "calibrates no axis; give at least one, such as {x: 0.2 um}"
-    )
-    text = "has no meaning in two dimensions; remove it"
-    is_right &= references.require(dimension != 2 or "z" not in by_axis, (*place, "z"), text)
+    axes = _axes(settings, steps, references)
     balls = references.balls(settings.balls, layout, (*steps, "balls"))
-    if balls is None or not is_right or dimension is None:
+    is_right = check_keys(settings, steps, references)
+    if balls is None or axes is None or not is_right or dimension is None:
         return None
-    values = _certified_coordinates(
-        settings, balls, list(by_axis), layout, (*steps, "values"), references
+    found = _certified_coordinates(settings, balls, axes, layout, steps, references)
+    if found is None:
+        return None
+    values, in_file, covariance = found
+    uncertainty = settings.standard_uncertainty
+    of_axes = None
+    if isinstance(uncertainty, float):
+        of_axes = np.full(len(axes), uncertainty)
+    elif uncertainty is not None:
+        of_axes = np.array(list(uncertainty.stated.values()))
+    names = [(layout.names[ball], axis) for ball in balls for axis in axes]
+    of_item = None if of_axes is None else np.tile(of_axes, len(balls))
+    known = uncertainties_of(
+        settings, names, False, of_item, in_file.ravel(), covariance, steps, references
     )
-    if values is None:
+    if known is None:
         return None
-    axes = tuple(AXIS_NAMES.index(axis) for axis in by_axis)
+    of_balls = len(np.unique(balls))
+    text = (
+        f"co-ordinates tie {of_balls} balls together, at most {MOST_TIED_BALLS} are possible; leave"
+        " the covariance out"
+    )
+    if known.root is not None and not references.require(
+        of_balls <= MOST_TIED_BALLS, (*steps, "covariance"), text
+    ):
+        return None
+    is_common = of_axes is not None and known.root is None
     return CoordinateCalibration(
         artefact,
         balls,
-        axes,
+        tuple(AXIS_NAMES.index(axis) for axis in axes),
         frozen(values),
         settings.values is not None,
-        frozen(list(by_axis.values())),
+        frozen(of_axes if is_common else known.standard.reshape(values.shape)),
+        root=known.root,
     )
+
+
+def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[str] | None:
+    """The calibrated axes, None after saying what is wrong with them."""
+    dimension, uncertainty = references.dimension, settings.standard_uncertainty
+    place = (*steps, "standard_uncertainty")
+    if uncertainty is None or isinstance(uncertainty, float):
+        axes = list(settings.axes or AXIS_NAMES[:dimension])
+        place = (*steps, "axes")
+        is_once = references.require(
+            len(set(axes)) == len(axes), place, "names an axis twice; name each once"
+        )
+        text = "has no meaning in two dimensions; remove it"
+        in_plane = references.require(dimension != 2 or "z" not in axes, place, text)
+        return sorted(axes) if is_once and in_plane else None
+    axes = list(uncertainty.stated)
+    if settings.axes is not None:
+        text = "go with the uncertainties of a file; standard_uncertainty names the axes; remove it"
+        references.problems.add((*steps, "axes"), text, of_key=True)
+        return None
+    is_right = references.require(
+        bool(axes), place, "calibrates no axis; give at least one, such as {x: 0.2 um}"
+    )
+    text = "has no meaning in two dimensions; remove it"
+    is_right &= references.require(dimension != 2 or "z" not in axes, (*place, "z"), text)
+    return axes if is_right else None
 
 
 def _certified_coordinates(
@@ -163,19 +234,48 @@ def _certified_coordinates(
     layout: BallLayout,
     steps: Steps,
     references: References,
-) -> Array | None:
+) -> tuple[Array, Array, tuple[Array, Array] | None] | None:
+    """Values (k, a), their standard uncertainties in the file, NaN without any, and covariance."""
     problems = references.problems
+    drawn = layout.coordinates[balls][:, [AXIS_NAMES.index(axis) for axis in axes]]
     if settings.values is None:
-        return layout.coordinates[balls][:, [AXIS_NAMES.index(axis) for axis in axes]]
-    try:
-        others = [axis for axis in AXIS_NAMES if axis not in axes]
-        rows = read_table(references.folder / settings.values, ["ball"], axes, others)
-    except ExperimentError as error:
-        problems.take(error, steps)
+        return drawn, np.full(drawn.shape, np.nan), None
+    covariance = None
+    if is_digital(settings.values):
+        wanted = [(layout.names[ball], axis) for ball in balls for axis in axes]
+        digital = read_digital(settings, wanted, False, steps, references)
+        if digital is None:
+            return None
+        covariance = digital.covariance
+        found = np.array([one.value for one in digital.entries]).reshape(drawn.shape)
+        uncertainty = np.array([one.uncertainty for one in digital.entries]).reshape(drawn.shape)
+    else:
+        of_table = _table_of_coordinates(settings, balls, axes, layout, steps, references)
+        if of_table is None:
+            return None
+        found, uncertainty = of_table
+    if text := far_spread(found, drawn):
+        problems.add((*steps, "values"), text)
+        return None
+    return found, uncertainty, covariance
+
+
+def _table_of_coordinates(
+    settings: CoordinatesSettings,
+    balls: NDArray[np.intp],
+    axes: list[str],
+    layout: BallLayout,
+    steps: Steps,
+    references: References,
+) -> tuple[Array, Array] | None:
+    problems, steps = references.problems, (*steps, "values")
+    others = [axis for axis in AXIS_NAMES if axis not in axes]
+    read = read_rows(settings, ["ball"], axes, others, steps, references)
+    if read is None:
         return None
     before, known = len(problems.messages), set(layout.names)
-    by_ball: dict[str, tuple[float, ...]] = {}
-    for row in rows:
+    by_ball: dict[str, tuple[Array, Array]] = {}
+    for row, uncertainty in zip(*read, strict=True):
         name = row.texts[0]
         if name not in known:
             problems.add_at(row.mark, steps, f'unknown ball "{name}"; {hint(name, layout.names)}')
@@ -183,7 +283,7 @@ def _certified_coordinates(
             problems.add_at(
                 row.mark, steps, f'ball "{name}" is listed twice; remove one of the two lines'
             )
-        by_ball[name] = row.lengths[: len(axes)]
+        by_ball[name] = np.array(row.lengths[: len(axes)]), uncertainty
     missing = [layout.names[i] for i in balls if layout.names[i] not in by_ball]
     if missing and len(problems.messages) == before:
         problems.add(
@@ -191,13 +291,8 @@ def _certified_coordinates(
         )
     if len(problems.messages) > before:
         return None
-    found = np.array([by_ball[layout.names[i]] for i in balls])
-    if text := far_spread(
-        found, layout.coordinates[balls][:, [AXIS_NAMES.index(axis) for axis in axes]]
-    ):
-        problems.add(steps, text)
-        return None
-    return found
+    chosen = [by_ball[layout.names[i]] for i in balls]
+    return np.array([one for one, _ in chosen]), np.array([u for _, u in chosen])
 
 
 def far_spread(values: Array, drawn: Array) -> str:

@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
-from ...inputs.messages import ExperimentError, Steps
-from ...inputs.quantities import LengthFunction, PositiveLength
+from ...inputs.messages import Steps
+from ...inputs.quantities import LengthFunction, PositiveLength, UncertaintyFunction
 from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
-from ...inputs.tables import read_table
-from ...inputs.yamltree import Mark, mark_of
+from ...inputs.yamltree import mark_of
 from ...machines.protocol import Array, Integers
 from ..arrays import Design, Words
 from ..lookup import References
 from .balls import BallObservations
-from .calibration import FAR_FROM_DRAWING, Calibration, far_from_drawing
-
-# Balls tied to one another by distances are estimated together, with memory that grows as the
-# square of their number.
-MOST_TIED_BALLS = 3000
+from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration, far_from_drawing
+from .certificate_tables import read_rows
+from .digital_values import read_digital
+from .stated_values import (
+    CertificateEntry,
+    CertificateSettings,
+    FileValues,
+    check_keys,
+    is_digital,
+    uncertainties_of,
+)
+from .whitening import CovarianceRoot, at_least_exact
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,8 @@ class DistanceCalibration(Calibration):
 
     ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
     ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
-    the function ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability``
+    the function ``standard_uncertainty`` at the nominal distances, None where a file states them.
+    ``form`` and ``repeatability``
     matter for length standards only.
     """
 
@@ -80,11 +87,12 @@ class DistanceCalibration(Calibration):
     dimensions: Literal[2, 3]
     values: Array
     certified: bool
-    standard_uncertainty: LengthFunction
+    standard_uncertainty: LengthFunction | None
     standard_uncertainties: Array
     form: Literal["distance", "projection"]
     repeatability: Literal["included", "ignored"]
     kind: Literal["distances"] = "distances"
+    root: CovarianceRoot | None = None
 
     are_lengths: ClassVar[bool] = True
 
@@ -92,7 +100,11 @@ class DistanceCalibration(Calibration):
         ends = np.asarray(self.pairs + first, np.int64)
         dimensions = np.full(len(ends), self.dimensions)
         return CalibratedDistances(
-            ends[:, 0], ends[:, 1], dimensions, self.values, self.standard_uncertainties
+            ends[:, 0],
+            ends[:, 1],
+            dimensions,
+            self.values,
+            at_least_exact(self.standard_uncertainties),
         )
 
     def names(self, layout: BallLayout) -> list[tuple[str, str]]:
@@ -100,9 +112,11 @@ class DistanceCalibration(Calibration):
 
     def times_as_uncertain(self, factor: float) -> DistanceCalibration:
         old = self.standard_uncertainty
+        new = None if old is None else LengthFunction(factor * old.constant, factor * old.slope)
+        scaled = super().times_as_uncertain(factor) if old is None else self
         return replace(
-            self,
-            standard_uncertainty=LengthFunction(factor * old.constant, factor * old.slope),
+            scaled,
+            standard_uncertainty=new,
             standard_uncertainties=factor * self.standard_uncertainties,
         )
 
@@ -121,7 +135,7 @@ class CertifiedDistance(Settings):
 CertifiedDistances = NonEmpty[CertifiedDistance]
 
 
-class DistancesSettings(Settings):
+class DistancesSettings(CertificateSettings):
     """Calibrated distances between balls of an artefact."""
 
     kind: Literal["distances"] = Field(description="calibrated distances between balls")
@@ -137,12 +151,19 @@ class DistancesSettings(Settings):
     dimensions: Literal[2, 3] | None = Field(
         None, description="3 (default): distances in space; 2: in the artefact's plane"
     )
-    standard_uncertainty: LengthFunction = Field(description="of each distance; may grow with it")
+    standard_uncertainty: UncertaintyFunction | None = Field(
+        None,
+        description=(
+            "of each distance; may grow with it; 0 um where it is exact; left out where values or"
+            " covariance state it"
+        ),
+    )
     values: Forms[Text, CertifiedDistances, CertifiedDistances] | None = Field(
         None,
         description=(
-            "CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
-            "{balls: [a, b], distance: …}; default: nominal distances"
+            "CSV file with columns ball_1, ball_2 and distance_mm, and standard_uncertainty_um, or"
+            " expanded_uncertainty_um and k; a DCC (XML); or a list of"
+            " {balls: [a, b], distance: …}; default: nominal distances"
         ),
     )
     form: Literal["distance", "projection"] = Field(
@@ -160,16 +181,10 @@ class DistancesSettings(Settings):
 def read_distances(
     settings: DistancesSettings, artefact: str, steps: Steps, references: References
 ) -> DistanceCalibration | None:
-    layout, is_right = references.layouts[artefact], True
-    if references.artefacts[artefact].role != "length_standard":
-        for key in ("form", "repeatability"):
-            if key in settings.model_fields_set:
-                text = (
-                    "is only for artefacts with role: length_standard; remove it, or give"
-                    f' "{artefact}" that role'
-                )
-                references.problems.add((*steps, key), text, of_key=True)
-                is_right = False
+    layout, is_right = (
+        references.layouts[artefact],
+        _suits_role(settings, artefact, steps, references),
+    )
     if references.dimension == 2 and settings.dimensions == 3:
         text = "a two-dimensional experiment has distances in 2 dimensions; remove it"
         references.problems.add((*steps, "dimensions"), text)
@@ -182,22 +197,28 @@ def read_distances(
         return None
     if not _can_be_tied(len(np.unique(indices)), (*steps, "pairs"), references):
         return None
-    difference = (layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]])[
-        :, :dimensions
-    ]
-    nominal = np.linalg.norm(difference, axis=1)
-    if np.any(nominal < COINCIDENT):
-        i, j = indices[int(np.argmin(nominal))]
-        text = (
-            f'balls "{layout.names[i]}" and "{layout.names[j]}" have no distance in the plane; use'
-            " dimensions: 3"
-        )
-        references.problems.add((*steps, "pairs"), text)
+    nominal = _nominal(indices, layout, dimensions, (*steps, "pairs"), references)
+    if nominal is None:
         return None
-    values = _certified_distances(
-        settings, indices, layout, nominal, (*steps, "values"), references
-    )
-    if values is None or not is_right:
+    is_right &= check_keys(settings, steps, references)
+    if not is_right:
+        return None
+    found = _certified_distances(settings, indices, layout, nominal, steps, references)
+    if found is None:
+        return None
+    values, in_file, covariance = found
+    names = [(layout.names[i], layout.names[j]) for i, j in indices]
+    stated = settings.standard_uncertainty
+    of_item = None if stated is None else stated.at(nominal)
+    known = uncertainties_of(settings, names, True, of_item, in_file, covariance, steps, references)
+    if known is None:
+        return None
+    if known.root is not None and references.artefacts[artefact].role == "length_standard":
+        text = (
+            "a length standard's lengths are read as independent; leave the covariance out, or give"
+            f' "{artefact}" the role of a plate'
+        )
+        references.problems.add((*steps, "covariance"), text)
         return None
     indices.setflags(write=False)
     return DistanceCalibration(
@@ -206,11 +227,50 @@ def read_distances(
         dimensions,
         frozen(values),
         settings.values is not None,
-        settings.standard_uncertainty,
-        frozen(settings.standard_uncertainty.at(nominal)),
+        stated if known.root is None else None,
+        known.standard,
         settings.form,
         settings.repeatability,
+        root=known.root,
     )
+
+
+def _nominal(
+    indices: NDArray[np.intp],
+    layout: BallLayout,
+    dimensions: Literal[2, 3],
+    steps: Steps,
+    references: References,
+) -> Array | None:
+    """Distances (m,) as drawn, None after saying that one is none."""
+    difference = layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]]
+    nominal = np.linalg.norm(difference[:, :dimensions], axis=1)
+    if np.any(nominal < COINCIDENT):
+        i, j = indices[int(np.argmin(nominal))]
+        text = (
+            f'balls "{layout.names[i]}" and "{layout.names[j]}" have no distance in the plane; use'
+            " dimensions: 3"
+        )
+        references.problems.add(steps, text)
+        return None
+    return np.asarray(nominal)
+
+
+def _suits_role(
+    settings: DistancesSettings, artefact: str, steps: Steps, references: References
+) -> bool:
+    """Whether keys that are for length standards only are of one, after saying which are not."""
+    is_right = True
+    if references.artefacts[artefact].role != "length_standard":
+        for key in ("form", "repeatability"):
+            if key in settings.model_fields_set:
+                text = (
+                    "is only for artefacts with role: length_standard; remove it, or give"
+                    f' "{artefact}" that role'
+                )
+                references.problems.add((*steps, key), text, of_key=True)
+                is_right = False
+    return is_right
 
 
 def _can_be_tied(balls: int, steps: Steps, references: References) -> bool:
@@ -266,41 +326,88 @@ def _certified_distances(
     nominal: Array,
     steps: Steps,
     references: References,
-) -> Array | None:
+) -> tuple[Array, Array, tuple[Array, Array] | None] | None:
+    """Values (m,), standard uncertainties (m,) in their file, NaN without any, and covariance."""
     if settings.values is None:
-        return nominal
-    problems = references.problems
-    # Two names, the distance, and where it is written.
-    entries: list[tuple[tuple[str, str], float, Mark, Steps]]
+        return nominal, np.full(len(nominal), np.nan), None
+    problems, place = references.problems, (*steps, "values")
+    wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
+    read = _entries(settings, wanted, place, references)
+    if read is None:
+        return None
+    before = len(problems.messages)
+    by_pair = _by_pair(read.entries, layout, references)
+    missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
+    drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
+    for entry in read.entries:
+        expected, distance = drawn.get(frozenset(entry.names)), entry.value
+        if (
+            expected is not None
+            and distance > 0
+            and not abs(distance - expected) <= FAR_FROM_DRAWING * expected
+        ):
+            text = f"{far_from_drawing(distance, expected)}; correct one of the two"
+            problems.add_at(entry.mark, entry.steps, text)
+    if missing and len(problems.messages) == before:
+        problems.add(place, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
+    if len(problems.messages) > before:
+        return None
+    chosen = [by_pair[frozenset(pair)] for pair in wanted]
+    return (
+        np.array([one.value for one in chosen]),
+        np.array([one.uncertainty for one in chosen]),
+        read.covariance,
+    )
+
+
+def _entries(
+    settings: DistancesSettings,
+    wanted: list[tuple[str, str]],
+    steps: Steps,
+    references: References,
+) -> FileValues | None:
+    """What the file or the list of values states; None after saying what is wrong."""
+    if is_digital(settings.values):
+        return read_digital(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):
-        try:
-            rows = read_table(
-                references.folder / settings.values, ["ball_1", "ball_2"], ["distance"]
-            )
-        except ExperimentError as error:
-            problems.take(error, steps)
+        read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
+        if read is None:
             return None
-        entries = [
-            (cast(tuple[str, str], row.texts), row.lengths[0], row.mark, steps) for row in rows
+        found = [
+            CertificateEntry(
+                (row.texts[0], row.texts[1]), row.lengths[0], float(u[0]), row.mark, steps
+            )
+            for row, u in zip(*read, strict=True)
         ]
-    else:
-        entries = [
-            (entry.balls, entry.distance, mark_of(problems.root, (*steps, i)), (*steps, i))
-            for i, entry in enumerate(settings.values)
-        ]
-    before, known = len(problems.messages), set(layout.names)
-    by_pair: dict[frozenset[str], float] = {}
-    for names, distance, mark, place in entries:
+        return FileValues(found)
+    listed = [
+        CertificateEntry(
+            entry.balls,
+            entry.distance,
+            np.nan,
+            mark_of(references.problems.root, (*steps, i)),
+            (*steps, i),
+        )
+        for i, entry in enumerate(settings.values or ())
+    ]
+    return FileValues(listed)
+
+
+def _by_pair(
+    entries: list[CertificateEntry], layout: BallLayout, references: References
+) -> dict[frozenset[str], CertificateEntry]:
+    """Entries by their balls, after saying which are no distances of two of them, each once."""
+    problems, known = references.problems, set(layout.names)
+    by_pair: dict[frozenset[str], CertificateEntry] = {}
+    for entry in entries:
+        names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
         for name in names:
             if name not in known:
                 problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
         pair = frozenset(names)
         if len(pair) == 1:
-            problems.add_at(
-                mark,
-                place,
-                f'a ball has no distance from itself; name two balls, not "{names[0]}" twice',
-            )
+            text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
+            problems.add_at(mark, place, text)
         if pair in by_pair:
             text = (
                 f'the distance of "{names[0]}" and "{names[1]}" is given twice; remove one of'
@@ -309,21 +416,5 @@ def _certified_distances(
             problems.add_at(mark, place, text)
         if distance <= 0:
             problems.add_at(mark, place, "a distance must be above zero; correct it")
-        by_pair[pair] = distance
-    wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
-    missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
-    drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
-    for names, distance, mark, place in entries:
-        expected = drawn.get(frozenset(names))
-        if (
-            expected is not None
-            and distance > 0
-            and not abs(distance - expected) <= FAR_FROM_DRAWING * expected
-        ):
-            text = f"{far_from_drawing(distance, expected)}; correct one of the two"
-            problems.add_at(mark, place, text)
-    if missing and len(problems.messages) == before:
-        problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
-    if len(problems.messages) > before:
-        return None
-    return np.array([by_pair[frozenset(pair)] for pair in wanted])
+        by_pair[pair] = entry
+    return by_pair

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...machines.protocol import Array, ErrorModel, Integers
-from ..arrays import Design, Observations, Rows, State, locations, reading_uncertainties
+from ..arrays import Design, Observations, Rows, State, locations, reading_noise
 from ..parameters import SharedLayout, shared_layout
 from .joint_lengths import LengthArrays, LengthWhitening, length_whitening_of
 from .readings import expected_readings, offset_sensitivity
@@ -88,7 +88,7 @@ class Lengths(LengthArrays, Observations):
 def length_whitening(design: Design) -> LengthWhitening:
     """What makes uncorrelated observations of unit variance of the lengths of standards."""
     given, readings = design.of(Lengths), design.readings
-    noise = reading_uncertainties(design, readings) / np.sqrt(readings.repeats)[:, None]
+    noise = reading_noise(design, readings)
     standard = design.balls.artefact[readings.ball[given.first]]
     place = readings.position[given.first] * len(design.probes.names) + readings.probe[given.first]
     return length_whitening_of(given, noise, standard, place)

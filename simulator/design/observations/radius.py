@@ -12,7 +12,7 @@ from pydantic import Field
 from ...geometry.artefacts import BryanGaugeSettings
 from ...geometry.ball_layouts import BallLayout, Name
 from ...inputs.messages import Steps
-from ...inputs.quantities import PositiveLength
+from ...inputs.quantities import LengthUncertainty, PositiveLength
 from ...inputs.settings import Settings
 from ...machines.protocol import Array
 from ..lookup import References
@@ -55,8 +55,8 @@ class RadiusSettings(Settings):
     value: PositiveLength | None = Field(
         None, description="the radius certified; default: as drawn"
     )
-    standard_uncertainty: PositiveLength = Field(
-        description="of the radius, the same wherever the gauge stands"
+    standard_uncertainty: LengthUncertainty = Field(
+        description="of the radius, the same wherever the gauge stands; 0 um where it is exact"
     )
 
 

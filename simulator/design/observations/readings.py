@@ -19,6 +19,7 @@ from ..arrays import (
     State,
     influence_shifts,
     locations,
+    measured,
     nominal_state,
     reading_uncertainties,
 )
@@ -93,8 +94,11 @@ def rotation_sensitivity(arm: Array) -> Array:
 
 
 def reading_weights(design: Design, readings: Readings) -> Array:
-    """Reciprocal standard uncertainties (m, d) of the mean of each reading's repeats."""
-    return np.asarray(np.sqrt(readings.repeats)[:, None] / reading_uncertainties(design, readings))
+    """Reciprocal standard uncertainties (m, d) of the mean of each reading's repeats, zero for
+    co-ordinates that are not read.
+    """
+    weights = np.sqrt(readings.repeats)[:, None] / reading_uncertainties(design, readings)
+    return np.where(measured(design, readings), weights, 0.0)
 
 
 def reading_blocks(
@@ -126,6 +130,11 @@ def reading_blocks(
     by_pose = np.zeros((len(x), d, pose_size(d)), np.result_type(arm, float))
     by_pose[:, range(d), range(d)] = -weight
     by_pose[:, :, d:] = -weight[:, :, None] * rotation_sensitivity(arm)
+    if design.positions.across is not None:
+        # Tilts are held: they would show through holes that are out of the plane alone.
+        across = design.positions.across[readings.position]
+        tilts = (across[:, None] >= 0) & (np.arange(3) != across[:, None])
+        by_pose[:, :, d:] *= ~tilts[:, None]
     by_offset = None
     if design.probes.free.any():
         by_offset = weight[:, :, None] * offset_sensitivity(design.model, x, state.a, p)

@@ -71,3 +71,93 @@ def whitening(own: Array, shared: Array, group: Integers) -> Whitening:
     # (1 - 1 / sqrt(1 + q)) / q without the difference.
     root = np.sqrt(1.0 + square)
     return Whitening(total, ratio / np.sqrt(root * (1.0 + root)), group)
+
+
+# What an exact value counts as, in its unit (m, rad, 1): far below what any laboratory can state,
+# and above the rounding of a residual in double precision.
+EXACT = 1e-13
+
+# Eigenvalues of a correlation matrix below this are those of combinations that are exact.
+SINGULAR = 1e-12
+
+
+def at_least_exact(uncertainty: Array) -> Array:
+    """Standard uncertainties with those of exact values replaced by what these count as."""
+    return np.maximum(uncertainty, EXACT)
+
+
+class IndefiniteError(ValueError):
+    """A covariance matrix with a negative eigenvalue: `share` of the largest, of correlations."""
+
+    def __init__(self, share: float) -> None:
+        self.share = share
+        super().__init__(f"a negative eigenvalue, {-share:.2g} of the largest")
+
+
+@dataclass(frozen=True)
+class CovarianceRoot:
+    """Roots of a covariance matrix D V diag(s^2) V' D of m values: `own` (m,) is D, their standard
+    uncertainties, `vectors` (m, m) the V, `deviations` (m,) the s.
+
+    Values that are exact have an eigenvector each of their own.
+    """
+
+    own: Array
+    vectors: Array
+    deviations: Array
+
+    def whitened(self, rows: Array) -> Array:
+        """`rows` (m, ...) made uncorrelated and of unit variance: diag(1/s) V' D^-1 rows."""
+        scaled = np.tensordot(self.vectors.T, rows / _along(self.own, rows), axes=1)
+        return np.asarray(scaled / _along(self.deviations, rows))
+
+    def pulled(self, rows: Array) -> Array:
+        """The transpose of `whitened`."""
+        scaled = np.tensordot(self.vectors, rows / _along(self.deviations, rows), axes=1)
+        return np.asarray(scaled / _along(self.own, rows))
+
+    def drawn(self, normal: Array) -> Array:
+        """Errors (..., m) of standard normal numbers (..., m), by the symmetric root, which does
+        not depend on the choice of eigenvectors.
+        """
+        exact = self.own <= EXACT
+        mixed = ((normal @ self.vectors) * self.deviations) @ self.vectors.T
+        return np.asarray(np.where(exact, 0.0, self.own * mixed))
+
+    @property
+    def weights(self) -> Array:
+        """The largest derivative (m,) of each whitened row by a value."""
+        return np.asarray(np.abs(self.vectors / self.own[:, None]).max(axis=0) / self.deviations)
+
+
+def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> CovarianceRoot:
+    """The root of a covariance (m, m) whose entries are known to `rounding`.
+
+    The matrix may be singular: eigenvalues of the correlations below `SINGULAR`, or below what the
+    digits of the entries tell, count as that. A combination that has no variance is so tied to a
+    millionth of the standard uncertainties, or as well as the digits tell.
+
+    :raises IndefiniteError: an eigenvalue that is negative by more than rounding.
+
+    >>> root = covariance_root(np.array([[25.0, 16.0], [16.0, 25.0]]))
+    >>> white = root.whitened(np.eye(2))
+    >>> np.linalg.inv(white.T @ white).round(9)
+    array([[25., 16.],
+           [16., 25.]])
+    """
+    size = np.sqrt(np.diag(covariance))
+    exact = size <= EXACT
+    own = np.where(exact, EXACT, size)
+    inner = ~exact
+    vectors, deviations = np.eye(len(own)), np.ones(len(own))
+    if inner.any():
+        scale = np.outer(own[inner], own[inner])
+        correlation = covariance[np.ix_(inner, inner)] / scale
+        values, found = np.linalg.eigh((correlation + correlation.T) / 2.0)
+        share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
+        floor = max(SINGULAR, float(np.sqrt((share**2).sum())))
+        if values[0] < -floor * len(values):
+            raise IndefiniteError(float(values[0] / values[-1]))
+        vectors[np.ix_(inner, inner)] = found
+        deviations[inner] = np.sqrt(np.maximum(values, floor))
+    return CovarianceRoot(own, vectors, deviations)

@@ -1,0 +1,124 @@
+"""Certified values in tables (CSV), each with its uncertainty, a standard or an expanded one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...inputs.messages import ExperimentError, Steps
+from ...inputs.settings import shorten
+from ...inputs.tables import FileRow, header_cells, read_table, table_lines
+from ...inputs.yamltree import Mark
+from ...machines.protocol import Array
+from ..lookup import References
+
+STANDARD, EXPANDED, FACTOR = "standard_uncertainty", "expanded_uncertainty", "k"
+NO_FACTOR = "-"
+# Names of columns that do not say which uncertainty they hold.
+UNCLEAR = re.compile(r"(u|u95|unc|uncertainty)_[^_]+", re.IGNORECASE)
+
+
+def read_rows(
+    settings: Any,
+    texts: Sequence[str],
+    lengths: Sequence[str],
+    others: Sequence[str],
+    steps: Steps,
+    references: References,
+) -> tuple[tuple[FileRow, ...], list[Array]] | None:
+    """Rows of a CSV file, and the standard uncertainties of each row's `lengths`, NaN without any;
+    None after saying what is wrong.
+    """
+    path = references.folder / settings.values
+    problems = references.problems
+    own = [f"{one}_{name}" for name in (STANDARD, EXPANDED) for one in lengths]
+    optional = [*others, STANDARD, EXPANDED, *own]
+    columns = [*texts, FACTOR]
+    try:
+        _refuse_unclear(table_lines(path), str(path))
+        rows = read_table(
+            path, columns, lengths, optional, defaults={FACTOR: NO_FACTOR}, absent=math.nan
+        )
+    except ExperimentError as error:
+        problems.take(error, steps)
+        return None
+    count, before = len(lengths), len(problems.messages)
+    uncertainties = []
+    for row in rows:
+        extra = dict(zip(optional, row.lengths[count:], strict=True))
+        factor = _factor(row.texts[-1], settings.coverage_factor)
+        found = np.full(count, math.nan)
+        for k, one in enumerate(lengths):
+            stated = [
+                value
+                for name in (STANDARD, EXPANDED)
+                for value in (extra[f"{one}_{name}"], extra[name])
+                if not math.isnan(value)
+            ]
+            if len(stated) > 1:
+                text = "states an uncertainty twice; leave one column out"
+                problems.add_at(row.mark, steps, text)
+                break
+            if not stated:
+                continue
+            is_expanded = not all(math.isnan(extra[n]) for n in (EXPANDED, f"{one}_{EXPANDED}"))
+            text = _wrong(stated[0], is_expanded, factor, row.texts[-1])
+            if text:
+                problems.add_at(row.mark, steps, text)
+                break
+            found[k] = stated[0] / (factor or 1.0) if is_expanded else stated[0]
+        if not is_right_factor(row.texts[-1], extra, own):
+            text = "has a coverage factor k and no expanded uncertainty; call the column"
+            problems.add_at(row.mark, steps, f"{text} expanded_uncertainty_um, or leave k out")
+        uncertainties.append(found)
+    return None if len(problems.messages) > before else (rows, uncertainties)
+
+
+def is_right_factor(text: str, extra: dict[str, float], own: list[str]) -> bool:
+    """Whether a coverage factor stands beside an expanded uncertainty, or there is none."""
+    names = [EXPANDED, *(name for name in own if name.endswith(EXPANDED))]
+    return text == NO_FACTOR or any(not math.isnan(extra[name]) for name in names)
+
+
+def _refuse_unclear(lines: list[tuple[int, str]], file: str) -> None:
+    if not lines:
+        return
+    mark = Mark(file, lines[0][0], 1)
+    for place, cell, _, unit in header_cells(mark, lines[0][1], "ball_1,ball_2,distance_mm"):
+        if UNCLEAR.fullmatch(cell):
+            text = (
+                f'"{shorten(cell)}" does not say which uncertainty it is; call it'
+                f" {STANDARD}_{unit}, or {EXPANDED}_{unit} beside a column k"
+            )
+            raise ExperimentError([place.message("", text)])
+
+
+def _factor(text: str, common: float | None) -> float | None:
+    if text == NO_FACTOR:
+        return common
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _wrong(value: float, is_expanded: bool, factor: float | None, text: str) -> str:
+    """What is wrong with a stated uncertainty; empty if nothing is."""
+    if value < 0.0:
+        return "an uncertainty is below zero; correct it"
+    if not is_expanded:
+        return ""
+    if factor is None:
+        return (
+            "an expanded uncertainty has no coverage factor; add a column k, or coverage_factor to"
+            " the item, or call the column standard_uncertainty if it is one"
+        )
+    return (
+        ""
+        if 0.0 < factor < math.inf
+        else f'the coverage factor is "{shorten(text)}"; it must be above 0'
+    )

@@ -1,0 +1,172 @@
+"""Certified values in a Digital Calibration Certificate: which of them are those of an item."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from ...inputs.digital_certificates import (
+    DigitalResult,
+    DigitalValue,
+    matrix_of,
+    read_digital_certificate,
+)
+from ...inputs.messages import ExperimentError, Steps
+from ...inputs.settings import listing, shorten
+from ..lookup import References
+from .stated_values import CertificateEntry, FileValues, value_name
+
+REFERENCE_TEMPERATURE = 20.0
+# Words about a value that are part of no name.
+IDLE = {
+    "distance",
+    "length",
+    "coordinate",
+    "co-ordinate",
+    "ball",
+    "axis",
+    "of",
+    "from",
+    "to",
+    "and",
+}
+
+
+def read_digital(
+    settings: Any,
+    wanted: Sequence[tuple[str, str]],
+    is_pair: bool,
+    steps: Steps,
+    references: References,
+) -> FileValues | None:
+    """The wanted values in a digital certificate; None after saying what is wrong.
+
+    The result is the one that is named, or else the only one that has them all.
+    """
+    problems, path = references.problems, references.folder / settings.values
+    place = (*steps, "values")
+    try:
+        version, results = read_digital_certificate(path)
+    except ExperimentError as error:
+        problems.take(error, place)
+        return None
+    labels = listing(one.label for one in results)
+    chosen = [one for one in results if settings.result is None or one.is_called(settings.result)]
+    if not chosen or settings.result is not None and len(chosen) > 1:
+        many = "several results are" if chosen else "no result is"
+        text = f'{path.name}: {many} called "{shorten(settings.result)}"; it has {labels}'
+        problems.add((*steps, "result"), text)
+        return None
+    forms = _forms(wanted, is_pair)
+    by_result = [_matched(one, forms) for one in chosen]
+    full = [k for k, found in enumerate(by_result) if len(found) == len(wanted)]
+    if len(full) > 1:
+        told = listing(chosen[k].label for k in full)
+        text = f"{path.name}: {len(full)} results have these values: {told}; say which with result:"
+        problems.add(place, text)
+        return None
+    best = full[0] if full else max(range(len(chosen)), key=lambda k: len(by_result[k]))
+    result, found = chosen[best], by_result[best]
+    if not full:
+        text = _nothing_found(result, found, wanted, is_pair)
+        problems.add(place, f"{path.name}: {text}; it has {labels}")
+        return None
+    before = len(problems.messages)
+    entries = []
+    for k, names in enumerate(wanted):
+        values = [result.lengths[i] for i in found[k]]
+        if len(values) > 1:
+            lines = listing(str(one.mark.line) for one in values)
+            text = f"{value_name(names, is_pair)} has several values, in lines {lines}"
+            problems.add_at(values[1].mark, place, text)
+        if values[0].problem:
+            text = f"{value_name(names, is_pair)} {values[0].problem}"
+            problems.add_at(values[0].mark, place, text)
+        entries.append(
+            CertificateEntry(names, values[0].value, values[0].uncertainty, values[0].mark, place)
+        )
+    if len(problems.messages) > before:
+        return None
+    covariance = matrix_of(result, [found[k][0] for k in range(len(wanted))])
+    _tell(
+        version,
+        result,
+        [result.lengths[found[k][0]] for k in range(len(wanted))],
+        settings,
+        covariance is not None,
+        place,
+        references,
+    )
+    return FileValues(entries, covariance)
+
+
+def _tell(
+    version: str,
+    result: DigitalResult,
+    values: list[DigitalValue],
+    settings: Any,
+    correlated: bool,
+    steps: Steps,
+    references: References,
+) -> None:
+    """Say which result was taken, and the temperature that it is stated for."""
+    factors = sorted({f"{one.factor:g}" for one in values if not math.isnan(one.uncertainty)})
+    told = f"DCC {version}, result {result.label}: {len(values)} values"
+    told += f", k = {listing(factors)}" if factors else ""
+    told += ", with their covariance" if correlated else ""
+    for name, degrees in result.temperatures:
+        told += f"; {shorten(name)} {degrees:.4g} °C"
+    references.problems.note(steps, f"{settings.values}: {told}")
+    away = [one for _, one in result.temperatures if abs(one - REFERENCE_TEMPERATURE) > 0.5]
+    if away:
+        text = (
+            f"{settings.values} states a temperature of {away[0]:.4g} °C; its values are taken as"
+            " they are, as those at the temperature at which all lengths are meant"
+        )
+        references.problems.doubt(steps, text)
+
+
+def _nothing_found(
+    result: DigitalResult,
+    found: dict[int, list[int]],
+    wanted: Sequence[tuple[str, str]],
+    is_pair: bool,
+) -> str:
+    missing = listing(
+        value_name(names, is_pair) for k, names in enumerate(wanted) if k not in found
+    )
+    if found:
+        return f"result {result.label} has no value of {missing}"
+    known = list(dict.fromkeys(name for one in result.lengths for name in one.names))
+    example = " ".join(wanted[0])
+    told = f"its values are called {listing(known)}" if known else "its values have no names"
+    return f'no result has values of these balls, called for example "{example}"; {told}'
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(word for word in re.split(r"[\s_\-–—/.,:;|()\[\]]+", text.casefold()) if word)
+
+
+def _forms(wanted: Sequence[tuple[str, str]], is_pair: bool) -> dict[tuple[str, ...], int]:
+    """Words that name each value, in either order; those that name several are left out."""
+    forms: dict[tuple[str, ...], int] = {}
+    for k, (first, second) in enumerate(wanted):
+        for words in (_words(first) + _words(second), _words(second) + _words(first)):
+            forms[words] = -1 if forms.get(words, k) != k else k
+    return {words: k for words, k in forms.items() if k >= 0}
+
+
+def _matched(result: DigitalResult, forms: dict[tuple[str, ...], int]) -> dict[int, list[int]]:
+    """Places of the values of a result by what is wanted."""
+    found: dict[int, list[int]] = {}
+    for i, one in enumerate(result.lengths):
+        texts = [*one.names, *one.contexts]
+        texts += [f"{own} {about}" for own in one.names for about in one.contexts]
+        tried = [_words(text) for text in texts]
+        tried += [tuple(word for word in words if word not in IDLE) for words in tried]
+        k = next((forms[words] for words in tried if words in forms), None)
+        if k is not None:
+            found.setdefault(k, []).append(i)
+    return found

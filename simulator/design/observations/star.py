@@ -1,0 +1,249 @@
+"""Stars of probes as one body: tips that are known among one another, in whatever direction the
+star points (NPL Report CISE 15/98, section 2.4.2).
+
+A star with tips at c, turned by a rotation R, has the offsets p = R c. The rotation is no
+parameter: that nearest to offsets p follows from them, and rows compare R' p with c across the
+directions in which a small turn moves the tips. What is left of the misfit lies there, so that the
+sum of squares is the least over all rotations, exactly and for turns of any size, and each row is
+independent of the others. Where the star's place is unknown too, shifts are left out likewise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ...geometry.motions import AXIS_NAMES
+from ...machines.protocol import Array, ErrorModel, Integers
+from ..arrays import Design, Observations, Replicates, Rows, State
+from ..parameters import shared_layout
+from .readings import rotation_sensitivity
+
+# A turn that moves tips by less than this share of their distances moves none: tips are in a line.
+IN_LINE = 1e-9
+
+# Tips in a line leave the turn about it open, and rounding would choose it. By this share the
+# rotation is drawn to none, which chooses the least turn, and moves tips by far less than a
+# nanometre.
+LEAST_TURN = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Star:
+    """A star of `probes` (names) whose tips are at ``coordinates`` (l, d) in its own frame, in
+    metres, each known to ``standard_uncertainty`` along each axis.
+
+    ``has_place``: whether it turns about the machine's reference point, which is the origin of the
+    coordinates; otherwise its place is unknown as well.
+    """
+
+    probes: tuple[str, ...]
+    coordinates: Array
+    standard_uncertainty: float
+    has_place: bool
+
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """Probe and axis of each co-ordinate."""
+        letters = AXIS_NAMES[: self.coordinates.shape[1]]
+        return [(probe, letter) for probe in self.probes for letter in letters]
+
+    def with_values(self, values: Array) -> Star:
+        """The same with other co-ordinates (l d,), from a certificate."""
+        return replace(self, coordinates=values.reshape(self.coordinates.shape))
+
+    def true_values(self, offsets: Array) -> Array:
+        """Its co-ordinates (l d,) where its tips have `offsets` (l, d) and it lies in its own
+        frame as it does now.
+        """
+        turn = self.rotation(offsets)
+        if self.has_place:
+            return (offsets @ turn).ravel()
+        return ((offsets - offsets.mean(axis=0)) @ turn + self.coordinates.mean(axis=0)).ravel()
+
+    def rotation(self, offsets: Array) -> Array:
+        """Rotations (..., d, d) that bring the star nearest to `offsets` (..., l, d)."""
+        source = self.coordinates
+        if not self.has_place:
+            source = source - source.mean(axis=0)
+            offsets = offsets - offsets.mean(axis=-2, keepdims=True)
+        together = offsets.swapaxes(-1, -2) @ source
+        if _in_line(self):
+            together = together + LEAST_TURN * (source**2).sum() * np.eye(source.shape[1])
+        u, _, vh = np.linalg.svd(together)
+        sign = np.ones(together.shape[:-1])
+        sign[..., -1] = np.sign(np.linalg.det(u @ vh))
+        return np.asarray((u * sign[..., None, :]) @ vh)
+
+
+def _moves(star: Star) -> Array:
+    """How small turns, and shifts where its place is unknown, move its tips: (l d, k)."""
+    arms = star.coordinates if star.has_place else star.coordinates - star.coordinates.mean(axis=0)
+    count, d = arms.shape
+    turns = rotation_sensitivity(arms).reshape(count * d, -1)
+    if star.has_place:
+        return turns
+    size = max(float(np.sqrt((arms**2).sum())), np.finfo(float).tiny)
+    return np.concatenate([turns, np.tile(size * np.eye(d), (count, 1)) / np.sqrt(count)], axis=1)
+
+
+def _free(star: Star) -> Array:
+    """Orthonormal directions (l d, k) in which its tips move as one body."""
+    left, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
+    return np.asarray(left[:, sizes > IN_LINE * sizes.max(initial=0.0)])
+
+
+def _in_line(star: Star) -> bool:
+    d = star.coordinates.shape[1]
+    turns = 3 if d == 3 else 1
+    return _free(star).shape[1] < turns + (0 if star.has_place else d)
+
+
+def _shape(star: Star) -> tuple[Array, Integers]:
+    """Orthonormal columns (l d, m) across all motions of the body, each mostly one co-ordinate of a
+    tip, and which (m,).
+    """
+    free = _free(star)
+    across = np.eye(len(free)) - free @ free.T
+    left, chosen = across.copy(), []
+    for _ in range(len(free) - free.shape[1]):
+        size = (left**2).sum(axis=0)
+        # Of those that are as large but for rounding, the first.
+        k = int(np.flatnonzero(size > size.max() * (1.0 - 1e-6))[0])
+        chosen.append(k)
+        direction = left[:, k] / np.sqrt(size[k])
+        left = left - np.outer(direction, direction @ left)
+    places = np.sort(np.array(chosen, np.int64))
+    u, _, vh = np.linalg.svd(across[:, places], full_matrices=False)
+    return np.asarray(u @ vh), places
+
+
+@dataclass(frozen=True)
+class Stars(Observations):
+    """The shapes of all `stars`; `value` and `uncertainty` (m,) are in metres.
+
+    `probes` are the indices of each star's, `bases` (l d, m) the directions of its rows, and
+    `place` (m,) the co-ordinate, among all tips of its star, that each row is mostly about.
+    """
+
+    word: ClassVar[str] = "star"
+
+    stars: tuple[Star, ...]
+    probes: tuple[Integers, ...]
+    bases: tuple[Array, ...]
+    star: Integers
+    place: Integers
+    value: Array
+    uncertainty: Array
+
+    def rows(self, design: Design, state: State, x: Array | None) -> Rows:
+        columns = design.once(shared_layout).offset_columns
+        by_shared = np.zeros((len(self), len(design.once(shared_layout)) + 1))
+        at = 0
+        for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
+            turn = star.rotation(state.probes[probes])
+            slopes = np.einsum("ldm,ed->mle", basis.reshape(*star.coordinates.shape, -1), turn)
+            # What is held goes to the extra column.
+            by_shared[at : at + basis.shape[1], columns[probes].ravel()] = slopes.reshape(
+                basis.shape[1], -1
+            )
+            at += basis.shape[1]
+        by_shared = by_shared[:, :-1] / self.uncertainty[:, None]
+        residual = (self.values(state.probes) - self.value) / self.uncertainty
+        return Rows(residual, by_shared, np.zeros((len(self), 0, design.dimension)))
+
+    def values(self, offsets: Array) -> Array:
+        """Values (..., m) with offsets (..., probes, d), turned back into the stars' frames."""
+        found = []
+        for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
+            own = offsets[..., probes, :]
+            turned = own @ star.rotation(own)
+            found.append(turned.reshape(*turned.shape[:-2], -1) @ basis)
+        return np.concatenate(found, axis=-1)
+
+    def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
+        return self.values(truth.probes)
+
+    def name(self, design: Design, k: int) -> str:
+        probe, letter = self.stars[self.star[k]].names[self.place[k]]
+        return f"shape of the star, mostly {letter} of probe {probe}"
+
+    def as_read(self, design: Design, x: Array) -> Design:
+        offsets = design.probes.offsets.copy()
+        for star, probes in zip(self.stars, self.probes, strict=True):
+            offsets[probes] = _turned(star, probes, design, x)
+        return replace(design, probes=replace(design.probes, offsets=offsets))
+
+    def add_misfit(self, rows: Rows, errors: Array, at: Replicates) -> None:
+        """Exact, whatever the turn of the star."""
+        offsets = (
+            at.start.probes + np.append(at.shared, 0.0 * at.shared[:, :1], axis=1)[:, at.offsets]
+        )
+        residual = (self.values(offsets) - self.values(at.truth.probes) - errors) / self.uncertainty
+        at.squares[:] += (residual**2).sum(axis=1)
+        forces = np.zeros(offsets.shape)
+        first = 0
+        for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
+            own = slice(first, first + basis.shape[1])
+            pull = (residual[:, own] / self.uncertainty[own]) @ basis.T
+            turned = pull.reshape(len(pull), *star.coordinates.shape) @ star.rotation(
+                offsets[:, probes]
+            ).swapaxes(-1, -2)
+            forces[:, probes] += turned
+            first = own.stop
+        probe, axis = np.nonzero(at.offsets >= 0)
+        at.by_shared[:, at.offsets[probe, axis]] += forces[:, probe, axis]
+
+
+def observed_stars(stars: Sequence[Star], names: Sequence[str]) -> Stars:
+    """The shapes of stars of the probes of those names."""
+    shapes = [_shape(star) for star in stars]
+    count = [len(places) for _, places in shapes]
+    return Stars(
+        tuple(stars),
+        tuple(np.array([names.index(name) for name in star.probes], np.int64) for star in stars),
+        tuple(basis for basis, _ in shapes),
+        np.repeat(np.arange(len(stars)), count),
+        np.concatenate([places for _, places in shapes]),
+        np.concatenate(
+            [
+                star.coordinates.ravel() @ basis
+                for star, (basis, _) in zip(stars, shapes, strict=True)
+            ]
+        ),
+        np.repeat([star.standard_uncertainty for star in stars], count),
+    )
+
+
+def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
+    """Offsets (l, d) of a star's tips, turned as readings of the same balls in the same positions
+    say; as they are where readings say nothing.
+    """
+    drawn, readings = design.probes.offsets[probes], design.readings
+    rows = np.flatnonzero(np.isin(readings.probe, probes))
+    tip = np.argmax(readings.probe[rows][:, None] == probes, axis=1)
+    key = readings.position[rows] * len(design.balls.names) + readings.ball[rows]
+    _, place, count = np.unique(key, return_inverse=True, return_counts=True)
+    # Every ball in every position has a place of its own, whatever it is read with: tip and scale
+    # reading together.
+    seen = np.zeros((len(count), len(probes)))
+    total = np.zeros((len(count), len(probes), x.shape[1]))
+    np.add.at(seen, (place, tip), 1.0)
+    np.add.at(total, (place, tip), x[rows])
+    times = seen.sum(axis=1)
+    weights = np.diag(seen.sum(axis=0)) - seen.T @ (seen / times[:, None])
+    sides = -(total.sum(axis=0) - seen.T @ (total.sum(axis=1) / times[:, None]))
+    if np.linalg.matrix_rank(weights, hermitian=True) < len(probes) - 1:
+        return drawn
+    offsets = np.linalg.lstsq(weights, sides, rcond=1e-9)[0]
+    alone = replace(star, has_place=False)
+    turn = alone.rotation(offsets)
+    if star.has_place:
+        return np.asarray(star.coordinates @ turn.T)
+    held = np.flatnonzero(~design.probes.free[probes].any(axis=1))
+    turned = star.coordinates @ turn.T
+    of = held if len(held) else np.arange(len(probes))
+    return np.asarray(turned + (drawn[of] - turned[of]).mean(axis=0))

@@ -1,0 +1,241 @@
+"""Values of a calibration item that a file states, with their uncertainties and covariance.
+
+The file is a table (CSV), to which another may give the covariance, or a Digital Calibration
+Certificate (XML).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from ...inputs.covariances import read_matrix
+from ...inputs.messages import ExperimentError, Message, Steps
+from ...inputs.settings import Settings, Text, hint, listing, shorten
+from ...inputs.yamltree import Mark
+from ...machines.protocol import Array, Integers
+from ..lookup import References
+from .joint_values import MOST_JOINT_VALUES
+from .whitening import CovarianceRoot, IndefiniteError, covariance_root
+
+# An uncertainty and the variance beside it agree to their last digits, this being a generous share.
+AGREE = 0.02
+
+
+class CertificateSettings(Settings):
+    """Keys of an item of calibration whose values may stand in a file."""
+
+    covariance: Text | None = Field(
+        None,
+        description=(
+            "CSV file with the covariance matrix of the values: first cell covariance_um2 (or"
+            " another unit), or correlation, then the names of values, as row and as column"
+        ),
+    )
+    result: Text | None = Field(
+        None, description="name, id or refType of the result of a DCC (XML) that is meant"
+    )
+    coverage_factor: float | None = Field(
+        None, gt=0, description="k of the expanded uncertainties of a CSV file without a column k"
+    )
+
+
+@dataclass(frozen=True)
+class CertificateEntry:
+    """A value of a file: two names, value and standard uncertainty (NaN without one) in metres, and
+    where it is written.
+    """
+
+    names: tuple[str, str]
+    value: float
+    uncertainty: float
+    mark: Mark
+    steps: Steps
+
+
+@dataclass(frozen=True)
+class Uncertainties:
+    """Standard uncertainties (m,) of values in metres, and the root of their covariance where they
+    are correlated.
+    """
+
+    standard: Array
+    root: CovarianceRoot | None = None
+
+
+@dataclass(frozen=True)
+class FileValues:
+    """What a file states: its entries, and of a digital certificate a covariance (m, m) with its
+    rounding of the values that were asked for.
+    """
+
+    entries: list[CertificateEntry]
+    covariance: tuple[Array, Array] | None = None
+
+
+def is_digital(values: object) -> bool:
+    """Whether the values of an item are in a digital certificate."""
+    return isinstance(values, str) and values.lower().endswith(".xml")
+
+
+def check_keys(settings: Any, steps: Steps, references: References) -> bool:
+    """Tell whether the keys about a file go with one another, after saying which do not."""
+    is_right = True
+    of_file = isinstance(settings.values, str)
+    digital = is_digital(settings.values)
+    for key, fits, instead in (
+        ("result", digital, "goes with values in a DCC (XML)"),
+        ("coverage_factor", of_file and not digital, "goes with values in a CSV file"),
+        ("covariance", not digital, "is for values that are no DCC, which has its own"),
+    ):
+        if getattr(settings, key) is not None and not fits:
+            references.problems.add((*steps, key), f"{instead}; remove it", of_key=True)
+            is_right = False
+    return is_right
+
+
+def value_name(names: tuple[str, str], is_pair: bool) -> str:
+    """What a value is called in messages."""
+    return "–".join(names) if is_pair else f"{names[1]} of {names[0]}"
+
+
+def uncertainties_of(
+    settings: Any,
+    names: Sequence[tuple[str, str]],
+    is_pair: bool,
+    stated: Array | None,
+    found: Array,
+    covariance: tuple[Array, Array] | None,
+    steps: Steps,
+    references: References,
+) -> Uncertainties | None:
+    """Uncertainties of values with `names`: those `stated` (m,) with the item, or those `found`
+    (m,) in its file, and those of a covariance; None after saying what is wrong.
+    """
+    problems, own = references.problems, (*steps, "standard_uncertainty")
+    in_file = not np.isnan(found).any()
+    matrix = covariance
+    if settings.covariance is not None:
+        matrix = _of_file(
+            settings, names, is_pair, stated if stated is not None else found, steps, references
+        )
+        if matrix is None:
+            return None
+    is_correlation = settings.covariance is not None and len(matrix or ()) == 3
+    states = in_file or (matrix is not None and not is_correlation)
+    if stated is not None and states:
+        where = settings.values if in_file or not settings.covariance else settings.covariance
+        problems.add(own, f"{where} states uncertainties; remove one of the two", of_key=True)
+        return None
+    of_values = np.diag(matrix[0]) if states and matrix is not None else found
+    without = np.flatnonzero(np.isnan(of_values))
+    if 0 < len(without) < len(of_values):
+        told = listing(value_name(names[k], is_pair) for k in without.tolist())
+        text = f"states no uncertainty of {told}, and of others it does; leave these out"
+        problems.add((*steps, "values"), text)
+        return None
+    if stated is None and not states:
+        text = 'missing; add "standard_uncertainty", or values with their uncertainties'
+        problems.add(own, text)
+        return None
+    if matrix is None:
+        return Uncertainties(_frozen(found if stated is None else stated))
+    place = (*steps, "covariance") if settings.covariance is not None else (*steps, "values")
+    size = np.sqrt(np.diag(matrix[0]))
+    if in_file and not is_correlation:
+        wrong = np.flatnonzero(np.abs(size - found) > AGREE * np.maximum(size, found) + 1e-12)
+        if len(wrong):
+            problems.add(place, _disagreement(names, is_pair, size, found, wrong))
+            return None
+    if len(size) > MOST_JOINT_VALUES:
+        problems.add(
+            place, f"{len(size)} correlated values; at most {MOST_JOINT_VALUES} are possible"
+        )
+        return None
+    try:
+        root = covariance_root(matrix[0], matrix[1])
+    except IndefiniteError as error:
+        problems.add(
+            place,
+            f"is no covariance: its correlations have {error}; correct it, or give more digits",
+        )
+        return None
+    return Uncertainties(_frozen(size), root)
+
+
+def _disagreement(
+    names: Sequence[tuple[str, str]], is_pair: bool, size: Array, found: Array, wrong: Integers
+) -> str:
+    k = int(wrong[0])
+    text = (
+        f"the covariance has the standard uncertainty {1e6 * size[k]:.4g} µm for"
+        f" {value_name(names[k], is_pair)}, beside it stands {1e6 * found[k]:.4g} µm"
+    )
+    ratio = size[wrong] / np.maximum(found[wrong], 1e-300)
+    if len(wrong) == len(size) and np.ptp(ratio) < 0.05 * ratio.mean() and ratio.mean() < 10.0:
+        text += (
+            f", always {ratio.mean():.3g} times; is one of the two expanded? State standard"
+            " uncertainties and their covariance"
+        )
+        return text
+    return f"{text}; correct one of the two"
+
+
+def _of_file(
+    settings: Any,
+    names: Sequence[tuple[str, str]],
+    is_pair: bool,
+    standard: Array,
+    steps: Steps,
+    references: References,
+) -> Any:
+    """Covariance and rounding (m, m) of values from a CSV file, and a third entry where they are
+    those of correlations; None after saying what is wrong.
+    """
+    problems, place = references.problems, (*steps, "covariance")
+    try:
+        matrix = read_matrix(references.folder / settings.covariance)
+    except ExperimentError as error:
+        problems.take(error, place)
+        return None
+    index: dict[str, int] = {}
+    for k, (first, second) in enumerate(names):
+        index[f"{first} {second}"] = k
+        index[f"{second} {first}"] = k
+    at = np.full(len(names), -1)
+    messages: list[Message] = []
+    for i, name in enumerate(matrix.names):
+        known = index.get(" ".join(name.split()))
+        if known is None:
+            text = f'"{shorten(name)}" names no value of this item; {hint(name, index)}'
+            messages.append(matrix.marks[i].message("", text))
+        elif at[known] >= 0:
+            messages.append(matrix.marks[i].message("", f'"{shorten(name)}" stands there twice'))
+        else:
+            at[known] = i
+    missing = [value_name(names[k], is_pair) for k in np.flatnonzero(at < 0).tolist()]
+    if missing and not messages:
+        problems.add(place, f"no covariance of {listing(missing)}; add it")
+        return None
+    if messages:
+        problems.take(ExperimentError(messages), place)
+        return None
+    values, rounding = matrix.values[np.ix_(at, at)], matrix.rounding[np.ix_(at, at)]
+    if not matrix.is_correlation:
+        return values, rounding
+    scale = np.outer(standard, standard)
+    if np.isnan(standard).any():
+        text = 'missing; a correlation needs "standard_uncertainty", or uncertainties in values'
+        problems.add((*steps, "standard_uncertainty"), text)
+        return None
+    return values * scale, rounding * scale, True
+
+
+def _frozen(values: Array) -> Array:
+    found = np.array(values, float)
+    found.setflags(write=False)
+    return found

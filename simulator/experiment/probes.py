@@ -1,0 +1,222 @@
+"""Probes of an experiment: their offsets, as stated or by the angles of a head, what is known of
+them, and stars of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..design.lookup import Floats, References, lengths_per_axis
+from ..design.observations.star import Star
+from ..geometry.ball_layouts import frozen
+from ..geometry.rotations import rotation_matrix
+from ..inputs.messages import ExperimentError, Steps
+from ..inputs.settings import hint, listing
+from ..inputs.tables import read_table
+from ..inputs.yamltree import written
+from .model import Probe
+from .probe_sections import HeadSettings, ProbeSettings, StarSettings
+from .references import DEFAULT_PROBE
+from .structure import Sections
+
+
+def resolve_probes(sections: Sections, references: References) -> dict[str, Probe]:
+    """Return the probes that are right, by name."""
+    problems, dimension = references.problems, references.dimension
+    if written(problems.root, "probes") is None:
+        if dimension == 3:
+            text = (
+                'missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: offsets from the'
+                " reference point"
+            )
+            problems.add(("probes",), text)
+            return {}
+        at_reference = Probe(DEFAULT_PROBE, frozen(np.zeros(dimension or 0)))
+        return {DEFAULT_PROBE: at_reference} if dimension == 2 else {}
+    angles = [getattr(one, "a", None) for one in sections.entries("probes").values()]
+    if sections.get("head") is not None and set(angles) <= {None}:
+        problems.doubt(("head",), "no probe states an angle A; the head has no effect")
+    members = _star_members(sections, references)
+    reference = _reference_probe(sections, references)
+    probes = {}
+    for key, settings in sections.entries("probes").items():
+        name, steps = str(key), ("probes", str(key))
+        offset, uncertainty = settings, None
+        if isinstance(settings, ProbeSettings):
+            offset = _offset(settings, sections.get("head"), steps, references)
+            uncertainty = _offset_uncertainty(settings, steps, references)
+            if name in members and (settings.unknown or settings.standard_uncertainty):
+                key = "unknown" if settings.unknown else "standard_uncertainty"
+                text = "its star says what is known of this probe; remove it"
+                problems.add((*steps, key), text, True)
+        if name in members:
+            uncertainty = frozen([np.inf] * (dimension or 0))
+        if offset is not None and references.has_dimension(offset, steps):
+            known = None if name == reference else uncertainty
+            probes[name] = Probe(name, frozen(offset), known)
+    return probes
+
+
+def _offset(
+    settings: ProbeSettings, head: HeadSettings | None, steps: Steps, references: References
+) -> tuple[float, ...] | None:
+    """The offset (d,) that is stated, or that the head's angles make; None after saying what is
+    wrong.
+    """
+    if settings.a is None:
+        return settings.offset
+    tip = settings.tip or (head.tip if head is not None else None)
+    text = "has no centre to turn about; add head: {tip: [0 mm, 0 mm, -120 mm]}"
+    if not references.require(head is not None, (*steps, "A"), text) or head is None:
+        return None
+    if not references.require(references.dimension != 2, (*steps, "A"), "has no meaning in 2-D"):
+        return None
+    text = "has no tip; add tip to head, or to the probe"
+    if not references.require(tip is not None, (*steps, "A"), text) or tip is None:
+        return None
+    centre = head.centre or (0.0, 0.0, 0.0)
+    for where, point in ((("head", "tip"), tip), (("head", "centre"), centre)):
+        if not references.has_dimension(point, where):
+            return None
+    # A positive angle A tilts a stylus that points down towards -y.
+    turn = rotation_matrix([-settings.a, 0.0, settings.b or 0.0])
+    return tuple((np.array(centre) + turn @ np.array(tip)).tolist())
+
+
+def _star_members(sections: Sections, references: References) -> list[str]:
+    """Probes of stars, what is wrong with their names told."""
+    members: list[str] = []
+    for i, settings in sections.entries("stars").items():
+        steps: Steps = ("stars", int(i), "probes")
+        names = settings.probes or references.probes
+        if settings.probes is not None and not references.are_probes(names, steps):
+            continue
+        references.require(len(names) > 1, ("stars", int(i)), "has one probe only; remove the star")
+        for name in names:
+            text = f'probe "{name}" is in another star already; a probe is in one star'
+            references.require(name not in members, steps, text)
+        members += [name for name in names if name not in members]
+    return members
+
+
+def _in_place(sections: Sections, references: References) -> list[str]:
+    """Probes of stars that turn about the machine's reference point."""
+    return [
+        name
+        for settings in sections.entries("stars").values()
+        if settings.place == "stated"
+        for name in settings.probes or references.probes
+    ]
+
+
+def resolve_stars(
+    sections: Sections, probes: Mapping[str, Probe], references: References
+) -> tuple[Star, ...]:
+    """Return the stars that are right."""
+    stars = []
+    for i, settings in sections.entries("stars").items():
+        names = tuple(settings.probes or references.probes)
+        if not set(names) <= set(probes):
+            continue
+        steps: Steps = ("stars", int(i))
+        coordinates = np.array([probes[name].offset for name in names])
+        if settings.values is not None:
+            found = _star_values(settings, names, (*steps, "values"), references)
+            if found is None:
+                continue
+            coordinates = found
+        has_place = settings.place == "stated"
+        stars.append(Star(names, frozen(coordinates), settings.standard_uncertainty, has_place))
+    return tuple(stars)
+
+
+def _star_values(
+    settings: StarSettings, names: tuple[str, ...], steps: Steps, references: References
+) -> Floats | None:
+    """Co-ordinates (l, d) of a star's tips from its table, None after saying what is wrong."""
+    letters = list("xyz"[: references.dimension])
+    try:
+        rows = read_table(references.folder / str(settings.values), ["probe"], letters, [])
+    except ExperimentError as error:
+        references.problems.take(error, steps)
+        return None
+    before, found = len(references.problems.messages), dict[str, tuple[float, ...]]()
+    for row in rows:
+        name = row.texts[0]
+        if name not in names:
+            text = f'unknown probe "{name}"; {hint(name, names)}'
+            references.problems.add_at(row.mark, steps, text)
+        elif name in found:
+            text = f'probe "{name}" is listed twice; remove one of the two lines'
+            references.problems.add_at(row.mark, steps, text)
+        found[name] = row.lengths
+    missing = [name for name in names if name not in found]
+    if missing and len(references.problems.messages) == before:
+        text = f"no co-ordinates for {listing(missing)}; add them, or leave them out of probes"
+        references.problems.add(steps, text)
+    if len(references.problems.messages) > before:
+        return None
+    return np.array([found[name] for name in names])
+
+
+def _reference_probe(sections: Sections, references: References) -> str:
+    """Name of the probe whose offset is held, none where stars turn about a stated place; what is
+    wrong with it is told.
+    """
+    problems = references.problems
+    listed = {
+        str(name): s
+        for name, s in sections.entries("probes").items()
+        if isinstance(s, ProbeSettings)
+    }
+    named = [name for name, settings in listed.items() if settings.reference]
+    for name in named[1:]:
+        problems.add(
+            ("probes", name, "reference"),
+            f'"{named[0]}" is the reference already; remove one of the two',
+        )
+    in_place = _in_place(sections, references)
+    if named:
+        text = (
+            "its star turns about a stated place, which is the reference; remove it, or say place:"
+            " unknown of the star"
+        )
+        references.require(named[0] not in in_place, ("probes", named[0], "reference"), text)
+        return named[0]
+    if in_place:
+        return ""
+    first = references.probes[0] if references.probes else ""
+    if first in listed and (listed[first].unknown or listed[first].standard_uncertainty):
+        text = (
+            "its offset is held as stated, as the first probe is the reference where none has"
+            " reference: true"
+        )
+        problems.doubt(("probes", first), f"{text}; its stated uncertainty is ignored")
+    return first
+
+
+def _offset_uncertainty(
+    settings: ProbeSettings, steps: Steps, references: References
+) -> Floats | None:
+    """Standard uncertainties (d,) of an offset that is estimated, infinite where it is unknown,
+    None after saying what is wrong and where nothing is stated.
+    """
+    problems, dimension = references.problems, references.dimension
+    stated = settings.standard_uncertainty
+    if settings.unknown and stated is not None:
+        problems.add(
+            (*steps, "unknown"),
+            'does not go with "standard_uncertainty"; remove one of the two',
+            True,
+        )
+    if settings.reference and (settings.unknown or stated is not None):
+        key = "unknown" if settings.unknown else "standard_uncertainty"
+        problems.add(
+            (*steps, key), "the offset of the reference is held as stated; remove it", True
+        )
+    uncertainty, is_right = lengths_per_axis(stated, (*steps, "standard_uncertainty"), references)
+    if settings.unknown and dimension is not None:
+        return frozen([np.inf] * dimension)
+    return uncertainty if is_right else None

@@ -1,0 +1,154 @@
+"""Campaigns with stars and re-indexed heads simulated by their definitions: coverage where they are
+declared, and what the documentation says of where they are not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.estimation.functions import linear_functions
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import written_in_python
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.uncertainty.quantities import QUANTITIES
+from scipy.stats import chi2
+
+QUICKSTART: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
+NAMES = tuple(QUICKSTART["probes"])
+TIPS = np.array(
+    [[0.0, 0.0, -0.05], [0.05, 0.0, 0.0], [-0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, -0.05, 0.0]]
+)
+# Standard uncertainties of a tip in the star and of re-indexing, and by how much stars are turned.
+TIP, SHIFT, TURN = 2e-7, 5e-7, 2e-4
+PAGE = Path("docs/how-to/probes-and-reference-sphere.md")
+
+
+def small(**changes: Any) -> Experiment:
+    """The quickstart with nine balls and few coefficients."""
+    model = {**QUICKSTART["error_model"], "position_coefficients": 3, "rotation_coefficients": 3}
+    stated = {
+        **QUICKSTART,
+        "error_model": model,
+        "artefacts": {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}},
+        "evaluation": {"points": {"random": 12, "seed": 3}, "probe": "down"},
+        **changes,
+    }
+    return written_in_python(stated, Path())
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Share of distances within 1.96 uncertainties, root mean square of their errors in
+    uncertainties, and share of fits that would warn of S^2: one in a thousand does by chance.
+    """
+
+    within: dict[str, float]
+    size: dict[str, float]
+    noticed: float
+
+
+def with_tips(experiment: Experiment, tips: np.ndarray) -> Design:
+    """The design with certified tips: of the star, or without one offsets held as certified."""
+    stars = tuple(replace(one, coordinates=tips) for one in experiment.stars)
+    probes = {
+        name: replace(experiment.probes[name], offset=tip)
+        for name, tip in zip(NAMES, tips, strict=True)
+    }
+    return lay_out(replace(experiment, stars=stars, probes=probes))
+
+
+def coverage(told: Experiment, of_star: bool, count: int) -> Shares:
+    """Campaigns on a machine without errors; what is certified of tips is wrong and the star turned,
+    or tips are re-indexed.
+    """
+    generator = np.random.default_rng(20261122)
+    ratios: dict[str, list[np.ndarray]] = {"U5": [], "U6": []}
+    noticed, design = 0, lay_out(told)
+    for _ in range(count):
+        p, one = TIPS, design
+        if of_star:
+            a, b, c = TURN * generator.standard_normal(3)
+            p = TIPS + np.cross([a, b, c], TIPS)
+            one = with_tips(told, TIPS + TIP * generator.standard_normal(TIPS.shape))
+        readings, state = one.readings, nominal_state(one)
+        arms = np.einsum(
+            "mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball]
+        )
+        x = arms + state.origins[readings.position] - p[readings.probe]
+        if not of_star:
+            shifts = SHIFT * generator.standard_normal((6, 5, 3))
+            x -= shifts[readings.position, readings.probe]
+        x += one.machine.repeatability * generator.standard_normal(x.shape)
+        given = one.of(CalibratedDistances)
+        wrong = given.value + given.uncertainty * generator.standard_normal(len(given))
+        one = one.observed(given.given(value=wrong))
+        solution = estimate(one, x)
+        assert solution.status == "converged"
+        at = linearised_fit(one, solution)
+        freedom = one.observation_count - one.parameter_count
+        noticed += int(solution.factor.sum_of_squares > chi2.isf(0.001, freedom))
+        for symbol, errors in ratios.items():
+            (functions,) = QUANTITIES[symbol].functions(one, at.layout)
+            places, true = functions.places.at(one, at.state), functions.places.at(one, state)
+            first, second = np.triu_indices(len(places), 1)
+            error = np.linalg.norm(places[first] - places[second], axis=1) - np.linalg.norm(
+                true[first] - true[second], axis=1
+            )
+            errors.append(error / at.uncertainty(linear_functions(at, functions)))
+    both = {symbol: np.array(one) for symbol, one in ratios.items()}
+    return Shares(
+        {symbol: float((np.abs(one) < 1.96).mean()) for symbol, one in both.items()},
+        {symbol: float(np.sqrt((one**2).mean())) for symbol, one in both.items()},
+        noticed / count,
+    )
+
+
+STAR = {"stars": [{"standard_uncertainty": "0.2 um"}]}
+REINDEXED = {"influences": [{"kind": "re-indexing", "standard_uncertainty": "0.5 um"}]}
+# By the rows of the documentation's table: what is told, and whether it is of a star.
+TOLD: dict[str, tuple[dict[str, Any], bool]] = {
+    "star, declared": (STAR, True),
+    "star, offsets held as certified": ({}, True),
+    "re-indexing, declared": (REINDEXED, False),
+    "re-indexing, not declared": ({}, False),
+}
+
+
+def assert_covered(found: Shares, count: int) -> None:
+    # Distances of one campaign are one draw at the worst.
+    for symbol in ("U5", "U6"):
+        assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
+        assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
+    assert found.noticed < 0.001 + 6.0 * np.sqrt(0.001 / count)
+
+
+@pytest.mark.parametrize("name", ["star, declared", "re-indexing, declared"])
+def test_what_is_declared_is_covered(name: str) -> None:
+    changes, of_star = TOLD[name]
+    assert_covered(coverage(small(**changes), of_star, 20), 20)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["star, declared", "re-indexing, declared"])
+def test_what_is_declared_is_covered_in_many_campaigns(name: str) -> None:
+    changes, of_star = TOLD[name]
+    assert_covered(coverage(small(**changes), of_star, 2000), 2000)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", TOLD)
+def test_the_page_states_what_is_wrong_otherwise(name: str) -> None:
+    changes, of_star = TOLD[name]
+    found = coverage(small(**changes), of_star, 1000)
+    cells = [f"{100 * found.within[s]:.1f} %" for s in ("U5", "U6")]
+    cells += [f"{found.size[s]:.3g}" for s in ("U5", "U6")]
+    row = f"| {' | '.join([name, *cells, f'{100 * found.noticed:.1f} %'])} |"
+    assert row in PAGE.read_text(encoding="utf-8"), row
