@@ -25,13 +25,16 @@ from ballplate.results.variance_components.components import (
     told_apart,
 )
 from ballplate.results.variance_components.groupings import GROUPINGS, Grouping
-from ballplate.results.variance_components.groups import Group, groups_of
+from ballplate.results.variance_components.groups import Group, groups_of, reweighted
 from ballplate.results.variance_components.restricted_likelihood import (
     at_ratios,
     estimated_ratios,
     group_sums,
 )
-from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.observations.joint_values import JointValues
+from ballplate.simulator.design.observations.whitening import covariance_root
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -250,6 +253,32 @@ def test_a_fit_names_the_axis_that_scatters_more(
     assert found["readings along z"].lower < 6.25 < found["readings along z"].upper
     assert sum(one.redundancy for one in found.values()) == pytest.approx(fit.degrees_of_freedom)
     assert {one.by for one in map(fit.components, GROUPINGS)} == set(GROUPINGS)
+
+
+def test_co_ordinates_of_holes_that_are_not_read_are_in_no_group(small: bp.Experiment) -> None:
+    holes = small.with_({"artefacts.plate.reads": "in plane", "artefacts.plate.flatness": "1 um"})
+    fit = bp.fit(holes, bp.simulate(holes))
+    for by in GROUPINGS:
+        groups = fit.components(by).groups
+        assert sum(one.redundancy for one in groups) == pytest.approx(fit.degrees_of_freedom)
+        assert sum(one.observations for one in groups) == fit.design.observation_count
+
+
+def test_values_with_a_covariance_are_reweighted_together(design: Design) -> None:
+    """Distances half of whose variance is of errors in common."""
+    covariance = 0.04e-12 * (0.5 + 0.5 * np.eye(4))
+    groups = groups_of(design, "calibration")
+    enlarged = reweighted(design, groups, np.array([1.0, 9.0]))
+    one, other = (each.of(CalibratedDistances) for each in (design, enlarged))
+    np.testing.assert_allclose(other.uncertainty, 3.0 * one.uncertainty)
+    joint = JointValues.of([(one, covariance_root(covariance))])
+    state = nominal_state(design)
+    moved = replace(state, balls=state.balls * 1.00001)
+    rows = joint.rows(design, moved, None)
+    wide = joint.enlarged(np.full(4, 3.0)).rows(design, moved, None)
+    # Rounding of what is 16 uncertainties large.
+    np.testing.assert_allclose(wide.residual, rows.residual / 3.0, atol=1e-12)
+    np.testing.assert_allclose(wide.by_ball, rows.by_ball / 3.0, rtol=1e-9, atol=1e-3)
 
 
 def test_a_fit_has_the_estimates_of_the_dense_likelihood(

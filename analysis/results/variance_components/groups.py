@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, Observations, reading_uncertainties
+from ballplate.simulator.design.arrays import Design, Observations, measured, reading_uncertainties
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.hat import row_count, row_places
@@ -53,6 +53,8 @@ def groups_of(design: Design, by: Grouping) -> tuple[Group, ...]:
         ),
         "calibration": (["readings"], np.zeros(d * len(readings), np.int64)),
     }[by]
+    # Holes are read in two co-ordinates.
+    member = np.where(measured(design, readings).ravel(), member, -1)
     found = [Group(word, np.flatnonzero(member == k)) for k, word in enumerate(words)]
     places = row_places(design)
     for one in design.observations:
