@@ -13,7 +13,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.arguments import (
@@ -40,6 +40,8 @@ from .results.variance_components.groupings import GROUPINGS, Grouping
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
 
+PathLike = str | os.PathLike[str]
+
 if TYPE_CHECKING:
     import pandas
 
@@ -60,7 +62,8 @@ if TYPE_CHECKING:
     from .results.imported import ReadReport
     from .results.prediction import Prediction
 
-PathLike = str | os.PathLike[str]
+    # A table of readings, or several; None for those that the experiment names.
+    Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
 
 SIGMAS = ("estimated", "given")
 
@@ -334,20 +337,23 @@ def read_report(
 @overload
 def fit(
     experiment: Experiment | PathLike,
-    readings: PathLike | pandas.DataFrame,
+    readings: Tables = None,
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     *,
     components: Grouping | None = None,
     reweight: bool = False,
+    columns: Mapping[str, object] | None = None,
+    unit: str | None = None,
+    coordinates: str | None = None,
 ) -> Fit: ...
 
 
 @overload
 def fit(
     experiment: Experiment | PathLike,
-    readings: PathLike | pandas.DataFrame,
+    readings: Tables = None,
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
@@ -356,14 +362,18 @@ def fit(
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
+    *,
     components: Grouping | None = None,
     reweight: bool = False,
+    columns: Mapping[str, object] | None = None,
+    unit: str | None = None,
+    coordinates: str | None = None,
 ) -> FitResult: ...
 
 
 def fit(
     experiment: Experiment | PathLike,
-    readings: PathLike | pandas.DataFrame,
+    readings: Tables = None,
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
@@ -372,11 +382,18 @@ def fit(
     across_probes: bool = False,
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
+    *,
     components: Grouping | None = None,
     reweight: bool = False,
+    columns: Mapping[str, object] | None = None,
+    unit: str | None = None,
+    coordinates: str | None = None,
 ) -> FitResult:
-    """The estimate from readings.
+    """The estimate from readings: a table or several, or those that the experiment's file names.
 
+    `columns`, `unit` and `coordinates` say how tables are written, in place of the experiment's
+    section `readings`: columns by role, the unit of those that state none, and whether co-ordinates
+    are scale readings, ball centres or those of a part.
     `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
@@ -417,10 +434,12 @@ def fit(
     reason = misused(components, reweight, sigma)
     if reason:
         raise ValueError(reason)
-    chosen, table = _experiment(experiment), _table("readings", readings)
+    said = {"columns": columns, "unit": unit, "coordinates": coordinates}
+    chosen = _experiment(experiment).with_readings(said)
+    tables = _tables(readings, chosen)
     if certificate is not None:
         chosen = read_certificate(_table("certificate", certificate), chosen)
-    observed = read_readings(table, lay_out(chosen))
+    observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
     return fit_readings(
         chosen,
         observed,
@@ -789,6 +808,20 @@ def _table(name: str, given: PathLike | pandas.DataFrame) -> Path | GivenText:
     if not isinstance(given, pandas.DataFrame):
         raise TypeError(f"{name}={given!r}; give the path of a CSV file, or a data frame")
     return GivenText(name, given.to_csv(index=False))
+
+
+def _tables(given: Tables, experiment: Experiment) -> list[Path | GivenText]:
+    """Tables of readings, or those that the experiment names."""
+    if given is None:
+        named = experiment.readings.named_files
+        if not named:
+            raise ValueError("readings: the experiment names no files; give a table")
+        return [experiment.source.parent / name for name in named]
+    if not isinstance(given, list | tuple):
+        return [_table("readings", given)]
+    if not given:
+        raise ValueError("readings: no table; give one at least")
+    return [_table(f"readings[{k}]", one) for k, one in enumerate(given)]
 
 
 def _experiment(given: Any) -> Experiment:

@@ -17,19 +17,30 @@ from ..results.variance_components.groupings import GROUPINGS
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .outputs import UsageError, add_force, write
-from .telling import complain, warn
+from .table_options import add_tables
+from .telling import complain, note, warn
 
 HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
-    "Estimate all parameters of an experiment from a CSV file of readings with the columns"
-    " position, ball, probe, x_mm, y_mm, z_mm (or another unit). The exit status is 0 if"
-    " the estimate converged and the rank is as expected, otherwise 1."
+    "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"
+    " ball, probe, x_mm, y_mm, z_mm (or another unit), or tables that measuring programs write. The"
+    " exit status is 0 if the estimate converged and the rank is as expected, otherwise 1."
 )
 
 
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
-    parser.add_argument("readings", metavar="READINGS", type=Path, help="readings (CSV)")
+    readings = parser.add_argument(
+        "readings",
+        metavar="READINGS",
+        nargs="+",
+        type=Path,
+        default=[],
+        help="readings: one table or several; default: readings.files of the experiment file",
+    )
+    # With nargs="*" none would be looked for behind the first option.
+    readings.required = False
+    add_tables(parser)
     parser.add_argument(
         "--certificate",
         metavar="CSV",
@@ -52,6 +63,19 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="report error functions by the coefficients of t, t^2, ... on [0, 1]",
     )
+    _add_estimators(parser)
+    _add_components(parser)
+    add_picture(
+        parser,
+        "--plot",
+        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
+    )
+    add_force(parser)
+    add_json(parser)
+
+
+def _add_estimators(parser: ArgumentParser) -> None:
+    """Add the choice of an estimator, and what goes with only some of them."""
     parser.add_argument(
         "--estimator",
         choices=ESTIMATORS,
@@ -77,14 +101,6 @@ def add_options(parser: ArgumentParser) -> None:
             " of five"
         ),
     )
-    _add_components(parser)
-    add_picture(
-        parser,
-        "--plot",
-        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
-    )
-    add_force(parser)
-    add_json(parser)
 
 
 def _add_components(parser: ArgumentParser) -> None:
@@ -111,14 +127,19 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.readings.reading_files import read_readings
 
     from .common import show, single
+    from .table_options import named_sources, with_options
 
     _refuse_misused(options)
     experiment = single(options)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
-    observed = read_readings(options.readings, lay_out(experiment))
-    for remark in observed.remarks:
-        complain(f"{options.readings}: {remark}")
+    experiment = with_options(options, experiment)
+    sources = options.readings or named_sources(experiment)
+    observed = read_readings(sources, lay_out(experiment), settings=experiment.readings)
+    for remark in observed.told:
+        note(options, remark)
+    for remark in observed.remarks[len(observed.told) :]:
+        complain(f"{', '.join(map(str, sources))}: {remark}")
     warn(observed.doubts)
     result = fit_readings(
         experiment,
@@ -159,10 +180,11 @@ def _refuse_misused(options: Namespace) -> None:
         for name in ("components", "sigma"):
             reason = reason.replace(f" {name}", f" --{name}")
         raise UsageError(f"--{reason}")
-    first, second = options.files[0], options.readings
-    if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
-        raise UsageError(
-            f"the experiment file comes first, then the readings: fit {second} {first}"
-        )
+    first = options.files[0]
+    for second in options.readings:
+        if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
+            raise UsageError(
+                f"the experiment file comes first, then the readings: fit {second} {first}"
+            )
     if options.plot and options.estimator not in DRAWN:
         raise UsageError("--plot draws residuals by the full estimator or reversal; leave it out")

@@ -17,10 +17,10 @@ from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.quantities import length_text
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import AXES, read_readings
+from ballplate.simulator.readings.reading_files import read_readings
+from ballplate.simulator.readings.reading_sources import read_source
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
@@ -66,12 +66,18 @@ def done_candidates(
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
     places = {c.name: k for k, c in enumerate(candidates) if isinstance(c.item, Position)}
-    texts, defaults = ["position", "ball", "probe"], {"probe": ""}
     planned = {short: name for name, short in (names or {}).items()}
+    known = {"position": tuple(places), "probe": tuple(experiment.probes)}
+    wrong: list[Message] = []
+    settings, d = experiment.readings, experiment.dimension
+    # Where decimals could be thousands, the whole is refused when it is read below.
+    table = read_source(path, known, settings, wrong, lambda x: False, d, {})
+    if wrong:
+        raise ExperimentError(wrong)
     messages: dict[str, Message] = {}
     found: dict[str, int] = {}
     name = ""
-    for row in read_table(path, texts, AXES[: experiment.dimension], ["u"], defaults=defaults):
+    for row in table.rows:
         name = row.texts[0]
         meant = _meant(name, planned)
         base = places.get(meant, places.get(base_name(meant)))
@@ -85,7 +91,8 @@ def done_candidates(
     if messages:
         raise ExperimentError(list(messages.values()))
     drawn = [renamed(candidates[base], own) for own, base in found.items()]
-    design = read_readings(path, lay_out(with_chosen(experiment, drawn)), every_ball=False).design
+    chosen = lay_out(with_chosen(experiment, drawn))
+    design = read_readings(path, chosen, every_ball=False, settings=settings).design
     result = []
     for number, (as_read, base) in enumerate(zip(drawn, found.values(), strict=True)):
         own = _meant(as_read.name, planned)

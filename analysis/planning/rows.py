@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
 from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.lengths import (
     Lengths,
     length_derivative,
@@ -252,7 +253,8 @@ def calibration_rows(
     artefact = drawn.design.artefacts.names.index(item.artefact)
     if experiment.artefacts[item.artefact].role == "plate":
         first = int(drawn.design.balls.of(artefact)[0])
-        return _of_observations(drawn, [item.observed(first)])
+        one, root = item.observed(first), item.root
+        return _of_observations(drawn, [one if root is None else JointValues.of([(one, root)])])
     named = drawn.design.unknown_lengths.of(artefact)
     if len(named) != 1:
         text = (

@@ -36,6 +36,8 @@ from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .probes import resolve_probes, resolve_stars
+from .readings_checks import check_readings
+from .readings_section import no_settings
 from .references import resolve_references
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
@@ -210,6 +212,7 @@ def _build(
     noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
+    check_readings(sections, references)
     stars = resolve_stars(sections, probes, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
@@ -241,6 +244,7 @@ def _build(
         stars=stars,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),
+        readings=sections.get("readings") or no_settings(),
         notes=tuple(str(note) for note in problems.notes),
     )
     return experiment if planning or pool is None else placed_only(experiment), []

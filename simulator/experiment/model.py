@@ -5,7 +5,7 @@ resolved.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,8 +22,9 @@ from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
 from ..inputs.quantities import Target
-from ..inputs.yamltree import Mark, Node, mark_of, written
+from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
 from .changes import changed_tree
+from .readings_section import ReadingsSettings, no_settings
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
@@ -217,8 +218,9 @@ class Experiment:
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
     meant for. ``noise``: of simulated readings. ``pool``: what a plan may choose from. ``doubts``:
     what of the file is possible, and unlikely to be meant. ``notes``: what was found in its tables
-    by itself. ``tree``: what was written, without variants, ``mark``: where the experiment itself
-    stands, and ``builder``: what makes an experiment of a tree.
+    by itself. ``readings``: where tables of readings are and how they are written. ``tree``: what
+    was written, without variants, ``mark``: where the experiment itself stands, and ``builder``:
+    what makes an experiment of a tree.
     """
 
     title: str
@@ -248,6 +250,7 @@ class Experiment:
     stars: tuple[Star, ...] = ()
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()
+    readings: ReadingsSettings = field(default_factory=no_settings)
     notes: tuple[str, ...] = ()
 
     @property
@@ -329,6 +332,21 @@ class Experiment:
         return self.builder(
             changed_tree(self.tree, str(self.source), {**(changes or {}), **sections})
         )
+
+    def with_readings(self, said: Mapping[str, Any]) -> Experiment:
+        """The experiment with other keys of `readings`; None leaves one as it is, and columns are
+        added to those stated.
+
+        :raises ExperimentError: they are wrong.
+        """
+        given = {key: value for key, value in said.items() if value is not None}
+        if not given:
+            return self
+        old = written(self.tree, "readings")
+        known = {} if old is None else to_python(old)
+        columns = {**known.get("columns", {}), **given.get("columns", {})}
+        both = {**known, **given, **({"columns": columns} if columns else {})}
+        return self.with_(readings=both)
 
 
 def _words_of(position: Position) -> str:

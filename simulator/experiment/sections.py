@@ -20,6 +20,7 @@ from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from .pool_sections import PoolSettings
 from .position_sections import Edges, LengthPerAxis, PositionSettings
 from .probe_sections import AnyProbe, HeadSettings, StarSettings
+from .readings_section import ReadingsSettings
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
@@ -165,6 +166,9 @@ class ExperimentSettings(Settings):
     priors: NonEmpty[PriorSettings] | None = Field(
         None, description="prior knowledge of machine errors and poses"
     )
+    readings: ReadingsSettings | None = Field(
+        None, description="the laboratory's readings: where they are and how they are written"
+    )
     influences: NonEmpty[AnyInfluence] | None = Field(
         None,
         description="what disturbs readings: temperature, probing, position scale, reproducibility",
@@ -180,7 +184,7 @@ class ExperimentSettings(Settings):
             " in mm"
         ),
     )
-    coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
+    coverage_factor: Annotated[float, Field(ge=1, le=10, strict=True)] = Field(
         1.0,
         description=(
             "k of the expanded uncertainty U = k u that is compared with"

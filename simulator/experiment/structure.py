@@ -36,7 +36,7 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
 }
 
 # Sections that files complete which they name, and which may say something else next time.
-COMPLETED_LATER = ("error_model", "true_machine")
+COMPLETED_LATER = ("error_model", "true_machine", "readings")
 
 # Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
 # a sweep's cells, share all others.

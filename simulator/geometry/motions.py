@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 
 AXIS_NAMES = ("x", "y", "z")
 
+# Extent of points across their line, as a fraction of that along it, above which they are in none.
+ACROSS = 1e-6
+
 
 def cross_matrices(v: Array) -> Array:
     """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
@@ -91,6 +94,19 @@ def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
     sign[-1] = np.sign(np.linalg.det(u @ vh))
     rotation = (u * sign) @ vh
     return rotation, centre_target - rotation @ centre_source
+
+
+def fixes_pose(points: Array) -> bool:
+    """Whether places of points (n, d) fix a motion: in space of three that are not in line.
+
+    >>> fixes_pose(np.array([[0.0, 0.0], [1.0, 0.0]])), fixes_pose(np.zeros((1, 3)))
+    (True, False)
+    """
+    n, d = points.shape
+    if n < d:
+        return False
+    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(extent[d - 2] > ACROSS * extent[0])
 
 
 def without_rigid_motion(places: Array, errors: Array) -> Array:

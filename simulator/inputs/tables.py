@@ -48,11 +48,13 @@ def table_lines(path: Path | GivenText) -> list[tuple[int, str]]:
 
     :raises ExperimentError: the file cannot be read.
     """
-    return [
-        (number, line)
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    return list(_lines(path))
+
+
+def _lines(path: Path | GivenText) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield number, line
 
 
 def read_table(
@@ -252,6 +254,17 @@ def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, 
     for column, cell in split_cells(header) or []:
         name, _, unit = cell.rpartition("_")
         yield Mark(mark.file, mark.line, column), cell, name, plain_unit(unit)
+
+
+def header_names(path: Path | GivenText) -> set[str]:
+    """Names of the columns of a comma-separated file, without their units; none where there are
+    none.
+
+    :raises ExperimentError: the file cannot be read.
+    """
+    line = next((line for line in _lines(path)), (0, ""))[1]
+    cells = split_cells(line) or []
+    return {cell.rpartition("_")[0] or cell for _, cell in cells}
 
 
 def read_number(

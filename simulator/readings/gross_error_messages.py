@@ -13,6 +13,7 @@ from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
+from .common_causes import common_cause
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 
 
@@ -26,6 +27,14 @@ def refuse_gross_errors(design: Design, x: Array, marks: Sequence[Mark]) -> None
     :raises ExperimentError: some readings are wrong; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
+    if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
+        cause = common_cause(design, x)
+        if cause:
+            text = (
+                f"the readings of most positions do not fit; all do {cause}: correct the columns,"
+                " the unit or the readings section; otherwise the names of balls are wrong"
+            )
+            raise ExperimentError([marks[0].message("", text)])
     messages = [_of_position(design, wrong, marks) for wrong in positions]
     told: set[int] = set()
     for wrong in readings:

@@ -106,7 +106,7 @@ def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], li
 def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
     seen = seen_places(design, readings, x)
-    pitch = _pitches(design)
+    pitch = ball_pitches(design)
     found, positions = _against_drawing(design, seen, pitch)
     lost = np.isin(readings.position, [wrong.position for wrong in positions])
     wrong = ~found.agreeing & ~lost
@@ -123,7 +123,7 @@ def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[W
     return positions, sorted(named, key=lambda one: one.reading)
 
 
-def _pitches(design: Design) -> Array:
+def ball_pitches(design: Design) -> Array:
     """Distance (n,) from each ball to the nearest one of its artefact, infinite for a single
     ball.
     """

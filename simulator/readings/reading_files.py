@@ -5,6 +5,7 @@ name.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,17 +18,22 @@ from ..design.arrays import Design, Readings, measured, nominal_state
 from ..design.observations.lengths import Lengths
 from ..design.observations.readings import expected_readings
 from ..estimation.spheres import fit_sphere
-from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
+from ..experiment.readings_section import ReadingsSettings, no_settings
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
-from ..inputs.tables import FileRow, read_table
+from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
+from .common_causes import doubts_about_poses
+from .coordinate_kinds import as_scale_readings
 from .gross_error_messages import (
     doubts_about_lengths,
     doubts_about_volume,
     refuse_gross_errors,
 )
+from .offsets_applied import doubt_about_offsets, said_of
+from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")
 
@@ -42,7 +48,8 @@ class ObservedReadings:
 
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the
     design did not foresee. `marks` tell where each reading stands; of the mean of several, where
-    the first does.
+    the first does. `told` is how tables were read, `of_offsets` what is doubtful about offsets of
+    probes in them.
     """
 
     design: Design
@@ -50,18 +57,29 @@ class ObservedReadings:
     missing: tuple[str, ...]
     unplanned: tuple[str, ...]
     marks: tuple[Mark, ...] = ()
+    told: tuple[str, ...] = ()
+    of_offsets: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """How far they are those that were planned, in words; nothing where they are."""
+        """How tables that are no plain CSV files were read, and how far the readings are those that
+        were planned, in words; nothing where they are.
+        """
         both = (("planned but not read", self.missing), ("read but not planned", self.unplanned))
-        return tuple(f"{what} ({len(names)}): {listing(names)}" for what, names in both if names)
+        differ = (f"{what} ({len(names)}): {listing(names)}" for what, names in both if names)
+        return (*self.told, *differ)
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """What of them is possible, and unlikely to be meant: lengths and places."""
         of_volume = doubts_about_volume(self.design, self.x, self.marks)
-        return (*doubts_about_lengths(self.design, self.x), *of_volume)
+        of_poses = doubts_about_poses(self.design, self.x)
+        return (
+            *self.of_offsets,
+            *of_poses,
+            *doubts_about_lengths(self.design, self.x),
+            *of_volume,
+        )
 
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
@@ -87,11 +105,17 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
         writer.writerow([*row[:3], *("" if v != v else repr(v) for v in row[3:])])
 
 
+# In one piece: what is refused, in which order, each before what relies on it.
 def read_readings(
-    path: Path | GivenText, design: Design, every_ball: bool = True
+    source: Source | Sequence[Source],
+    design: Design,
+    every_ball: bool = True,
+    settings: ReadingsSettings | None = None,
 ) -> ObservedReadings:
-    """Readings of a file as observations of a design.
+    """Readings of a file, or of several, as observations of a design.
 
+    A plain CSV file has the columns position, ball, probe, x_mm, y_mm and z_mm; how other tables
+    are written is found, or said by the `settings`, which also tell what their co-ordinates are of.
     The probe's column may be left out where there is one probe only. An optional column u, with a
     unit as in u_um, states the standard uncertainty of each co-ordinate of a reading; without it a
     reading has the uncertainty that the design plans for it, and one that is not planned the
@@ -102,15 +126,17 @@ def read_readings(
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
     """
-    texts, d = ["position", "ball", "probe"], design.dimension
-    # One probe need not be named.
-    defaults = {"probe": design.probes.names[0]} if len(design.probes.names) == 1 else {}
+    d, settings = design.dimension, settings or no_settings()
+    sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
     units = {name: one for kind in design.influences for name, one in kind.columns.items()}
     empty = AXES[:d] if design.positions.across is not None else ()
-    rows = read_table(
-        path, texts, AXES[:d], ["u", *units], messages, defaults, np.nan, units, empty
-    )
+
+    def is_possible(x: Array) -> bool:
+        return settings.coordinates == "part" or not far_outside(x, design).any()
+
+    found = source_rows(sources, design, settings, messages, is_possible, units, empty)
+    rows = found.rows
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
@@ -120,33 +146,46 @@ def read_readings(
         messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
-    x, stated = lengths[:, :d], lengths[:, d]
+    given, stated = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
         order = {"order": np.arange(len(rows), dtype=float)}
         beside = order | dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
+    if empty and (
+        settings.coordinates == "part" or settings.compensation not in (None, "off", "on")
+    ):
+        text = "part co-ordinates, and a correction to be taken off, need all co-ordinates of balls"
+        raise refused(sources[0], f"{text}; give scale readings")
+    x = as_scale_readings(design, readings, given, settings, sources[0])
     x = _where_not_read(rows, x, design, readings)
-    _refuse_far_outside(rows, x, design)
+    if settings.coordinates != "part":
+        _refuse_far_outside(rows, x if empty else given, design)
     uncertainty = (
         np.repeat(stated[:, None], d, axis=1)
         if has_uncertainty
         else _planned_uncertainty(design, readings)
     )
     readings = replace(readings, uncertainty=uncertainty, beside=beside)
-    missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
+    missing, unplanned = _compare(design, readings, [row.mark for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
         raise ExperimentError(
             [
                 Message(
-                    str(path), 1, 1, "", f"no reading of the balls {names}; read each at least once"
+                    str(sources[0]),
+                    1,
+                    1,
+                    "",
+                    f"no reading of the balls {names}; read each at least once",
                 )
             ]
         )
     marks = tuple(row.mark for row in rows)
+    doubt = () if empty else doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
+    observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks)
     _refuse_repeated(rows, readings, design)
     return observed
@@ -213,8 +252,8 @@ def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> 
             messages.append(rows[i].mark.message("", MORE_ERRORS))
             break
         text = (
-            f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the"
-            " column's name"
+            f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit, and"
+            " that it is a co-ordinate of the machine, not of a part (readings: coordinates)"
         )
         messages.append(rows[i].mark.message("", text))
     if messages:
@@ -286,7 +325,7 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
 
 
 def _compare(
-    design: Design, readings: Readings, lines: list[int]
+    design: Design, readings: Readings, marks: list[Mark]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, found = _key(design.readings.expanded()), _key(readings)
 
@@ -308,7 +347,11 @@ def _compare(
         return surplus
 
     missing = tuple(name(planned[i]) for i in without(planned, found))
-    return missing, tuple(f"{name(found[i])} (line {lines[i]})" for i in without(found, planned))
+    several = len({mark.file for mark in marks}) > 1
+    where = [f"{mark.file}, " if several else "" for mark in marks]
+    return missing, tuple(
+        f"{name(found[i])} ({where[i]}line {marks[i].line})" for i in without(found, planned)
+    )
 
 
 def observe(design: Design, readings: Readings, x: Array) -> ObservedReadings:

@@ -1,0 +1,75 @@
+"""Options that say how tables of readings are written."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
+
+KEYS = ("columns", "unit", "decimal", "coordinates")
+
+
+def add_tables(parser: ArgumentParser) -> None:
+    """Add what can be said of tables of readings in place of the experiment file."""
+    parser.add_argument(
+        "--columns",
+        metavar="NAME=COLUMN,…",
+        type=columns,
+        help=(
+            "columns of the readings by name or number, such as position=Lage,ball=Nr; =NAME is the"
+            " same in all rows, such as probe==down"
+        ),
+    )
+    parser.add_argument(
+        "--unit", metavar="UNIT", help="unit of readings whose columns state none, such as mm"
+    )
+    parser.add_argument(
+        "--decimal", choices=("point", "comma"), help="what stands before decimals of readings"
+    )
+    parser.add_argument(
+        "--coordinates",
+        choices=("scale readings", "ball centres", "part"),
+        help=(
+            "what readings are: scale readings (default); ball centres, to which the measuring"
+            " program has applied the offsets of probes; or ball centres in co-ordinates of a part"
+        ),
+    )
+
+
+def columns(text: str) -> dict[str, str]:
+    """Read columns from the command line."""
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        name, sign, column = (one.strip() for one in part.partition("="))
+        if not sign or not column or name in found:
+            raise ArgumentTypeError(
+                f'expected columns such as position=Lage,ball=Nr, not "{text}"; names with commas'
+                " stand in the experiment file"
+            )
+        found[name] = column
+    return found
+
+
+def with_options(options: Namespace, experiment: Experiment) -> Experiment:
+    """The experiment with what the options say of tables of readings.
+
+    :raises ExperimentError: they are wrong.
+    """
+    return experiment.with_readings({key: getattr(options, key) for key in KEYS})
+
+
+def named_sources(experiment: Experiment) -> list[Path]:
+    """The tables that the experiment file names.
+
+    :raises ExperimentError: it names none.
+    """
+    from ballplate.simulator.inputs.messages import refused
+
+    named = experiment.readings.named_files
+    if not named:
+        text = "names no readings; give a table, or add readings: {files: readings.csv}"
+        raise refused(experiment.source, text)
+    return [experiment.source.parent / name for name in named]

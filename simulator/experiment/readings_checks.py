@@ -1,0 +1,80 @@
+"""Checks of an experiment's `readings`: units, encodings, probes and the machine's correction."""
+
+from __future__ import annotations
+
+import codecs
+
+from ..design.lookup import References
+from ..inputs.messages import ExperimentError, Steps
+from ..inputs.quantities import LENGTH_UNITS, plain_unit
+from ..inputs.settings import hint
+from .machine_file import load_machine
+from .readings_section import CompensationSettings, ReadingsSettings
+from .structure import Sections
+
+AXES = ("x", "y", "z")
+
+
+def check_readings(sections: Sections, references: References) -> None:
+    """Report what of the readings section nothing else here has; read the file of a correction."""
+    settings, problems = sections.get("readings"), references.problems
+    if not isinstance(settings, ReadingsSettings):
+        return
+    if settings.unit is not None and plain_unit(settings.unit) not in LENGTH_UNITS:
+        text = f'unknown unit "{settings.unit}"; {hint(settings.unit, LENGTH_UNITS)}'
+        problems.add(("readings", "unit"), text)
+    if settings.encoding is not None and not is_text_encoding(settings.encoding):
+        text = f'unknown encoding "{settings.encoding}"; write for example utf-8 or cp1252'
+        problems.add(("readings", "encoding"), text)
+    if settings.columns is not None:
+        if settings.columns.z is not None and references.dimension == 2:
+            problems.add(("readings", "columns", "z"), "there are two dimensions; leave z out")
+        for axis in AXES:
+            columns = getattr(settings.columns, axis)
+            if isinstance(columns, dict):
+                _check_probes(list(columns), ("readings", "columns", axis), references)
+    offsets = settings.offsets_in_controller or {}
+    _check_probes(list(offsets), ("readings", "offsets_in_controller"), references)
+    for name, offset in offsets.items():
+        references.has_dimension(offset, ("readings", "offsets_in_controller", name))
+    if offsets and settings.coordinates not in ("ball centres", "part"):
+        text = "goes with coordinates: ball centres, or part; add it, or leave this out"
+        problems.add(("readings", "offsets_in_controller"), text)
+    _read_correction(settings, references)
+
+
+def is_text_encoding(name: str) -> bool:
+    """Whether Python knows an encoding of text by this name.
+
+    >>> is_text_encoding("cp1252"), is_text_encoding("zip"), is_text_encoding("cp 12520")
+    (True, False, False)
+    """
+    try:
+        found = codecs.lookup(name)
+        "".encode(name)
+    except (LookupError, UnicodeError, ValueError):
+        return False
+    return found.name not in ("idna", "punycode", "undefined", "unicode_escape")
+
+
+def _check_probes(names: list[str], steps: Steps, references: References) -> None:
+    for name in names:
+        if name not in references.probes:
+            text = f'unknown probe "{name}"; {hint(name, references.probes)}'
+            references.problems.add((*steps, name), text, True)
+
+
+def _read_correction(settings: ReadingsSettings, references: References) -> None:
+    """Let a correction to be taken off be that of its machine file."""
+    correction = settings.compensation
+    if not isinstance(correction, CompensationSettings):
+        return
+    steps: Steps = ("readings", "compensation", "file")
+    if references.dimension == 2:
+        text = "a machine file has 3 dimensions, but machine.volume has 2"
+        references.problems.add(steps, text)
+        return
+    try:
+        correction.of(load_machine(references.folder / correction.file))
+    except ExperimentError as error:
+        references.problems.take(error, steps)

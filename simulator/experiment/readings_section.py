@@ -1,0 +1,116 @@
+"""The keys of an experiment's `readings`: where the laboratory's tables are, and how they are
+written.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr
+
+from ..geometry.ball_layouts import Coordinates, Name
+from ..inputs.settings import Forms, NonEmpty, Settings, Text
+from ..machines.description import MachineDescription, true_volumetric
+from ..machines.protocol import TrueMachine
+
+Coordinate = Literal["scale readings", "ball centres", "part"]
+COORDINATES: tuple[Coordinate, ...] = ("scale readings", "ball centres", "part")
+
+Columns = Forms[Name, Name, Annotated[dict[Name, Name], Field(min_length=1)]]
+_COORDINATE = "its name or number, or {probe: column, …} where each probe has a column"
+
+
+class CompensationSettings(Settings):
+    """The machine's own correction that was on, to be taken off the readings."""
+
+    file: Text = Field(description="machine file (YAML) of the correction, as for ballplate map")
+
+    # What the file says; filled in when the experiment is loaded.
+    _machine: MachineDescription | None = PrivateAttr(default=None)
+
+    def of(self, machine: MachineDescription) -> None:
+        """Take the machine that the file describes."""
+        self._machine = machine
+
+    def machine(self) -> TrueMachine:
+        """What the correction added to scale readings."""
+        assert self._machine is not None
+        return true_volumetric(self._machine)
+
+
+class ColumnsSettings(Settings):
+    """Columns of a table of readings: the name in the table or the number of each, from 1.
+
+    A text that begins with = is the same in all rows.
+    """
+
+    position: Name | None = Field(None, description="names of positions; or =NAME, of all rows")
+    ball: Name | None = Field(None, description="names of balls")
+    probe: Name | None = Field(None, description="names of probes; or =NAME, of all rows")
+    x: Columns | None = Field(None, description=_COORDINATE)
+    y: Columns | None = Field(None, description=_COORDINATE)
+    z: Columns | None = Field(None, description=_COORDINATE)
+    u: Name | None = Field(None, description="standard uncertainties of each co-ordinate")
+    diameter: Name | None = Field(None, description="diameters of the balls as measured")
+
+
+class ReadingsSettings(Settings):
+    """The laboratory's readings: where they are and how they are written."""
+
+    files: Forms[Text, NonEmpty[Text], Text] | None = Field(
+        None, description="table of readings, or list of tables, for fit without READINGS"
+    )
+    columns: ColumnsSettings | None = Field(
+        None, description="which columns of the table are meant, where their names do not tell"
+    )
+    unit: Text | None = Field(
+        None, description="unit of columns that state none: mm, um, m, in or another length unit"
+    )
+    decimal: Literal["point", "comma"] | None = Field(
+        None, description="point or comma before decimals; default: found in the table"
+    )
+    separator: Literal["comma", "semicolon", "tab", "bar", "space"] | None = Field(
+        None, description="what separates columns; default: found in the table"
+    )
+    encoding: Text | None = Field(
+        None, description="encoding of the table, such as cp1250; default: UTF-8, 16 or cp1252"
+    )
+    header: Annotated[int, Field(ge=0, strict=True)] | None = Field(
+        None, description="number of the line with the names of columns, 0 without one"
+    )
+    coordinates: Coordinate | None = Field(
+        None,
+        description=(
+            "scale readings (default), ball centres, from which the measuring program has taken off"
+            " the probe's offset, or part: ball centres in a part's co-ordinate system, another in"
+            " each position"
+        ),
+    )
+    offsets_in_controller: dict[Name, Coordinates] | None = Field(
+        None,
+        description=(
+            "name → offset that the measuring program has applied to ball centres, where it is not"
+            " that of probes"
+        ),
+    )
+    compensation: Forms[Literal["on", "off"], Literal["on", "off"], CompensationSettings] | None = (
+        Field(
+            None,
+            description=(
+                "whether the machine's own correction was on; or {file: machine.yaml}, which was on"
+                " and is taken off"
+            ),
+        )
+    )
+
+    @property
+    def named_files(self) -> tuple[str, ...]:
+        """Names of the tables, as they are written."""
+        if self.files is None:
+            return ()
+        return (self.files,) if isinstance(self.files, str) else tuple(self.files)
+
+
+def no_settings() -> ReadingsSettings:
+    """The settings of an experiment that says nothing of its readings."""
+    return ReadingsSettings.model_validate({})

@@ -1,0 +1,77 @@
+"""Scale readings from what measuring programs write: centres of balls, in the machine's
+co-ordinates or in those of a part, with the machine's own correction or without.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..design.arrays import Design, Readings
+from ..estimation.consensus import consensus_motion
+from ..experiment.readings_section import CompensationSettings, ReadingsSettings
+from ..geometry.motions import fixes_pose
+from ..inputs.messages import refused
+from ..inputs.settings import listing
+from ..machines.protocol import Array
+from .generate import NoReadingError, scale_readings
+from .gross_errors import AGAINST_DRAWING, ball_pitches
+
+
+def controller_offsets(design: Design, settings: ReadingsSettings) -> Array:
+    """Offsets (l, d) that the measuring program has applied to ball centres."""
+    offsets = design.probes.offsets.copy()
+    for name, offset in (settings.offsets_in_controller or {}).items():
+        offsets[design.probes.names.index(name)] = offset
+    return offsets
+
+
+def as_scale_readings(
+    design: Design, readings: Readings, x: Array, settings: ReadingsSettings, file: object
+) -> Array:
+    """Scale readings (m, d) of co-ordinates (m, d) of the kind that the settings state.
+
+    Ball centres lose the offset that the controller has. Part co-ordinates are first put where the
+    nominal pose of each position has its balls: the estimated pose takes up the rest, and the
+    machine's errors are evaluated as far off as the artefact stood from its nominal pose. What the
+    machine's correction has added is taken off last, where it is stated.
+
+    :raises ExperimentError: a position has too few balls for its part co-ordinates to be placed, or
+        the correction is too large to be taken off.
+    """
+    if settings.coordinates == "part":
+        x = _in_machine(design, readings, x, file)
+    offsets = controller_offsets(design, settings)[readings.probe]
+    if settings.coordinates in ("ball centres", "part"):
+        x = x - offsets
+    correction = settings.compensation
+    if isinstance(correction, CompensationSettings):
+        machine = correction.machine()
+        try:
+            x = scale_readings(machine.model, x + offsets, machine.a, offsets)
+        except NoReadingError:
+            text = f"the correction of {correction.file} is too large to be taken off"
+            raise refused(file, text) from None
+    return x
+
+
+def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> Array:
+    """Part co-ordinates moved to where the nominal poses have the balls."""
+    pitch, placed = ball_pitches(design), np.empty_like(x)
+    poor = []
+    for k in np.unique(readings.position):
+        rows = np.flatnonzero(readings.position == k)
+        nominal = design.balls.places[readings.ball[rows]]
+        there = nominal @ design.positions.rotations[k].T + design.positions.origins[k]
+        if not fixes_pose(nominal):
+            poor.append(design.positions.names[k])
+            continue
+        reach = AGAINST_DRAWING * pitch[readings.ball[rows]]
+        rotation, origin, _ = consensus_motion(x[rows], there, reach)
+        placed[rows] = x[rows] @ rotation.T + origin
+    if poor:
+        text = (
+            f"too few balls were read in {listing(poor)} to place part co-ordinates; give these in"
+            " the machine's co-ordinates"
+        )
+        raise refused(file, text)
+    return placed

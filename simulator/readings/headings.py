@@ -1,0 +1,355 @@
+"""What the headings of a table of readings name: roles, co-ordinates of probes, and units."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property, lru_cache
+
+from ..experiment.readings_section import ColumnsSettings
+from ..inputs.quantities import plain_unit
+from ..inputs.settings import hint, listing, shorten
+
+AXES = ("x", "y", "z")
+# Roles of columns of text.
+TEXTS = ("position", "ball", "probe")
+
+# Characters of what may be a heading.
+LONGEST = 100
+
+# How headings write units that `LENGTH_UNITS` has under another name.
+UNITS: Mapping[str, str] = {
+    **{unit: unit for unit in ("m", "dm", "cm", "mm", "um", "nm", "in")},
+    **dict.fromkeys(("inch", "inches", "zoll", '"', "″"), "in"),
+    **dict.fromkeys(("micron", "microns", "micrometre", "micrometer", "mikrometer"), "um"),
+    **dict.fromkeys(("millimetre", "millimeter", "millimetres", "millimeters"), "mm"),
+    **dict.fromkeys(("metre", "meter", "metres", "meters"), "m"),
+}
+_UNIT = "|".join(re.escape(unit) for unit in sorted(UNITS, key=len, reverse=True))
+_HEADING = re.compile(
+    rf"(?P<name>.*?)(?:[\s_,;:]+|\s*(?=[\[(/]))(?:in\s+)?[\[(/]?\s*(?P<unit>{_UNIT})\.?\s*[\])]?"
+)
+
+# Words beside an axis that say no more than that it is what was measured.
+MEASURED = frozenset(
+    (
+        *("coordinate", "coordinates", "co", "ordinate", "koordinate", "coord", "value", "wert"),
+        *("actual", "act", "ist", "istwert", "measured", "meas", "gemessen", "messwert"),
+        *("centre", "center", "centro", "mitte", "mittelpunkt"),
+    )
+)
+WORDS: Mapping[str, tuple[str, ...]] = {
+    "position": ("position", "pos", "placement", "setup", "set up", "lage", "aufstellung"),
+    "ball": ("ball", "sphere", "kugel", "ball name", "sphere name", "kugelname", "bille", "esfera"),
+    "probe": ("probe", "stylus", "tip", "taster", "taststift", "probe name", "palpeur", "palpador"),
+    "u": ("u", "uncertainty", "standard uncertainty", "unsicherheit", "standardunsicherheit"),
+    "diameter": ("diameter", "diam", "dia", "durchmesser", "sphere diameter", "ball diameter"),
+}
+# Only where no column has one of the words above.
+LESS_CLEAR: Mapping[str, tuple[str, ...]] = {
+    "position": ("position no", "position number", "lage nr", "pos nr", "pos no"),
+    "ball": (
+        *("ball no", "ball number", "ball id", "sphere no", "kugel nr", "kugelnummer", "feature"),
+        *("element", "merkmal", "name", "label", "id", "no", "nr", "number", "nummer", "punkt"),
+    ),
+    "probe": ("stylus name", "tip name", "sensor", "probe no", "stylus no", "taster nr", "tip no"),
+    "diameter": ("d", "ø", "actual diameter", "diameter actual", "durchmesser ist"),
+}
+
+
+@lru_cache(maxsize=100_000)
+def folded(text: str) -> str:
+    """A text without what people write differently: case, signs between words, zeros before
+    numbers.
+
+    >>> folded("Z_low"), folded("z  LOW"), folded("P-007"), folded("p7")
+    ('z low', 'z low', 'p 7', 'p 7')
+    """
+    plain = unicodedata.normalize("NFKC", text).casefold()
+    words = re.findall(r"[^\W\d_]+|\d+", plain)
+    return " ".join(word.lstrip("0") or "0" if word.isdigit() else word for word in words)
+
+
+def heading(cell: str) -> tuple[str, str | None]:
+    """The name of a column, folded, and the unit that its heading states.
+
+    >>> [heading(cell) for cell in ("x_mm", "X [µm]", "Y/mm", "z in inch", "x in", "x")]
+    [('x', 'mm'), ('x', 'um'), ('y', 'mm'), ('z', 'in'), ('x', 'in'), ('x', None)]
+    """
+    if len(cell) > LONGEST:
+        return "", None
+    match = _HEADING.fullmatch(plain_unit(cell).casefold())
+    if match is None or not match["name"].strip():
+        return folded(cell), None
+    return folded(match["name"]), UNITS[match["unit"]]
+
+
+def unit_of(cell: str) -> str | None:
+    """The unit that a cell or a line states by itself, in brackets or not; None where none.
+
+    >>> unit_of("[mm]"), unit_of("inch"), unit_of("12")
+    ('mm', 'in', None)
+    """
+    return UNITS.get(plain_unit(cell).strip().strip("[]() ").casefold())
+
+
+class HeadingError(ValueError):
+    """A line that names columns, but not as it has to; the text says what is wrong."""
+
+
+@dataclass(frozen=True)
+class HeadedColumn:
+    """A column by its place, with the unit in its heading; or the `constant` that all rows have."""
+
+    place: int
+    unit: str | None = None
+    constant: str | None = None
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns of the co-ordinates of one reading: `axes` and what their headings say of them."""
+
+    axes: tuple[HeadedColumn, ...]
+    texts: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Headings:
+    """Columns of a table: by role, and of co-ordinates in `groups`, several in a wide table.
+
+    `cells` are the headings, none in a table without; `unused` those of columns that nothing is
+    taken from.
+    """
+
+    roles: Mapping[str, HeadedColumn]
+    groups: tuple[Group, ...]
+    cells: tuple[str, ...]
+
+    @cached_property
+    def used(self) -> frozenset[int]:
+        """Places of the columns that something is taken from."""
+        columns = [*self.roles.values(), *(axis for group in self.groups for axis in group.axes)]
+        return frozenset(column.place for column in columns if column.constant is None)
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        return tuple(cell for i, cell in enumerate(self.cells) if cell and i not in self.used)
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """What headings may name: probes and positions, by their names, columns `stated`, and `further`
+    ones of numbers, with the units that each may have.
+    """
+
+    axes: tuple[str, ...]
+    probes: tuple[str, ...]
+    positions: tuple[str, ...]
+    stated: ColumnsSettings | None = None
+    further: Mapping[str, Mapping[str, Fraction]] = field(default_factory=dict)
+
+    @cached_property
+    def beside_axes(self) -> dict[str, dict[str, str]]:
+        """What a heading may say besides an axis, folded, and which texts of a reading that is."""
+        found: dict[str, dict[str, str]] = {"": {}}
+        probes = {folded(name): {"probe": name} for name in self.probes}
+        positions = {folded(name): {"position": name} for name in self.positions}
+        found |= {word: texts for word, texts in (probes | positions).items() if word}
+        if len(probes) * len(positions) <= 10_000:
+            for one, texts in positions.items():
+                for other, more in probes.items():
+                    found |= {f"{one} {other}": texts | more, f"{other} {one}": texts | more}
+        return found
+
+
+def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
+    """The columns that a line names; None where it does not name co-ordinates.
+
+    :raises HeadingError: it does, but in more than one way, or lacks what is stated.
+    """
+    parsed = [heading(cell) for cell in cells]
+    stated = words.stated
+    groups = _stated_groups(cells, words) or _found_groups(parsed, words)
+    if groups is None:
+        return None
+    taken = {axis.place for group in groups for axis in group.axes}
+    roles: dict[str, HeadedColumn] = {}
+    for role in (*TEXTS, "u", "diameter"):
+        name = getattr(stated, role, None)
+        if name is not None:
+            roles[role] = _stated_column(name, cells)
+            taken.add(roles[role].place)
+    for name, units in words.further.items():
+        found = {
+            i: unit for i, cell in enumerate(cells) if (unit := _unit_of(cell, name)) is not None
+        }
+        if len(found) > 1:
+            raise HeadingError(_which(name, [cells[i] for i in found]))
+        for i, unit in found.items():
+            if unit not in units:
+                text = f'the unit in the column "{shorten(cells[i])}" is not known'
+                raise HeadingError(f"{text}; write {listing(units)}")
+            roles[name] = HeadedColumn(i, unit)
+            taken.add(i)
+    for words_of in (WORDS, LESS_CLEAR):
+        for role, known in words_of.items():
+            if role in roles:
+                continue
+            places = [i for i, (name, _) in enumerate(parsed) if name in known and i not in taken]
+            if len(places) > 1:
+                raise HeadingError(_which(role, [cells[i] for i in places]))
+            if places:
+                roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
+                taken.add(places[0])
+    return Headings(roles, groups, tuple(cells))
+
+
+def _unit_of(cell: str, name: str) -> str | None:
+    """The unit of a heading that names a further column, empty without one; None if it does not.
+
+    >>> _unit_of("t_scales_degC", "t_scales"), _unit_of("T scales [°C]", "t_scales")
+    ('degC', 'degC')
+    """
+    if folded(cell[:LONGEST]) == folded(name):
+        return ""
+    match = re.fullmatch(
+        r"(.+?)(?:[\s_]+|\s*(?=[\[(/]))[\[(/]?\s*([^\s_\[\]()/]+)\s*[\])]?", cell[:LONGEST]
+    )
+    if match is None or folded(match[1]) != folded(name):
+        return None
+    return match[2].replace("°", "deg")
+
+
+def numbered_columns(words: Vocabulary, count: int) -> Headings:
+    """The columns of a table without headings, all of them stated by their numbers.
+
+    :raises HeadingError: some are not.
+    """
+    cells = [""] * count
+    groups = _stated_groups(cells, words)
+    if groups is None:
+        raise HeadingError(
+            "without headings, give the numbers of columns: readings: {columns: {position: 1, ball:"
+            " 2, x: 3, y: 4, z: 5}}"
+        )
+    roles = {
+        role: _stated_column(name, cells)
+        for role in (*TEXTS, "u", "diameter")
+        if (name := getattr(words.stated, role, None)) is not None
+    }
+    return Headings(roles, groups, ())
+
+
+def _which(role: str, cells: Sequence[str]) -> str:
+    named = listing(f'"{shorten(cell)}"' for cell in cells)
+    return (
+        f"the columns {named} could all be {role}; say which: readings: {{columns: {{{role}:"
+        f" {shorten(cells[0])}}}}}"
+    )
+
+
+def _stated_column(name: str, cells: Sequence[str]) -> HeadedColumn:
+    """The column that the experiment file names, exactly, without its unit, or by its number.
+
+    :raises HeadingError: there is none.
+    """
+    if name.startswith("="):
+        return HeadedColumn(-1, constant=name[1:].strip())
+    exact = [i for i, cell in enumerate(cells) if cell == name]
+    alike = [i for i, cell in enumerate(cells) if name and heading(cell)[0] == folded(name)]
+    for places in (exact, alike):
+        if len(places) > 1:
+            raise HeadingError(f'{len(places)} columns are called "{name}"; give the number of one')
+        if places:
+            return HeadedColumn(places[0], heading(cells[places[0]])[1])
+    if re.fullmatch("[0-9]{1,9}", name) and 1 <= int(name) <= len(cells):
+        return HeadedColumn(int(name) - 1, heading(cells[int(name) - 1])[1])
+    there = hint(name, filter(None, cells))
+    raise HeadingError(f'there is no column "{shorten(name)}"; {there}')
+
+
+def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
+    """Groups of co-ordinates that the experiment file names columns of; None where it names none.
+
+    :raises HeadingError: it names some that are not there, or not all.
+    """
+    stated = {axis: getattr(words.stated, axis, None) for axis in words.axes}
+    given = {axis: columns for axis, columns in stated.items() if columns is not None}
+    if not given:
+        return None
+    of_probes = [set(columns) if isinstance(columns, dict) else {""} for columns in given.values()]
+    if any(probes != of_probes[0] for probes in of_probes):
+        raise HeadingError("columns of x, y and z are of different probes; name the same")
+    parsed = [heading(cell) for cell in cells]
+    groups = []
+    for probe in sorted(of_probes[0]):
+        axes = []
+        for axis in words.axes:
+            named = given.get(axis, axis)
+            name = named[probe] if isinstance(named, dict) else named
+            places = [i for i, (word, _) in enumerate(parsed) if word == axis]
+            if axis not in given and len(places) == 1:
+                axes.append(HeadedColumn(places[0], parsed[places[0]][1]))
+            elif name.startswith("="):
+                raise HeadingError(f"{axis} is a co-ordinate of each reading; name its column")
+            else:
+                axes.append(_stated_column(name, cells))
+        groups.append(Group(tuple(axes), {"probe": probe} if probe else {}))
+    return tuple(groups)
+
+
+def _found_groups(
+    parsed: Sequence[tuple[str, str | None]], words: Vocabulary
+) -> tuple[Group, ...] | None:
+    """Groups of co-ordinates by what headings say besides an axis; None where none is complete.
+
+    :raises HeadingError: two columns could be the same co-ordinate.
+    """
+    found: dict[str, dict[str, list[int]]] = {}
+    for i, (name, _) in enumerate(parsed):
+        parts = name.split()
+        for k, axis in enumerate(parts):
+            others = [*parts[:k], *parts[k + 1 :]]
+            beside = " ".join(others)
+            if beside not in words.beside_axes:
+                beside = " ".join(word for word in others if word not in MEASURED)
+            if axis in words.axes and beside in words.beside_axes:
+                found.setdefault(beside, {}).setdefault(axis, []).append(i)
+    groups = {beside: axes for beside, axes in found.items() if set(axes) == set(words.axes)}
+    if not groups:
+        return None
+    for axes in groups.values():
+        for axis, places in axes.items():
+            if len(places) > 1:
+                raise HeadingError(_which(axis, [parsed[i][0] for i in places]))
+    if "" in groups and len(groups) > 1:
+        names = listing(beside for beside in groups if beside)
+        raise HeadingError(
+            f"there are co-ordinates by themselves and of {names}; name those that are meant under"
+            " readings: columns"
+        )
+    if "" not in groups and len(groups) < len(found):
+        names = listing(beside or "the others" for beside in found if beside not in groups)
+        text = f"not all of {listing(words.axes)} are there of {names}"
+        raise HeadingError(f"{text}; add the others, or name those meant under readings: columns")
+    return tuple(
+        Group(
+            tuple(HeadedColumn(axes[axis][0], parsed[axes[axis][0]][1]) for axis in words.axes),
+            words.beside_axes[beside],
+        )
+        for beside, axes in groups.items()
+    )
+
+
+def missing_columns(cells: Iterable[str], missing: Sequence[str]) -> str:
+    """What to say of a table that lacks columns: those there are, and what to write."""
+    named = listing((f'"{shorten(cell)}"' for cell in cells if cell), 12)
+    mapping = ", ".join(f"{role}: …" for role in missing)
+    return (
+        f"columns found: {named or 'none'}; missing: {listing(missing)}; name them in the"
+        f" experiment file: readings: {{columns: {{{mapping}}}}}"
+    )

@@ -1,0 +1,175 @@
+"""Rows of readings from one table or several, plain CSV files or any other, with the names and the
+co-ordinates that the design has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from ..design.arrays import Design
+from ..experiment.readings_section import ReadingsSettings
+from ..geometry.motions import AXIS_NAMES
+from ..inputs.messages import ExperimentError, Message
+from ..inputs.quantities import format_length
+from ..inputs.settings import listing
+from ..inputs.tables import FileRow, header_names, read_table
+from ..inputs.yamltree import GivenText
+from ..machines.protocol import Array
+from .any_table import TableRows, read_any_table, text_of
+from .coordinate_kinds import controller_offsets
+from .headings import Vocabulary
+from .name_matching import with_known_names
+
+Source = Path | GivenText
+Units = Mapping[str, Mapping[str, Fraction]]
+
+# A diameter is told that is further from others of its ball than so many times their usual
+# distance, and than this (m).
+TIMES_USUAL = 10.0
+LEAST_DEVIATION = 1e-6
+# Readings of a ball that its median diameter is of.
+ENOUGH = 3
+
+
+@dataclass(frozen=True)
+class SourceRows:
+    """Rows of all tables; `told` is how they were read and what was matched."""
+
+    rows: tuple[FileRow, ...]
+    told: tuple[str, ...]
+
+
+def source_rows(
+    sources: Sequence[Source],
+    design: Design,
+    settings: ReadingsSettings,
+    messages: list[Message],
+    is_possible: Callable[[Array], bool],
+    units: Units,
+    empty: Collection[str] = (),
+) -> SourceRows:
+    """Rows of tables of readings, with the names of the design as far as they can be matched.
+
+    Messages about rows of plain tables are added to `messages`, so that more can be said at once.
+
+    :raises ExperimentError: a table that cannot be read, or names that could be several.
+    """
+    names = {
+        "position": design.positions.names,
+        "ball": design.balls.names,
+        "probe": design.probes.names,
+    }
+    tables = [
+        read_source(source, names, settings, messages, is_possible, design.dimension, units, empty)
+        for source in sources
+    ]
+    rows = [row for table in tables for row in table.rows]
+    if messages:
+        return SourceRows(tuple(rows), ())
+    diameters = [d for table in tables for d in table.diameters]
+
+    def places(own: Sequence[FileRow]) -> Array:
+        return _places(own, design, settings)
+
+    named, matched, asked = with_known_names(
+        rows, design, None if settings.coordinates == "part" else places
+    )
+    if asked:
+        raise ExperimentError([rows[0].mark.message("", text) for text in asked])
+    told = [text for table in tables for text in table.told]
+    if len(diameters) == len(rows):
+        told += _about_diameters(named, np.array(diameters))
+    return SourceRows(named, (*told, *matched))
+
+
+def read_source(
+    source: Source,
+    names: Mapping[str, Sequence[str]],
+    settings: ReadingsSettings,
+    messages: list[Message],
+    is_possible: Callable[[Array], bool],
+    dimension: int,
+    units: Units,
+    empty: Collection[str] = (),
+) -> TableRows:
+    """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns,
+    and cells of the columns `empty` may be so in plain files.
+
+    :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
+        `messages`.
+    """
+    axes = AXIS_NAMES[:dimension]
+    text, encoding = text_of(source, settings.encoding)
+    stated = (settings.columns, settings.separator, settings.decimal, settings.header)
+    wrong: list[Message] = []
+    rows: tuple[FileRow, ...] = ()
+    looks_plain = encoding in ("", "UTF-8") and header_names(text) & set(axes)
+    if looks_plain and all(one is None for one in stated):
+        # One probe need not be named.
+        defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
+        texts = ["position", "ball", "probe"]
+        try:
+            rows = read_table(
+                text, texts, axes, ["u", *units], wrong, defaults, np.nan, units, empty
+            )
+        except ExperimentError as error:
+            wrong = list(error.messages)
+        if not wrong:
+            return TableRows(rows)
+    words = Vocabulary(
+        axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units
+    )
+    try:
+        return read_any_table(text, encoding, words, settings, is_possible)
+    except ExperimentError:
+        if not wrong:
+            raise
+    if not rows:
+        raise ExperimentError(wrong)
+    messages += wrong
+    return TableRows(rows)
+
+
+def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings) -> Array:
+    """Places (m, d) of the balls of rows, as far as the probe is known."""
+    x = np.array([row.lengths[: design.dimension] for row in rows])
+    added = design.probes.offsets
+    if settings.coordinates == "ball centres":
+        added = added - controller_offsets(design, settings)
+    index = {name: k for k, name in enumerate(design.probes.names)}
+    probe = np.array([index.get(row.texts[2], -1) for row in rows])
+    return np.asarray(x + np.where((probe >= 0)[:, None], added[probe], 0.0))
+
+
+def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
+    """In words which diameters of balls as measured are odd; nothing where none is stated."""
+    known = np.flatnonzero(~np.isnan(diameters))
+    if not len(known):
+        return []
+    by_ball: dict[str, list[int]] = {}
+    for i in known.tolist():
+        by_ball.setdefault(rows[i].texts[1], []).append(i)
+    usual = float(np.median(diameters[known]))
+    off = np.zeros(len(rows))
+    for own in by_ball.values():
+        off[own] = diameters[own] - (np.median(diameters[own]) if len(own) >= ENOUGH else usual)
+    limit = max(TIMES_USUAL * 1.4826 * float(np.median(np.abs(off[known]))), LEAST_DEVIATION)
+    odd = known[np.abs(off[known]) > limit]
+    odd = odd[np.argsort(-np.abs(off[odd]), kind="stable")]
+    text = f"sphere diameters, {format_length(float(f'{usual:.6g}'))} in the middle, are not used"
+    if not len(odd):
+        return [f"{text}; none is odd"]
+    named = listing(
+        (
+            f"{rows[i].texts[1]} in {rows[i].texts[0]} (line {rows[i].mark.line}):"
+            f" {format_length(float(f'{diameters[i]:.6g}'))}"
+            for i in odd.tolist()
+        ),
+        5,
+    )
+    return [f"{text}; odd: {named}: check these readings for dirt, or for another feature"]

@@ -1,0 +1,303 @@
+"""Tables that could mean two things are refused with the question; whatever is read has one
+meaning.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.readings.any_table import TableRows
+from ballplate.simulator.readings.reading_files import far_outside
+from ballplate.simulator.readings.reading_sources import read_source
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+DESIGN = Path("designs/quickstart.yaml")
+HEAD = "position;ball;probe;x_mm;y_mm;z_mm\n"
+
+
+@cache
+def quickstart() -> tuple[Experiment, Design]:
+    (found,) = load(DESIGN)
+    return found, lay_out(found)
+
+
+@pytest.fixture
+def experiment() -> Experiment:
+    return quickstart()[0]
+
+
+def read(
+    text: str | bytes, experiment: Experiment, path: Path | None = None, **said: object
+) -> TableRows:
+    """The rows of a table, without a look at its names."""
+    design = quickstart()[1]
+    names = {
+        "position": design.positions.names,
+        "ball": design.balls.names,
+        "probe": design.probes.names,
+    }
+    if path is not None:
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    source = GivenText("t.csv", str(text)) if path is None else path
+    stated = experiment.with_readings(said).readings
+    wrong: list[object] = []
+
+    def is_possible(x: np.ndarray) -> bool:
+        return not far_outside(x, design).any()
+
+    found = read_source(source, names, stated, wrong, is_possible, 3, {})  # type: ignore[arg-type]
+    if wrong:
+        raise ExperimentError(wrong)  # type: ignore[arg-type]
+    return found
+
+
+def numbers(found: TableRows) -> list[float]:
+    return [round(1e3 * x, 9) for row in found.rows for x in row.lengths[:3]]
+
+
+def asked(
+    text: str | bytes, experiment: Experiment, path: Path | None = None, **said: object
+) -> str:
+    with pytest.raises(ExperimentError) as refused:
+        read(text, experiment, path, **said)
+    return str(refused.value)
+
+
+# In micrometres both a thousandth and the whole may be inside the machine.
+EITHER = HEAD.replace("_mm", "_um") + "z low;r1c1;down;612,345;100,234;250,001\n"
+
+
+def test_decimals_that_could_be_thousands_are_asked_for(experiment: Experiment) -> None:
+    assert '"612,345" could be 612.345 or 612345' in asked(EITHER, experiment)
+    assert "decimal: comma" in asked(EITHER, experiment)
+    said = read(EITHER, experiment, decimal="comma")
+    assert numbers(said) == [0.612345, 0.100234, 0.250001]
+    # So could points where no commas separate columns.
+    assert "could be 612.345" in asked(EITHER.replace(",", "."), experiment)
+
+
+@pytest.mark.parametrize("other", ["0,001", "1012,345", "12,34", "1234", "-0,5", "12,3456"])
+def test_one_number_that_tells_is_enough(experiment: Experiment, other: str) -> None:
+    found = read(EITHER + f"z low;r1c2;down;{other};100,234;250,001\n", experiment)
+    assert numbers(found)[3] == pytest.approx(float(other.replace(",", ".")) / 1e3)
+
+
+def test_thousands_that_would_be_outside_the_machine_are_none(experiment: Experiment) -> None:
+    """612,345 mm is no place in a machine of one metre if it is 612 m."""
+    assert numbers(read(EITHER.replace("_um", "_mm"), experiment)) == [612.345, 100.234, 250.001]
+
+
+@pytest.mark.parametrize(
+    "cell", ["1.012,5", "1,012.5", "1'012.5", "1 012,5", "1\u00a0012,5", "1.012.345"]
+)
+def test_signs_between_thousands_are_refused_in_words(experiment: Experiment, cell: str) -> None:
+    text = HEAD + f"z low;r1c1;down;{cell};100,2;250\nz low;r1c2;down;5,25;100,2;250\n"
+    assert f'2:1: "{" ".join(cell.split())}" has signs between thousands' in asked(text, experiment)
+
+
+def test_two_kinds_of_decimals(experiment: Experiment) -> None:
+    text = HEAD + "z low;r1c1;down;1,5;2,5;3,5\nz low;r1c2;down;4,5;2.25;3,5\n"
+    assert '3:1: "2.25" has a decimal point, and others have decimal commas' in asked(
+        text, experiment
+    )
+
+
+def test_commas_that_separate_columns_and_decimals(experiment: Experiment) -> None:
+    """With as many further columns as there are decimals, every row has the right width."""
+    text = (
+        "position,ball,probe,x [mm],y [mm],z [mm],dx,dy,dz\n"
+        + "z low,r1c1,down,612,345,100,234,250,1\n" * 2
+    )
+    assert "perhaps decimals too" in asked(text, experiment)
+    assert numbers(read(text, experiment, decimal="point"))[:3] == [612, 345, 100]
+    short = text.replace(",dx,dy,dz", "")
+    assert "9 columns instead of 6" in asked(short, experiment)
+
+
+def test_commas_with_blanks_behind_them(experiment: Experiment) -> None:
+    """They separate columns, also of whole numbers."""
+    text = "unit: mm\nposition, ball, probe, x, y, z\nhigh, 17, down, 612, 345, 100\n"
+    (row,) = read(text, experiment).rows
+    assert row.texts == ("high", "17", "down") and row.lengths[:3] == (0.612, 0.345, 0.1)
+
+
+def test_two_columns_of_one_name(experiment: Experiment) -> None:
+    text = "position;ball;probe;x_mm;x actual [mm];y_mm;z_mm\nz low;r1c1;down;1,5;1,6;2;3\n"
+    assert "could all be x; say which" in asked(text, experiment)
+    found = read(text, experiment, columns={"x": "x actual"})
+    assert numbers(found) == [1.6, 2.0, 3.0]
+
+
+def test_lengths_without_a_unit(experiment: Experiment) -> None:
+    text = HEAD.replace("_mm", "") + "z low;r1c1;down;1,5;2,5;3\n"
+    assert 'no unit is stated for the columns "x", "y", "z"' in asked(text, experiment)
+    assert numbers(read(text, experiment, unit="in"))[0] == pytest.approx(38.1)
+    both = "unit: inch\n" + text
+    assert numbers(read(both, experiment))[0] == pytest.approx(38.1)
+    assert "lengths are in in, the experiment file mm" in asked(both, experiment, unit="mm")
+
+
+def test_columns_that_are_missing_are_named_beside_those_there(experiment: Experiment) -> None:
+    text = "Lage;Taster;X [mm];Y [mm];Z [mm]\nz low;down;1,5;2,5;3\n"
+    assert (
+        'columns found: "Lage", "Taster", "X [mm]", "Y [mm]", "Z [mm]"; missing: ball; name them in'
+        " the experiment file: readings: {columns: {ball: …}}"
+    ) in asked(text, experiment)
+    assert 'columns found: "A", "B", "C"; missing: x, y, z' in asked("A;B;C\n1;2;3\n", experiment)
+
+
+def test_columns_by_name_number_and_constant(experiment: Experiment) -> None:
+    text = "A;B;C;D;E\n17;1,5;2,5;3,5;x\n"
+    columns = {"position": "=z low", "ball": "A", "probe": "=down", "x": "B", "y": "C", "z": "4"}
+    (row,) = read(text, experiment, columns=columns, unit="mm").rows
+    assert row.texts == ("z low", "17", "down") and row.lengths[:3] == (0.0015, 0.0025, 0.0035)
+    bare = "17 1.5 2.5 3.5\n18 4.5 5.5 6.5\n"
+    columns |= {"ball": "1", "x": "2", "y": "3", "z": "4"}
+    assert numbers(read(bare, experiment, columns=columns, unit="mm", header=0))[3] == 4.5
+    assert 'there is no column "F"' in asked(text, experiment, columns=columns | {"x": "F"})
+
+
+def test_lines_among_the_rows_that_say_something(experiment: Experiment) -> None:
+    """A title in between would make the rows below those of another position."""
+    rows = "r1c1;down;1,5;2,5;3,5\n"
+    text = "Position: z low\nball;probe;x_mm;y_mm;z_mm\n" + rows
+    assert read(text, experiment).rows[0].texts[0] == "z low"
+    assert "a line without co-ordinates among the rows" in asked(
+        text + "Position: z high\n" + rows, experiment
+    )
+    full = HEAD + "z low;r1c1;down;1,5;2,5;3,5\nz high;;;;;\nz low;r1c2;down;1,5;2,5;3,5\n"
+    assert "a line without co-ordinates among the rows" in asked(full, experiment)
+
+
+def test_rows_that_were_cut_off(experiment: Experiment) -> None:
+    assert "instead of 6" in asked(
+        HEAD + "z low;r1c1;down;1,5;2,5;3,5\nz low;r1c2;down;1,5;2", experiment
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"PK\x03\x04\x14\x00", "is a workbook"),
+        (b"\x00\x01\x02\x03", "control characters"),
+        (b"\x00a\x01", "is no text"),
+        ((HEAD + "z low;r1c1;down;\x07;1;2\n").encode(), "control characters"),
+        (HEAD.encode(), "no rows below"),
+        (b"\xff\xfe", "the file is empty"),
+        (b"", "the file is empty"),
+        (b"nothing of the kind\n", "missing: x, y, z"),
+    ],
+)
+def test_files_that_are_no_tables(
+    experiment: Experiment, tmp_path: Path, content: bytes, told: str
+) -> None:
+    assert told in asked(content, experiment, tmp_path / "t.csv")
+
+
+def test_an_encoding_that_is_stated(experiment: Experiment, tmp_path: Path) -> None:
+    text = HEAD.replace("ball", "kulička") + "z low;r1c1;down;1,5;2,5;3,5\n"
+    columns = {"ball": "kulička"}
+    path = tmp_path / "t.csv"
+    found = read(text.encode("cp1250"), experiment, path, encoding="cp1250", columns=columns)
+    assert found.rows[0].texts[1] == "r1c1"
+    assert "is not in the encoding utf-8" in asked(
+        text.encode("cp1250"), experiment, path, encoding="utf-8"
+    )
+    marked = read(text.encode("utf-8-sig"), experiment, path, encoding="utf-8", columns=columns)
+    assert marked.rows[0].texts[1] == "r1c1"
+
+
+FORMS = st.sampled_from([(";", ","), (";", "."), ("\t", ","), ("\t", "."), ("|", ","), (",", ".")])
+VALUES = st.integers(-99_999_999, 999_999_999)
+NAMES = st.text("abcXYZ 0123456789-_äµ.,;'\"", min_size=1, max_size=8).filter(
+    lambda name: name.strip() == name and name[0] not in "#'=-"
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    FORMS,
+    st.lists(st.tuples(NAMES, NAMES, VALUES, VALUES, VALUES), min_size=1, max_size=5),
+    st.integers(0, 6),
+    st.sampled_from(["x_mm", "X [mm]", "x/mm", "x in mm"]),
+    st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
+)
+@example((";", ","), [("a", "b", 612345, 100234, 250001)], 3, "x_mm", "utf-8")
+def test_whatever_is_read_is_what_was_written(
+    form: tuple[str, str],
+    rows: list[tuple[str, str, int, int, int]],
+    digits: int,
+    head: str,
+    encoding: str,
+) -> None:
+    """A table that the reader takes has the numbers and names that were written, whatever its
+    form.
+    """
+    experiment, _ = quickstart()
+    separator, sign = form
+
+    def quoted(name: str) -> str:
+        return '"' + name.replace('"', '""') + '"' if any(c in name for c in '",;|\t') else name
+
+    def written(value: int) -> str:
+        text = f"{abs(value):0{digits + 1}}"
+        whole, part = (text, "") if not digits else (text[:-digits], text[-digits:])
+        return ("-" if value < 0 else "") + whole + (sign + part if part else "")
+
+    heads = ["position", "ball", "probe", *(head.replace("x", a).replace("X", a) for a in "xyz")]
+    lines = [separator.join(heads)]
+    lines += [
+        separator.join([quoted(one), quoted(two), "down", *map(written, xyz)])
+        for one, two, *xyz in rows
+    ]
+    path = Path(TMP) / "t.csv"
+    try:
+        found = read(("\n".join(lines) + "\n").encode(encoding), experiment, path)
+    except ExperimentError:
+        return
+    assert [row.texts[:2] for row in found.rows] == [(one, two) for one, two, *_ in rows]
+    expected = [value / 10**digits for _, _, *xyz in rows for value in xyz]
+    assert numbers(found) == pytest.approx(expected, rel=1e-12, abs=1e-9)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.one_of(
+        st.binary(max_size=200),
+        st.text('positionbalprexyz_m;,|\t\n "0123456789.-#[]', max_size=200).map(str.encode),
+        st.tuples(st.binary(max_size=6), st.integers(0, 120)).map(
+            lambda both: (
+                (HEAD + "z low;r1c1;down;1,5;2,5;3,5\n" * 2).encode()[: both[1]]
+                + both[0]
+                + (HEAD + "z low;r1c1;down;1,5;2,5;3,5\n" * 2).encode()[both[1] :]
+            )
+        ),
+    )
+)
+def test_no_table_makes_it_fail(content: bytes) -> None:
+    experiment, _ = quickstart()
+    try:
+        found = read(content, experiment, Path(TMP) / "t.csv")
+    except ExperimentError as error:
+        assert error.messages
+        return
+    assert found.rows
+
+
+TMP = ""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    global TMP
+    TMP = str(tmp_path_factory.mktemp("tables"))
