@@ -25,7 +25,7 @@ from ballplate.results.variance_components.components import (
     told_apart,
 )
 from ballplate.results.variance_components.groupings import GROUPINGS, Grouping
-from ballplate.results.variance_components.groups import Group, groups_of, reweighted
+from ballplate.results.variance_components.groups import ObservationGroup, groups_of, reweighted
 from ballplate.results.variance_components.restricted_likelihood import (
     at_ratios,
     estimated_ratios,
@@ -75,7 +75,7 @@ def with_errors(left: Leftover, errors: Real) -> Leftover:
     return replace(left, residual=left.of(errors[:, None])[:, 0])
 
 
-def variances(groups: tuple[Group, ...], ratios: Real, count: int) -> Real:
+def variances(groups: tuple[ObservationGroup, ...], ratios: Real, count: int) -> Real:
     """The variance of each whitened row."""
     found = np.ones(count)
     for group, ratio in zip(groups, ratios, strict=True):
@@ -145,14 +145,14 @@ def test_the_information_is_that_of_the_dense_projector(design: Design, left: Le
             assert at.information[i, j] == pytest.approx(expected, rel=1e-7, abs=1e-9)
 
 
-def components(left: Leftover, groups: tuple[Group, ...]) -> list[VarianceComponent]:
+def components(left: Leftover, groups: tuple[ObservationGroup, ...]) -> list[VarianceComponent]:
     return judged(told_apart(group_sums(left, groups), groups))
 
 
 def test_of_one_group_the_interval_is_that_of_chi_squared(left: Leftover) -> None:
     n = len(left.residual)
     some = with_errors(left, 1.3 * np.random.default_rng(5).standard_normal(n))
-    (found,) = components(some, (Group("everything", np.arange(n)),))
+    (found,) = components(some, (ObservationGroup("everything", np.arange(n)),))
     freedom = n - 90
     square = some.sum_of_squares
     assert found.redundancy == pytest.approx(freedom)
@@ -161,7 +161,9 @@ def test_of_one_group_the_interval_is_that_of_chi_squared(left: Leftover) -> Non
     ends = square / chi2.ppf([0.975, 0.025], freedom)
     assert (found.lower, found.upper) == pytest.approx(tuple(ends), rel=1e-5)
     assert found.verdict == LARGER
-    (smaller,) = components(replace(some, residual=0.5 * some.residual), (Group("", np.arange(n)),))
+    (smaller,) = components(
+        replace(some, residual=0.5 * some.residual), (ObservationGroup("", np.arange(n)),)
+    )
     assert smaller.verdict == SMALLER
 
 
@@ -196,7 +198,7 @@ def test_groups_that_nothing_tells_apart_are_not_estimated(small: bp.Experiment)
 
 
 def tallied(
-    left: Leftover, groups: tuple[Group, ...], ratios: Real, count: int
+    left: Leftover, groups: tuple[ObservationGroup, ...], ratios: Real, count: int
 ) -> tuple[Real, Real, int]:
     """Estimates (count, g) over true ratios, shares of intervals that hold these (g,), and the
     number of tables with a verdict other than agreement.
@@ -212,7 +214,9 @@ def tallied(
     return np.array(found) / ratios, inside / count, alarms
 
 
-def ensure_tallied(left: Leftover, groups: tuple[Group, ...], ratios: Real, count: int) -> None:
+def ensure_tallied(
+    left: Leftover, groups: tuple[ObservationGroup, ...], ratios: Real, count: int
+) -> None:
     found, inside, alarms = tallied(left, groups, ratios, count)
     off = np.abs(found.mean(axis=0) - 1.0)
     assert (off < 4.0 * found.std(axis=0) / np.sqrt(count)).all()

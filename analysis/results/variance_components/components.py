@@ -16,7 +16,7 @@ from ...gross_errors.leftover import leftover, too_many_entries
 from ...presentation.formatting import aligned, finite, number
 from ...presentation.result import Result
 from .groupings import Grouping
-from .groups import Group, groups_of
+from .groups import ObservationGroup, groups_of
 from .restricted_likelihood import (
     SMALLEST,
     GroupSums,
@@ -147,7 +147,7 @@ class VarianceComponents(Result):
         return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": groups}
 
 
-def too_many_groups(design: Design, groups: Sequence[Group]) -> str:
+def too_many_groups(design: Design, groups: Sequence[ObservationGroup]) -> str:
     """Why variance components take too much memory; otherwise empty."""
     entries = len(groups) * design.parameter_count**2
     if entries <= MOST_ENTRIES:
@@ -164,14 +164,14 @@ class Estimated:
     estimate, and `reasons` says why.
     """
 
-    groups: tuple[Group, ...]
+    groups: tuple[ObservationGroup, ...]
     sums: GroupSums
     ratios: Array
     free: Integers
     reasons: tuple[str, ...]
 
 
-def told_apart(sums: GroupSums, groups: tuple[Group, ...]) -> Estimated:
+def told_apart(sums: GroupSums, groups: tuple[ObservationGroup, ...]) -> Estimated:
     """REML estimates of the variances that the design tells apart."""
     free, reasons = _told_apart(sums, [group.name for group in groups])
     return Estimated(groups, sums, estimated_ratios(sums, free), free, reasons)

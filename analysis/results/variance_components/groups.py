@@ -17,7 +17,7 @@ from .groupings import Grouping
 
 
 @dataclass(frozen=True)
-class Group:
+class ObservationGroup:
     """Observations that have their actual uncertainties in one ratio to the stated ones; `rows`
     (k,) are those among the whitened rows of the design.
     """
@@ -26,7 +26,7 @@ class Group:
     rows: Integers
 
 
-def groups_of(design: Design, by: Grouping) -> tuple[Group, ...]:
+def groups_of(design: Design, by: Grouping) -> tuple[ObservationGroup, ...]:
     """All whitened rows of a design in groups: readings of plates by axis, probe, position or
     artefact, or as one, and all other observations by kind and artefact.
 
@@ -55,14 +55,14 @@ def groups_of(design: Design, by: Grouping) -> tuple[Group, ...]:
     }[by]
     # Holes are read in two co-ordinates.
     member = np.where(measured(design, readings).ravel(), member, -1)
-    found = [Group(word, np.flatnonzero(member == k)) for k, word in enumerate(words)]
+    found = [ObservationGroup(word, np.flatnonzero(member == k)) for k, word in enumerate(words)]
     places = row_places(design)
     for one in design.observations:
         start = places[one.word].start
         names = _names(design, one)
         for name in dict.fromkeys(names):
             rows = np.flatnonzero([own == name for own in names])
-            found.append(Group(name, start + rows))
+            found.append(ObservationGroup(name, start + rows))
     return tuple(group for group in found if len(group.rows))
 
 
@@ -81,7 +81,7 @@ def _names(design: Design, one: Observations) -> list[str]:
     return [f"{one.word}s of {design.artefacts.names[k]}" for k in artefacts]
 
 
-def reweighted(design: Design, groups: Sequence[Group], ratios: Array) -> Design:
+def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array) -> Design:
     """The design with the variances (g,) of groups that many times what is stated."""
     d, chosen = design.dimension, design.plate_readings
     times = np.ones(row_count(design))

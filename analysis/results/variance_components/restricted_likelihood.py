@@ -21,7 +21,7 @@ from ballplate.simulator.computing.threads import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...gross_errors.leftover import Leftover
-from .groups import Group
+from .groups import ObservationGroup
 
 # Ratios of variances that are looked at; outside these, a group has no scatter or no weight.
 SMALLEST, LARGEST = 1e-4, 1e6
@@ -59,7 +59,7 @@ class AtRatios:
     deviance: float
 
 
-def group_sums(left: Leftover, groups: Sequence[Group]) -> GroupSums:
+def group_sums(left: Leftover, groups: Sequence[ObservationGroup]) -> GroupSums:
     """Sums of groups of rows."""
     # Columns have length 1, or 0 where a ball is kept or a direction open.
     used = np.asarray(left.own_columns.power(2).sum(axis=0)).ravel() > 0.5
