@@ -8,7 +8,7 @@ than wrongly.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from ballplate.simulator.inputs.yamltree import (
 from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
 from ballplate.simulator.machines.custom import module_file
 
-from .short_names import renamed_keys
+from .short_names import renamed
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 SCHEMA_LINE = "# yaml-language-server:"
@@ -164,10 +164,11 @@ def _content(
         said["priors"] = [
             one for one, path in zip(said["priors"], paths, strict=True) if path not in gone
         ]
-    for one in said.get("influences", []):
-        left = {name: at for name, at in one.get("positions", {}).items() if name not in others}
-        one.pop("positions", None)
-        one |= {"positions": renamed_keys(left, short)} if left else {}
+    if "influences" in said:
+        told = [_of_chosen(one, others, short) for one in said["influences"]]
+        said["influences"] = [one for one in told if one]
+        if not said["influences"]:
+            del said["influences"]
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
     order = (
@@ -319,3 +320,18 @@ def _in_line(value: Any) -> Any:
         if isinstance(value, list)
         else value
     )
+
+
+def _of_chosen(
+    influence: dict[str, Any], others: Collection[str], short: Mapping[str, str]
+) -> dict[str, Any]:
+    """What is said of an influence quantity, less `others` among its positions; nothing where it is
+    of these alone.
+    """
+    said = influence.get("positions", {})
+    rest = {key: one for key, one in influence.items() if key != "positions"}
+    if isinstance(said, Mapping):
+        left = {name: at for name, at in said.items() if name not in others}
+        return rest | ({"positions": renamed(left, short)} if left else {})
+    names = renamed([name for name in said if name not in others], short)
+    return rest | {"positions": names} if names else {}

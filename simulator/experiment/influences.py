@@ -58,9 +58,14 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
         design.readings,
         experiment.source.parent,
     )
-    influences = tuple(one.influence(parts) for one in experiment.influences)
-    readings = in_sequence(design.readings, influences)
-    disturbed = replace(design, readings=readings, influences=influences)
+    influences = []
+    for i, one in enumerate(experiment.influences):
+        try:
+            influences.append(one.influence(parts))
+        except ValueError as error:
+            raise ExperimentError([experiment.message(("influences", i), str(error))]) from None
+    readings = in_sequence(design.readings, tuple(influences))
+    disturbed = replace(design, readings=readings, influences=tuple(influences))
     parameters = disturbed.influence_parameters
     twice = [name for name, count in Counter(one.name for one in parameters).items() if count > 1]
     if twice:

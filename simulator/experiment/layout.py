@@ -132,6 +132,7 @@ def lay_out(experiment: Experiment) -> Design:
             ).reshape(-1, 2),
             tuple(task.target for task in tasks),
         ),
+        noise=experiment.noise,
     )
     return with_influences(design, experiment)
 

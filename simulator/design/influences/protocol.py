@@ -32,6 +32,8 @@ class InfluenceParameter:
     An uncertainty of zero makes it a constant, an infinite one a free parameter. `effect` is what
     a unit of it displaces readings by, in metres, where it does most. `position` is the index of
     the position that it is of alone, -1 where it is of several.
+    Parameters of the same `component` are alike: values drawn from one distribution, the variance
+    of which can be estimated from them.
     """
 
     name: str
@@ -40,6 +42,7 @@ class InfluenceParameter:
     uncertainty: float
     effect: float
     position: int = -1
+    component: str = ""
 
 
 @dataclass(frozen=True)
@@ -128,5 +131,8 @@ class InfluenceSettings(Settings):
         """
 
     def influence(self, design: DesignParts) -> Influence:
-        """The influence quantity in a design."""
+        """The influence quantity in a design.
+
+        :raises ValueError: the design does not say what it needs.
+        """
         raise NotImplementedError
