@@ -49,7 +49,7 @@ EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 # Keys that files did not have at first, by what has them: where they are left out, all is as it was
 # without them.
 LATER_KEYS = {
-    "Experiment": ("influences",),
+    "Experiment": ("influences", "noise"),
     "KinematicSettings": ("functions", "squareness"),
     "EmpiricalSettings": ("rotation_functions",),
     "RadialSettings": ("function",),

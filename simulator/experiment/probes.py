@@ -35,8 +35,8 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
             return {}
         at_reference = Probe(DEFAULT_PROBE, frozen(np.zeros(dimension or 0)))
         return {DEFAULT_PROBE: at_reference} if dimension == 2 else {}
-    angles = [getattr(one, "a", None) for one in sections.entries("probes").values()]
-    if sections.get("head") is not None and set(angles) <= {None}:
+    tilts = [getattr(one, "a", None) for one in sections.entries("probes").values()]
+    if sections.get("head") is not None and set(tilts) <= {None}:
         problems.doubt(("head",), "no probe states an angle A; the head has no effect")
     members = _star_members(sections, references)
     reference = _reference_probe(sections, references)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Readings, in_sequence
 from ..design.observations.lengths import Lengths
 from ..estimation.spheres import fit_sphere
 from ..inputs.settings import listing
@@ -129,6 +129,7 @@ def combine_standards(
         combined = replace(
             combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]])
         )
+    combined = in_sequence(combined, design.influences)
     observed = replace(design, readings=combined).observed(lengths)
     chosen_marks = tuple(marks[i] for i in chosen) if marks else ()
     return ObservedReadings(

@@ -274,6 +274,23 @@ readings:
     ]
 
 
+def test_keys_of_an_influence_stay_with_it_where_one_before_is_left_out(
+    source: Path, tmp_path: Path
+) -> None:
+    text = """influences:
+  - {kind: position scale, standard_uncertainty: 1 um/m, positions: [two]}
+  - {kind: drift, axes: {standard_uncertainty: 2 um/h}, times: {set_up: 30 min, reading: 20 s}}
+"""
+    source.write_text(source.read_text("utf-8") + text, "utf-8")
+    experiment = planned(source, "as is")
+    chosen = by_name(experiment, "one", "more z 500 mm at 100, 100 mm")
+    told = {1: {"times": {"set_up": "10 min", "reading": "5 s"}}}
+    found = written(experiment, chosen, tmp_path / "out" / "chosen.yaml", of_influences=told)
+    (drift,) = found.influences
+    assert drift.kind == "drift"  # type: ignore[attr-defined]
+    assert drift.times.set_up == 600.0  # type: ignore[attr-defined]
+
+
 @pytest.mark.parametrize(
     "change",
     [
