@@ -281,7 +281,8 @@ def test_keys_of_an_influence_stay_with_it_where_one_before_is_left_out(
   - {kind: position scale, standard_uncertainty: 1 um/m, positions: [two]}
   - {kind: drift, axes: {standard_uncertainty: 2 um/h}, times: {set_up: 30 min, reading: 20 s}}
 """
-    source.write_text(source.read_text("utf-8") + text, "utf-8")
+    plates = source.read_text("utf-8").replace(", role: length_standard", "")
+    source.write_text(plates + text, "utf-8")
     experiment = planned(source, "as is")
     chosen = by_name(experiment, "one", "more z 500 mm at 100, 100 mm")
     told = {1: {"times": {"set_up": "10 min", "reading": "5 s"}}}
