@@ -43,7 +43,7 @@ def experiment_text(
     title: str | None = None,
     expected_rank_deficiency: int | None = None,
     names: Mapping[str, str] | None = None,
-    of_influences: Mapping[int, Mapping[str, Any]] | None = None,
+    of_influences: Mapping[int, dict[str, Any]] | None = None,
 ) -> str:
     """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
     in their order.
@@ -135,7 +135,7 @@ def _content(
     experiment: Experiment,
     chosen: Sequence[Candidate],
     short: Mapping[str, str],
-    of_influences: Mapping[int, Mapping[str, Any]],
+    of_influences: Mapping[int, dict[str, Any]],
 ) -> dict[str, Any]:
     said: dict[str, Any] = to_list(to_python(tree))
     positions = [one for one in chosen if isinstance(one.item, Position)]
