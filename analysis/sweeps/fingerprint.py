@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from ballplate.simulator.design.observations.python_values import PythonCalibration
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.settings import Settings
 from ballplate.simulator.machines.settings import PythonSettings
 from pydantic import BaseModel
 
@@ -42,6 +42,9 @@ LEFT_OUT = (
     "builder",
     "_folder",
 )
+# The same, of single classes: how the laboratory's tables are read; and functions in Python, which
+# the text of their module and their options tell.
+LEFT_OUT_OF = {"Experiment": ("readings", "notes"), "PythonCalibration": ("functions",)}
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
@@ -49,7 +52,10 @@ EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 # Keys that files did not have at first, by what has them: where they are left out, all is as it was
 # without them.
 LATER_KEYS = {
-    "Experiment": ("influences",),
+    "Experiment": ("influences", "stars"),
+    "ArtefactSettings": ("reads", "flatness"),
+    "DistanceCalibration": ("root",),
+    "CoordinateCalibration": ("root",),
     "KinematicSettings": ("functions", "squareness"),
     "EmpiricalSettings": ("rotation_functions",),
     "RadialSettings": ("function",),
@@ -129,15 +135,38 @@ def _add(digest: _Digest, value: Any) -> None:
         _settings(digest, value)
     elif is_dataclass(value) and not isinstance(value, type):
         _text(digest, f"object {type(value).__name__}")
-        later = LATER_KEYS.get(type(value).__name__, ())
+        later = _later_keys(value)
+        left_out = (*LEFT_OUT, *LEFT_OUT_OF.get(type(value).__name__, ()))
         for field in fields(value):
             found = getattr(value, field.name)
-            is_left_out = field.name in later and found == field.default
-            if field.name not in LEFT_OUT and not is_left_out:
-                _text(digest, EARLIER_NAMES.get(field.name, field.name))
-                _add(digest, found)
+            is_left_out = field.name in left_out or (field.name in later and found == field.default)
+            if is_left_out:
+                continue
+            _text(digest, EARLIER_NAMES.get(field.name, field.name))
+            if isinstance(value, Experiment) and field.name == "probes":
+                _add(digest, {name: probe.offset for name, probe in value.probes.items()})
+                continue
+            _add(digest, found)
+            if isinstance(value, Experiment) and field.name == "priors":
+                _text(digest, "offset_uncertainties")
+                _add(digest, _offset_uncertainties(value))
+        if isinstance(value, PythonCalibration):
+            _text(digest, module_text(value.object, value.source))
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
+
+
+def _later_keys(value: object) -> set[str]:
+    """Keys that a class, or one that it is made from, did not have at first."""
+    return {key for one in type(value).__mro__ for key in LATER_KEYS.get(one.__name__, ())}
+
+
+def _offset_uncertainties(experiment: Experiment) -> dict[str, Any]:
+    """Standard uncertainties of the offsets that are estimated, which experiments once had beside
+    their probes.
+    """
+    known = {name: probe.standard_uncertainty for name, probe in experiment.probes.items()}
+    return {name: u for name, u in known.items() if u is not None}
 
 
 def _text(digest: _Digest, text: str) -> None:
@@ -148,7 +177,7 @@ def _text(digest: _Digest, text: str) -> None:
 
 def _settings(digest: _Digest, value: BaseModel) -> None:
     _text(digest, f"settings {type(value).__name__}")
-    later = LATER_KEYS.get(type(value).__name__, ())
+    later = _later_keys(value)
     for name, field in type(value).model_fields.items():
         is_left_out = name in later and getattr(value, name) == field.default
         if name not in TOLD_LATER and not is_left_out:
@@ -159,13 +188,14 @@ def _settings(digest: _Digest, value: BaseModel) -> None:
             _text(digest, name)
             _add(digest, item)
     if isinstance(value, PythonSettings):
-        _text(digest, module_text(value))
+        _text(digest, module_text(value.object, value._folder))
 
 
-def module_text(settings: Settings) -> str:
-    """The text of the module with a user's own error model; empty where Python has none of it."""
-    name = str(getattr(settings, "object", "")).partition(":")[0]
-    folder = getattr(settings, "_folder", None)
+def module_text(made_by: str, folder: Path | None) -> str:
+    """The text of the module with a user's own error model or calibration, `made_by` an object
+    there; empty where Python has none of it.
+    """
+    name = made_by.partition(":")[0]
     places = [] if folder is None else [folder.joinpath(*name.split(".")).with_suffix(".py")]
     try:
         found = importlib.util.find_spec(name)

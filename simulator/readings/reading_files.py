@@ -142,8 +142,12 @@ def read_readings(
     has_uncertainty = not np.isnan(lengths[:, d]).all()
     if has_uncertainty:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
-        wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
-        messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
+        none = "no standard uncertainty, and other rows have one; write it, or leave the column out"
+        wrong = [row for row in rows if not row.lengths[d] > 0.0]
+        messages += [
+            row.mark.message("", none if np.isnan(row.lengths[d]) else text)
+            for row in wrong[:MOST_MESSAGES]
+        ]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     given, stated = lengths[:, :d], lengths[:, d]
@@ -183,7 +187,7 @@ def read_readings(
             ]
         )
     marks = tuple(row.mark for row in rows)
-    doubt = () if empty else doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
     observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks)
