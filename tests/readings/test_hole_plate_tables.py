@@ -1,0 +1,113 @@
+"""Tables of hole plates: any form of table, and offsets that are in them already."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+from ballplate.cli import main
+
+OFFSETS = {"down": (0, 0, -50), "right": (50, 0, 0), "left": (-50, 0, 0)}
+OFFSETS |= {"back": (0, 50, 0), "front": (0, -50, 0)}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Simulated readings of a hole plate, which two probes read in z high with offsets in its
+    plane.
+    """
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    text = text.replace("balls: [5, 5]", "balls: [3, 3], reads: in plane, flatness: 5 um")
+    text = text.replace("_coefficients: 5", "_coefficients: 3")
+    text = text.replace(
+        "corner: {x: 250 mm, y: 250 mm}, quarter_turns: 1, probes: [down]",
+        "corner: {x: 125 mm, y: 250 mm}, quarter_turns: 1, probes: [right, left]",
+    )
+    (tmp_path / "holes.yaml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", "holes.yaml", "-o", "readings.csv", "-q"]) == 0
+    return tmp_path
+
+
+def fitted(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    capsys.readouterr()
+    status = main(["fit", "holes.yaml", *arguments, "--json"])
+    return status, *capsys.readouterr()
+
+
+def test_decimal_commas_are_the_same_readings(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = Path("readings.csv").read_text(encoding="utf-8")
+    assert ",\n" in plain
+    Path("lab.csv").write_text(plain.translate(str.maketrans(",.", ";,")), encoding="utf-8")
+    expected, found = fitted(capsys, "readings.csv"), fitted(capsys, "lab.csv")
+    assert expected[0] == found[0] == 0
+    assert found[1].split('"sum_of_squares"')[1] == expected[1].split('"sum_of_squares"')[1]
+
+
+def test_a_co_ordinate_that_is_read_may_not_be_empty(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = Path("readings.csv").read_text(encoding="utf-8").splitlines()
+    cells = lines[5].split(",")
+    lines[5] = ",".join([*cells[:3], "", *cells[4:]])
+    Path("lab.csv").write_text("\n".join(lines).replace(",", ";"), encoding="utf-8")
+    status, _, complaint = fitted(capsys, "lab.csv")
+    assert status == 3
+    assert complaint.startswith("lab.csv:6:1: no x; write a number, or remove the line")
+
+
+def centres(source: str) -> str:
+    """The readings with the offsets of their probes added, as measuring programs write them."""
+    rows = list(csv.reader(io.StringIO(source)))
+    for row in rows[1:]:
+        for k, offset in enumerate(OFFSETS[row[2]], start=3):
+            row[k] = row[k] and repr(float(row[k]) + offset)
+    return "\n".join(map(",".join, rows))
+
+
+def test_centres_are_found_out(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = Path("readings.csv").read_text(encoding="utf-8")
+    Path("centres.csv").write_text(centres(plain), encoding="utf-8")
+    status, _, complaint = fitted(capsys, "centres.csv")
+    assert status == 3
+    assert "as ball centres, but only to 50 mm as scale readings, the default" in complaint
+    status, out, _ = fitted(capsys, "centres.csv", "--coordinates", "ball centres")
+    assert status == 0
+    status, _, complaint = fitted(capsys, "readings.csv", "--coordinates", "ball centres")
+    assert status == 3
+    assert "as scale readings, but only to 50 mm as ball centres, which is stated" in complaint
+
+
+def test_offsets_across_the_plate_change_nothing(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where all offsets are across the plate, nothing is in doubt."""
+    text = Path("holes.yaml").read_text(encoding="utf-8")
+    text = text.replace(
+        "corner: {x: 125 mm, y: 250 mm}, quarter_turns: 1, probes: [right, left]",
+        "corner: {x: 125 mm, y: 250 mm}, quarter_turns: 1, probes: [down]",
+    )
+    Path("holes.yaml").write_text(text, encoding="utf-8")
+    assert main(["simulate", "holes.yaml", "-o", "readings.csv", "-q", "--force"]) == 0
+    Path("centres.csv").write_text(
+        centres(Path("readings.csv").read_text(encoding="utf-8")), encoding="utf-8"
+    )
+    found = [fitted(capsys, name) for name in ("readings.csv", "centres.csv")]
+    assert found[0] == found[1]
+    assert "offsets" not in found[0][2]
+
+
+def test_some_uncertainties_are_missing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = Path("readings.csv").read_text(encoding="utf-8").splitlines()
+    rows = [f"{line},{'' if k % 2 else 0.3}" for k, line in enumerate(lines[1:])]
+    for name, sign in (("a.csv", ","), ("b.csv", ";")):
+        table = "\n".join([f"{lines[0]},u_um", *rows]).replace(",", sign)
+        Path(name).write_text(table, encoding="utf-8")
+        status, _, complaint = fitted(capsys, name)
+        assert status == 3
+        assert complaint.startswith(f"{name}:3:")
+        assert "leave the column out" in complaint
