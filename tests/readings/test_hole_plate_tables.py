@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from pathlib import Path
 
 import pytest
@@ -111,3 +112,38 @@ def test_some_uncertainties_are_missing(folder: Path, capsys: pytest.CaptureFixt
         assert status == 3
         assert complaint.startswith(f"{name}:3:")
         assert "leave the column out" in complaint
+
+
+def test_circles_of_a_report_are_readings_of_holes(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A report has all three co-ordinates of a circle's centre; that across the plate is not
+    read.
+    """
+    plain = Path("readings.csv").read_text(encoding="utf-8")
+    rows = list(csv.reader(io.StringIO(centres(plain))))[1:]
+    lines = ["FILNAM/'HOLES'", "UNITS/MM,ANGDEC"]
+    for position, ball, probe, *x in rows:
+        name = f"{position.replace(' ', '').upper()}_{ball.upper()}_{probe.upper()}"
+        place = ",".join(f"{float(cell or 250.0):.9f}" for cell in x)
+        lines.append(f"FA({name})=FEAT/CIRCLE,INNER,CART,{place},0,0,1,20.0")
+    Path("holes.dmo").write_text("\n".join([*lines, "ENDFIL", ""]), encoding="utf-8")
+    options = ["--circles", "--for", "holes.yaml", "-o", "imported.csv"]
+    assert main(["import", "holes.dmo", *options]) == 0
+    assert f"in their plane, {len(rows)}, are left out" in capsys.readouterr().err
+    status, out, _ = fitted(capsys, "imported.csv", "--coordinates", "ball centres")
+    assert status == 0
+    expected = json.loads(fitted(capsys, "readings.csv")[1])
+    # Reports have nine decimals of a millimetre at most.
+    assert json.loads(out)["sum_of_squares"] == pytest.approx(expected["sum_of_squares"], rel=1e-4)
+
+
+def test_a_plan_goes_on_from_readings_of_holes(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = Path("holes.yaml").read_text(encoding="utf-8")
+    Path("holes.yaml").write_text(f"{text}pool: {{limits: {{keep: all}}}}\n", encoding="utf-8")
+    options = ["--positions", "6", "--done", "readings.csv", "-o", "rest.yaml"]
+    status = main(["plan", "holes.yaml", *options])
+    captured = capsys.readouterr()
+    assert status == 0, captured.err
