@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         spline,
     )
     from .estimators.estimator_choice import ESTIMATORS
+    from .results.variance_components.groupings import GROUPINGS
     from .simulator.experiment.model import Experiment
     from .stores import stored, sweep, sweep_report
     from .sweeps.running import OtherSweepError
@@ -43,6 +44,7 @@ __all__ = [
     "ESTIMATORS",
     "Experiment",
     "ExperimentError",
+    "GROUPINGS",
     "OtherSweepError",
     "StoreError",
     "certificate",
@@ -74,6 +76,7 @@ _PLACES = {
     "ESTIMATORS": "ballplate.estimators.estimator_choice",
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
+    "GROUPINGS": "ballplate.results.variance_components.groupings",
     "OtherSweepError": "ballplate.sweeps.running",
     "StoreError": "ballplate.sweeps.store_file",
     "stored": "ballplate.stores",

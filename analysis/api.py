@@ -33,8 +33,10 @@ from .estimators.estimator_choice import (
     OF_DISTANCES,
     OF_LENGTHS,
     EstimatorName,
+    misused,
     takers,
 )
+from .results.variance_components.groupings import GROUPINGS, Grouping
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
 
@@ -49,6 +51,7 @@ if TYPE_CHECKING:
     from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
     from .planning.criteria import CriterionName
+    from .planning.orders import OrderName
     from .planning.requirements.answers import Reach
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
@@ -340,6 +343,8 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     *,
+    components: Grouping | None = None,
+    reweight: bool = False,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -359,6 +364,8 @@ def fit(
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
     *,
+    components: Grouping | None = None,
+    reweight: bool = False,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -377,6 +384,8 @@ def fit(
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
     *,
+    components: Grouping | None = None,
+    reweight: bool = False,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -390,7 +399,9 @@ def fit(
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
-    `offsets` between its positions are estimated. What is to be known beside the figures is in the
+    `offsets` between its positions are estimated. With `components`, one of the
+    `ballplate.GROUPINGS`, variances of groups of observations are estimated, and `reweight` puts
+    these in the place of the stated ones. What is to be known beside the figures is in the
     result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
@@ -412,12 +423,18 @@ def fit(
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
-    ensure_type(bool, "True or False", offsets=offsets)
+    ensure_type(bool, "True or False", offsets=offsets, reweight=reweight)
+    if components is not None:
+        ensure_one_of(GROUPINGS, components=components)
     asked = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
+    asked |= {"components": components, "reweight": reweight}
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} goes with the estimator {wrong[1]} only; leave it out")
+    reason = misused(components, reweight, sigma)
+    if reason:
+        raise ValueError(reason)
     said = {"columns": columns, "unit": unit, "coordinates": coordinates}
     chosen = _experiment(experiment).with_readings(said)
     tables = _tables(readings, chosen)
@@ -425,7 +442,17 @@ def fit(
         chosen = read_certificate(_table("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
     return fit_readings(
-        chosen, observed, estimator, sigma, monomials, pairs, across_probes, scale, offsets
+        chosen,
+        observed,
+        estimator,
+        sigma,
+        monomials,
+        pairs,
+        across_probes,
+        scale,
+        offsets,
+        components,
+        reweight,
     )
 
 
@@ -495,6 +522,8 @@ def plan(
     done: PathLike | pandas.DataFrame | None = None,
     moved: bool = False,
     earlier: PathLike | None = None,
+    order: OrderName | None = None,
+    drift: Sequence[str] = (),
     report: Report = unreported,
 ) -> Campaign:
     """Positions and certificates chosen from the experiment's pool for a budget, with the bound of
@@ -503,7 +532,8 @@ def plan(
     Without a budget the choice may cost what the positions of the experiment itself do. Readings
     that are `done` already are kept; where the artefact has `moved` since, a position interrupted
     there can only be set up again. `earlier` is the file of a choice from this pool before, to
-    compare with and go on from.
+    compare with and go on from. An `order`, change-over, mirrored, blocks or least-drift, or
+    sizes of a `drift` such as ["0.5 um/h", "0.2 ppm/h"] tell what a drift does in each order.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
@@ -515,6 +545,7 @@ def plan(
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
     from .planning.earlier import begun
+    from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
     ensure_one_of(NAMES, criterion=criterion)
@@ -526,7 +557,9 @@ def plan(
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
-    request = Request(criterion, budget, curve, seed)
+    if order is not None:
+        ensure_one_of(tuple(ORDERS), order=order)
+    request = Request(criterion, budget, curve, seed, order, tuple(drift))
     chosen = with_pool(_experiment(experiment))
     taken = None if done is None else _table("done", done)
     before = None if earlier is None else Path(earlier)

@@ -5,7 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ..estimators.estimator_choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
+from ..estimators.estimator_choice import (
+    DRAWN,
+    ESTIMATORS,
+    TAKE,
+    fit_readings,
+    misused,
+    takers,
+)
+from ..results.variance_components.groupings import GROUPINGS
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .outputs import UsageError, add_force, write
@@ -56,6 +64,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="report error functions by the coefficients of t, t^2, ... on [0, 1]",
     )
     _add_estimators(parser)
+    _add_components(parser)
     add_picture(
         parser,
         "--plot",
@@ -94,6 +103,23 @@ def _add_estimators(parser: ArgumentParser) -> None:
     )
 
 
+def _add_components(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--components",
+        choices=GROUPINGS,
+        metavar="BY",
+        help=(
+            "estimate how uncertain groups of observations are against what is stated, by axis,"
+            " probe, position, artefact or calibration (variance components, REML)"
+        ),
+    )
+    parser.add_argument(
+        "--reweight",
+        action="store_true",
+        help="with --components: fit again with the estimated variances in place of the stated",
+    )
+
+
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.layout import lay_out
@@ -125,6 +151,8 @@ def run(options: Namespace) -> int:
         options.across_probes,
         options.scale,
         not options.no_offsets,
+        options.components,
+        options.reweight,
     )
     if options.plot and result.converged:
         write(options, {options.plot: result.plot})
@@ -147,6 +175,11 @@ def _refuse_misused(options: Namespace) -> None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
         raise UsageError(f"--{option} goes with --estimator {estimators} only; leave it out")
+    reason = misused(options.components, options.reweight, options.sigma)
+    if reason:
+        for name in ("components", "sigma"):
+            reason = reason.replace(f" {name}", f" --{name}")
+        raise UsageError(f"--{reason}")
     first = options.files[0]
     for second in options.readings:
         if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):

@@ -15,6 +15,9 @@ from .telling import note
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
 
+ORDER_NAMES = ("change-over", "mirrored", "blocks", "least-drift")
+
+
 HELP = "choose positions and certificates from a pool, and bound what any choice could achieve"
 DESCRIPTION = (
     "Choose the positions and certificates from the pool of an experiment file that"
@@ -43,6 +46,27 @@ def add_options(parser: ArgumentParser) -> None:
     )
     budget.add_argument("--positions", metavar="N", type=count, help="largest number of positions")
     budget.add_argument("--readings", metavar="N", type=count, help="largest number of readings")
+    order = parser.add_argument_group("order of the positions")
+    order.add_argument(
+        "--order",
+        choices=ORDER_NAMES,
+        help=(
+            "change-over: the least; mirrored: there and back; blocks: random in blocks, by --seed;"
+            " least-drift: that in which drift of the scales does least. Tells what a drift does in"
+            " each; default: change-over"
+        ),
+    )
+    order.add_argument(
+        "--drift",
+        metavar="SIZE",
+        action="append",
+        type=_drift,
+        help=(
+            "size of the drift that is told of, such as 0.5um/h of the reference point or 0.2ppm/h"
+            " of the scales; may be given for both; default: that of the file, or 1 um/h and"
+            " 1 ppm/h"
+        ),
+    )
     again = parser.add_argument_group("a campaign that has begun")
     again.add_argument(
         "--done",
@@ -89,7 +113,10 @@ def add_options(parser: ArgumentParser) -> None:
     add_force(output)
     add_json(parser)
     parser.add_argument(
-        "--seed", type=whole, default=1, help="seed of the random starts of the search; default 1"
+        "--seed",
+        type=whole,
+        default=1,
+        help="seed of the random starts of the search, and of --order blocks; default 1",
     )
     add_workers(parser)
 
@@ -128,6 +155,18 @@ def _hours(text: str) -> float:
     return value
 
 
+def _drift(text: str) -> str:
+    from ballplate.simulator.inputs.quantities import QuantityError
+
+    from ..planning.drift_in_orders import drift_size
+
+    try:
+        drift_size(text)
+    except QuantityError as error:
+        raise ArgumentTypeError(str(error)) from None
+    return text
+
+
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
     from ballplate.simulator.computing.processes import processors
@@ -146,7 +185,14 @@ def run(options: Namespace) -> int:
     if any(value is not None for value in asked):
         seconds = None if options.hours is None else HOUR * options.hours
         budget = Budget(seconds, options.readings, options.positions)
-    request = Request(options.criterion, budget, options.curve, options.seed)
+    request = Request(
+        options.criterion,
+        budget,
+        options.curve,
+        options.seed,
+        options.order,
+        tuple(options.drift or ()),
+    )
     with progress(options) as shown:
         found = campaign(
             experiment, request, offered, earlier, options.workers or processors(), shown.show

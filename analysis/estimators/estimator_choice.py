@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
     from ..presentation.result import FitResult
+    from ..results.variance_components.groupings import Grouping
 
 EstimatorName = Literal[
     "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"
@@ -33,6 +34,8 @@ TAKE: dict[str, tuple[str, ...]] = {
     "pairs": OF_DISTANCES,
     "across_probes": OF_DISTANCES,
     "monomials": ("full", *OF_DISTANCES),
+    "components": ("full",),
+    "reweight": ("full",),
 }
 
 
@@ -48,6 +51,19 @@ def takers(estimator: str, given: Collection[str]) -> tuple[str, str] | None:
     return None
 
 
+def misused(components: str | None, reweight: bool, sigma: str | None) -> str:
+    """What is wrong with these together; otherwise empty.
+
+    >>> misused(None, True, None)
+    'reweight needs components, the groups of observations to be weighted anew'
+    """
+    if reweight and components is None:
+        return "reweight needs components, the groups of observations to be weighted anew"
+    if reweight and sigma == "estimated":
+        return "reweight takes variances as estimated by group; leave sigma out"
+    return ""
+
+
 def fit_readings(
     experiment: Experiment,
     observed: ObservedReadings,
@@ -58,6 +74,8 @@ def fit_readings(
     across_probes: bool = False,
     scale: Any = None,
     offsets: bool = True,
+    components: Grouping | None = None,
+    reweight: bool = False,
 ) -> FitResult:
     """What an estimator makes of an experiment's readings.
 
@@ -77,7 +95,7 @@ def fit_readings(
     if estimator == "full":
         from ..results.study import fit
 
-        return fit(experiment, observed, sigma, monomials)
+        return fit(experiment, observed, sigma, monomials, components, reweight)
     from .distances import fit_alternative
 
     return fit_alternative(experiment, observed, estimator, pairs, across_probes, monomials)

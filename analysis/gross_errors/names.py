@@ -39,6 +39,10 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
         return f"offset {letter} of probe {design.probes.names[subject]}"
     if kind == "length value":
         return f"certified {length_name(design, subject, of_reading=False)}"
+    if kind == "drift":
+        return f"drift along {letter} over the campaign"
+    if kind == "scale drift":
+        return "drift of the scales over the campaign"
     if kind == "scale":
         return f"scale of the certificate of {design.artefacts.names[subject]}"
     return f"expansion in position {design.positions.names[subject]}"

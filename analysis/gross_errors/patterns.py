@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, locations
+from ballplate.simulator.design.influences.drift import Drift, even_clock
 from ballplate.simulator.design.observations.lengths import (
     Lengths,
     length_directions,
@@ -35,7 +36,15 @@ if TYPE_CHECKING:
 # Axes along which a reading changes lengths by less than this share of the most are left out, and
 # so are those that change all of them in a proportion equal to within the square of this.
 SLIGHT = 1e-3
-UNITS: dict[str, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
+UNITS: dict[str, Literal["m", "rad", "1"]] = {
+    "turn": "rad",
+    "scale": "1",
+    "expansion": "1",
+    "scale drift": "1",
+}
+
+# Kinds that `fit` looks for among smooth errors, and not as these patterns.
+DRIFTS: tuple[str, ...] = ("drift", "scale drift")
 
 # A slip leaves at least so many readings of the position on either side, and is looked for before
 # at most so many.
@@ -454,6 +463,29 @@ def _expansions(at: LinearisedDesign) -> Iterator[BiasPatterns]:
         )
 
 
+def _drifts(at: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Drifts from the first reading to the last, of the reference point and of the scales: by the
+    clock that is stated, or in order.
+    """
+    if at.every_start:
+        return
+    design, readings, d = at.design, at.design.readings, at.design.dimension
+    stated = [one.clock for one in design.influences if isinstance(one, Drift)]
+    clock = stated[0] if stated else even_clock(len(design.positions.names))
+    time = clock.hours(readings)[:, None]
+    if not np.ptp(time) > 0.0:
+        return
+    time /= np.ptp(time)
+    for kind, displacement, axes in (
+        ("drift", time[:, :, None] * np.eye(d), np.arange(d)),
+        ("scale drift", (time * at.x)[:, :, None], np.array([-1])),
+    ):
+        rows = np.arange(len(at.chosen))
+        entries = at.of_readings(rows, displacement[at.chosen])
+        of_lengths = at.of_lengths(at.along_lengths(displacement))
+        yield _block(kind, _joined(entries, of_lengths), np.zeros(len(axes), np.int64), axes)
+
+
 BUILDERS: tuple[Callable[[LinearisedDesign], Iterator[BiasPatterns]], ...] = (
     _single_readings,
     _single_lengths,
@@ -466,4 +498,5 @@ BUILDERS: tuple[Callable[[LinearisedDesign], Iterator[BiasPatterns]], ...] = (
     _length_values,
     _scales,
     _expansions,
+    _drifts,
 )

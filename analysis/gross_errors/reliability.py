@@ -25,7 +25,7 @@ from ..rank.proposed_bars import listed
 from ..uncertainty.quantities import QUANTITIES
 from .effects import MOST_PLACES, across_probes
 from .names import name
-from .patterns import Patterns, single_kinds
+from .patterns import DRIFTS, Patterns, single_kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,6 +45,8 @@ EVENTS: tuple[tuple[str, ...], ...] = (
     ("length value",),
     ("scale",),
     ("expansion",),
+    ("drift",),
+    ("scale drift",),
 )
 
 
@@ -156,8 +158,11 @@ class Reliability(Result):
 
     @property
     def found_by_fit(self) -> Array:
-        """The same of the tests that `fit` makes, which are many together."""
-        return self._biases(self.fit_noncentrality)
+        """The same of the tests that `fit` makes, which are many together; NaN for drifts, which it
+        looks for as smooth errors.
+        """
+        as_smooth = np.isin(self.patterns.kind, DRIFTS)
+        return np.where(as_smooth, np.nan, self._biases(self.fit_noncentrality))
 
     @property
     def minimal_detectable(self) -> Array:

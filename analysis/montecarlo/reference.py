@@ -106,6 +106,12 @@ class Reference:
         return self.factor.sum_of_squares
 
     @property
+    def position(self) -> Integers:
+        """Positions (m,) of the plates' readings, in the order of the groups."""
+        counts = [group.rows.stop - group.rows.start for group in self.groups]
+        return np.repeat([group.position for group in self.groups], counts)
+
+    @property
     def linearisation(self) -> Linearisation:
         """The linearisation at the reference."""
         return Linearisation(

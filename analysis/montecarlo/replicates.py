@@ -103,7 +103,8 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
     # Single precision: drawn in half the time, and noise is noise.
-    moved = generator.standard_normal((BATCH, *shared.noise.shape), np.float32)
+    shape = (BATCH, *shared.noise.shape)
+    moved = design.noise.draw(generator, shape, shared.position, 2, np.float32)
     moved *= shared.noise.astype(np.float32)
 
     errors = tuple(one.errors(generator, BATCH) for one in design.observations)
@@ -118,7 +119,9 @@ def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Arra
     read, place = np.unique(
         np.concatenate([given.first, given.second[~given.to_pivot]]), return_inverse=True
     )
-    drawn = generator.standard_normal((BATCH, shared.design.dimension, len(read)))
+    shape = (BATCH, shared.design.dimension, len(read))
+    position = shared.design.readings.position[read]
+    drawn = shared.design.noise.draw(generator, shape, position, 2)
     first, second = np.split(place.ravel(), [len(given)])
     return drawn[:, :, first] * shared.end_noise[0], drawn[:, :, second] * shared.end_noise[1]
 

@@ -14,7 +14,6 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 
@@ -23,12 +22,21 @@ from .bound import Bound, bound
 from .choice import CurvePoint, Gain
 from .constraints import Budget, Constraints, constraints
 from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
+from .drift_in_orders import (
+    drift_effect,
+    in_time,
+    is_of_plates,
+    parse_drift_size,
+    without_drift,
+)
 from .information import pool_information
+from .least_drift import least_drift
 from .offer import Offer, offer, open_directions
+from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
-from .short_names import short_names, with_names
+from .short_names import short_names
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -46,12 +54,16 @@ CURVE_POINTS = 8
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a plan; `curve` asks for smaller and larger budgets as well."""
+    """What is asked of a plan; `curve` asks for smaller and larger budgets as well, and an `order`,
+    or sizes of a `drift`, for what a drift does in each order.
+    """
 
     criterion: CriterionName = "U6"
     budget: Budget | None = None
     curve: bool = False
     seed: int = 1
+    order: OrderName | None = None
+    drift: tuple[str, ...] = ()
 
 
 def campaign(
@@ -136,7 +148,7 @@ def _campaign(
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
     information = pool_information(
-        experiment, whole, is_about_balls(request.criterion), completed_by, report
+        without_drift(experiment), whole, is_about_balls(request.criterion), completed_by, report
     )
     wanted = criterion(information, experiment, request.criterion)
     own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
@@ -173,11 +185,15 @@ def _campaign(
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
-    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted)
+    offers = _orders(experiment, pool, request, offered, chosen)
+    order = next(one for one in offers if one.name == (request.order or LEAST_CHANGE_OVER.name))
+    size = parse_drift_size(request.drift, experiment)
+    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order=order)
     names = short_names(
         (step.position for step in sheet.steps), offered.names, [one.name for one in candidates]
     )
-    in_order = run_sheet(chosen, pool.changes, done, completed, interrupted, names).written
+    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, names, order)
+    timed = in_time(experiment, sheet, pool.changes, names)
     return Campaign(
         experiment,
         pool,
@@ -197,18 +213,56 @@ def _campaign(
         wanted.target,
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
-        predict(
-            replace(
-                with_chosen(with_names(experiment, names), in_order),
-                expected_rank_deficiency=left_open or None,
-            )
-        ),
+        predict(replace(timed, expected_rank_deficiency=left_open or None)),
+        order,
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
         left_open,
+        drift=size,
+        orders=tuple(
+            drift_effect(
+                experiment,
+                one.name,
+                run_sheet(chosen, pool.changes, order=one),
+                pool.changes,
+                size,
+            )
+            for one in offers
+            if len(offers) > 1
+        ),
         names=names,
     )
+
+
+def _orders(
+    experiment: Experiment,
+    pool: Pool,
+    request: Request,
+    offered: Offer,
+    chosen: Sequence[Candidate],
+) -> list[ReadingOrder]:
+    """The orders that are offered: where one is asked or a drift stated, all that there are.
+
+    :raises ExperimentError: an order is asked of a campaign that has begun, or that of the least
+        effect of drift where there are length standards.
+    """
+    is_stated = len(without_drift(experiment).influences) < len(experiment.influences)
+    is_asked = bool(request.order or request.drift)
+    if offered.done and is_asked:
+        text = "has begun, and its times are unknown; leave --order and --drift out"
+        raise _impossible(experiment, "pool", text)
+    if offered.done or not (is_asked or is_stated):
+        return [LEAST_CHANGE_OVER]
+    own = [one for one in chosen if isinstance(one.item, Position)]
+    found = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
+    if is_of_plates(experiment, own):
+        names = least_drift(experiment, chosen, pool.changes, request.seed)
+        return [*found, ReadingOrder("least-drift", request.seed, names)]
+    if request.order == "least-drift":
+        text = "has length standards, whose drift is not followed; ask for another --order"
+        raise _impossible(experiment, "pool", text)
+    return found
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:

@@ -12,6 +12,8 @@ from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
 from .done import REST
+from .drift_in_orders import DriftEffect, DriftSize
+from .orders import ReadingOrder
 from .schedule import Completion
 
 
@@ -54,8 +56,9 @@ class Selection:
     is infinite where the selection leaves something undetermined; `bound` is what no selection can
     do better than, NaN where there is none. `drawn` is the criterion of the positions of the
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
-    `drawn_words`; None without any. `prediction` judges what is chosen in full. `names` are the
-    short names of positions whose names the pool composed.
+    `drawn_words`; None without any. `prediction` judges what is chosen in full, in this `order`.
+    `orders` are what a `drift` does in each order, where that was asked. `names` are the short
+    names of positions whose names the pool composed.
     """
 
     experiment: Experiment
@@ -76,11 +79,14 @@ class Selection:
     gains: tuple[Gain, ...]
     left_out: tuple[Gain, ...]
     prediction: Prediction
+    order: ReadingOrder
     curve: tuple[CurvePoint, ...] = ()
     completed: Completion | None = None
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
+    drift: DriftSize = DriftSize()
+    orders: tuple[DriftEffect, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
 
     def title_of(self, candidate: Candidate) -> str:

@@ -8,7 +8,7 @@ than wrongly.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from ballplate.simulator.inputs.yamltree import (
 from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
 from ballplate.simulator.machines.custom import module_file
 
-from .short_names import renamed_keys
+from .short_names import renamed
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 SCHEMA_LINE = "# yaml-language-server:"
@@ -43,6 +43,7 @@ def experiment_text(
     title: str | None = None,
     expected_rank_deficiency: int | None = None,
     names: Mapping[str, str] | None = None,
+    of_influences: Mapping[int, Mapping[str, Any]] | None = None,
 ) -> str:
     """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
     in their order.
@@ -51,7 +52,8 @@ def experiment_text(
     `header` becomes comments at the top. Names of files lead from `folder` to the same files. A
     stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
     position places, what is known of them, and priors about other positions. `names` are the short
-    names of chosen positions by those in the pool.
+    names of chosen positions by those in the pool. `of_influences` are keys of influence quantities
+    that are others, by the places of these in their list.
 
     Of an experiment that was made or changed in Python nothing of a file is kept.
 
@@ -61,6 +63,8 @@ def experiment_text(
     text, root, tree = _source(experiment)
     assert isinstance(root, MappingNode) and isinstance(tree, MappingNode)
     content = _content(tree, experiment, chosen, names or {})
+    for k, keys in (of_influences or {}).items():
+        content["influences"][k] |= keys
     if title is not None:
         content["title"] = title
     if expected_rank_deficiency is not None:
@@ -160,10 +164,11 @@ def _content(
         said["priors"] = [
             one for one, path in zip(said["priors"], paths, strict=True) if path not in gone
         ]
-    for one in said.get("influences", []):
-        left = {name: at for name, at in one.get("positions", {}).items() if name not in others}
-        one.pop("positions", None)
-        one |= {"positions": renamed_keys(left, short)} if left else {}
+    if "influences" in said:
+        told = [_of_chosen(one, others, short) for one in said["influences"]]
+        said["influences"] = [one for one in told if one]
+        if not said["influences"]:
+            del said["influences"]
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
     order = (
@@ -211,6 +216,8 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
     }
     if "calibration" in found:
         found["calibration"] = [_with(one, "values", there) for one in found["calibration"]]
+    if "influences" in found:
+        found["influences"] = [_with(one, "values", there) for one in found["influences"]]
     if "evaluation" in found:
         found["evaluation"] = _with(
             found["evaluation"], "points", lambda points: _with(points, "file", there)
@@ -313,3 +320,18 @@ def _in_line(value: Any) -> Any:
         if isinstance(value, list)
         else value
     )
+
+
+def _of_chosen(
+    influence: dict[str, Any], others: Collection[str], short: Mapping[str, str]
+) -> dict[str, Any]:
+    """What is said of an influence quantity, less `others` among its positions; nothing where it is
+    of these alone.
+    """
+    said = influence.get("positions", {})
+    rest = {key: one for key, one in influence.items() if key != "positions"}
+    if isinstance(said, Mapping):
+        left = {name: at for name, at in said.items() if name not in others}
+        return rest | ({"positions": renamed(left, short)} if left else {})
+    names = renamed([name for name in said if name not in others], short)
+    return rest | {"positions": names} if names else {}

@@ -120,12 +120,9 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
 def refuse_influences(experiment: Experiment, design: Design) -> None:
     """Refuse influence quantities that a plan cannot weigh.
 
-    :raises ExperimentError: they depend on when readings are made, or a position brings a free
-        parameter of its own.
+    :raises ExperimentError: a position brings a free parameter of its own.
     """
     text = ""
-    if any(one.in_order for one in design.influences):
-        text = "depend on the order of readings, which a plan does not know; remove them to plan"
     own = [
         one.name
         for one in design.influence_parameters

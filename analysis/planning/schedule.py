@@ -11,6 +11,7 @@ from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Positio
 from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Visit, cheapest, kind_of
+from .orders import LEAST_CHANGE_OVER, ReadingOrder, Sequenced, in_order
 from .short_names import with_short_name
 
 
@@ -94,6 +95,7 @@ class RunSheet:
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
     timed: bool = True
+    changes: ChangeTimes = ChangeTimes(0.0, 0.0)
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -105,6 +107,16 @@ class RunSheet:
         """
         steps = sorted(self.steps, key=lambda step: step.left)
         return (*(step.whole or step.candidate for step in steps), *self.calibration)
+
+    @property
+    def first_readings(self) -> dict[str, float]:
+        """When the first reading of each position that is to be read begins, in seconds as
+        `Step.start` counts.
+        """
+        todo = [step for step in self.steps if not step.done]
+        sequence = tuple((step.candidate, step.probes) for step in todo)
+        found = first_readings(sequence, self.changes)
+        return {step.name: start for step, start in zip(todo, found, strict=True)}
 
     @property
     def written(self) -> tuple[Candidate, ...]:
@@ -136,9 +148,10 @@ def run_sheet(
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
     names: Mapping[str, str] | None = None,
+    order: ReadingOrder = LEAST_CHANGE_OVER,
 ) -> RunSheet:
-    """The run sheet of chosen candidates: the order that costs least, what is done already first
-    and as it was.
+    """The run sheet of chosen candidates: the order that costs least, or another one, what is done
+    already first and as it was.
 
     Candidates that are `done` may be among the chosen ones too. They take no time any more, and as
     before any first position nothing is changed before the first that is left. A position that is
@@ -152,7 +165,11 @@ def run_sheet(
     positions = [
         one for one in chosen if isinstance(one.item, Position) and one.name not in earlier
     ]
-    sequence = ordered(positions, changes, before, None if completed is None else completed.rest)
+    first = None if completed is None else completed.rest
+    if order.name == "change-over":
+        sequence = ordered(positions, changes, before, first)
+    else:
+        sequence = (*ordered((), changes, before, first), *in_order(positions, changes, order))
     steps: list[Step] = []
     elapsed = 0.0
     for k, (candidate, probes) in enumerate(sequence):
@@ -186,8 +203,21 @@ def run_sheet(
         )
         elapsed += change + seconds
     return RunSheet(
-        tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position))
+        tuple(steps),
+        tuple(one for one in chosen if not isinstance(one.item, Position)),
+        changes=changes,
     )
+
+
+def first_readings(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
+    """When the first reading of each position in a sequence begins, in seconds."""
+    found, elapsed = [], 0.0
+    for k, (candidate, probes) in enumerate(sequence):
+        elapsed += change_over(sequence[k - 1], sequence[k], changes)[0] if k else 0.0
+        elapsed += candidate.seconds
+        taken = (len(probes) - 1) * changes.probe + candidate.readings * candidate.reading_seconds
+        found.append(elapsed - min(taken, candidate.seconds))
+    return found
 
 
 def change_over(

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import with_chosen
 
 from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
@@ -17,11 +16,12 @@ from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
 from .done import base_name
+from .drift_in_orders import DriftEffect, in_order_settings, in_time, is_of_plates
 from .experiment_file import experiment_text
+from .orders import ORDERS
 from .schedule import RunSheet, run_sheet
 from .sheet import Sheet
 from .sheet_forms import sheet_data, sheet_lines
-from .short_names import with_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,7 +46,13 @@ class Campaign(Selection, Result):
     def sheet(self) -> RunSheet:
         """The choice in the order in which it is to be read."""
         return run_sheet(
-            self.chosen, self.pool.changes, self.done, self.completed, self.interrupted, self.names
+            self.chosen,
+            self.pool.changes,
+            self.done,
+            self.completed,
+            self.interrupted,
+            self.names,
+            self.order,
         )
 
     @property
@@ -54,7 +60,7 @@ class Campaign(Selection, Result):
         """The experiment with the chosen positions and certificates alone, in the order of the run
         sheet and under its short names.
         """
-        return with_chosen(with_names(self.experiment, self.names), self.sheet.written)
+        return in_time(self.experiment, self.sheet, self.pool.changes, self.names)
 
     def to_yaml(self, folder: str | Path = ".") -> str:
         """The choice as the text of an experiment file that is to stand in a folder.
@@ -67,7 +73,14 @@ class Campaign(Selection, Result):
         deficiency = self.left_open or None
         written = self.sheet.written
         return experiment_text(
-            self.experiment, written, header, Path(folder), None, deficiency, self.names
+            self.experiment,
+            written,
+            header,
+            Path(folder),
+            None,
+            deficiency,
+            self.names,
+            in_order_settings(self.chosen_experiment),
         )
 
     def sheet_text(self, form: str = ".txt") -> str:
@@ -147,7 +160,62 @@ def _lines(campaign: Campaign) -> list[str]:
         lines += ["", *_gain_table(campaign)]
     if campaign.curve:
         lines += ["", *_curve_table(campaign)]
+    if campaign.orders:
+        lines += ["", *_order_table(campaign)]
     return [*lines, "", *campaign.prediction.lines()[1:], "", *sheet_lines(campaign.sheet)]
+
+
+def _order_table(campaign: Campaign) -> list[str]:
+    """What a drift does in each order, and which one is chosen."""
+    size = campaign.drift
+    rows = [
+        [
+            "order",
+            "hours",
+            "change-over, h",
+            f"{number(1e6 * size.point)} µm/h does",
+            f"{number(1e6 * size.scale)} ppm/h does",
+            "U6, no drift",
+            "drift estimated",
+            "",
+        ]
+    ]
+    budget = campaign.budget.seconds
+    for one in campaign.orders:
+        is_over = budget is not None and one.seconds > budget * (1.0 + 1e-9)
+        words = ["chosen"] if one.order == campaign.order.name else []
+        words += ["more hours than allowed"] if is_over else []
+        values = (one.of_point, one.of_scale, one.without, one.estimated)
+        rows.append(
+            [
+                ORDERS[one.order],
+                f"{one.seconds / HOUR:.2f}",
+                f"{one.change_seconds / HOUR:.2f}",
+                *(number(1e6 * value) for value in values),
+                ", ".join(words),
+            ]
+        )
+    places = (step.candidate for step in campaign.sheet.steps)
+    if not is_of_plates(campaign.experiment, places):
+        why = "no figures of drift: that of length standards is not followed"
+        return [*aligned(rows, [False, *[True] * 6, False]), why]
+    return [
+        *aligned(rows, [False, *[True] * 6, False]),
+        "what a drift that nobody knows of changes a distance between corrected points by at"
+        " most, and the mean uncertainty of these distances; µm",
+        *_chosen_without_drift(campaign),
+    ]
+
+
+def _chosen_without_drift(campaign: Campaign) -> list[str]:
+    """That the drift of the file had no part in the choice."""
+    drifts = [one for one in campaign.experiment.influences if one.in_order]
+    if not drifts:
+        return []
+    return [
+        "positions were chosen as if nothing drifted; U1 to U6 are those with the drift of the"
+        " file, in the order chosen"
+    ]
 
 
 def _interrupted(campaign: Campaign) -> list[str]:
@@ -275,6 +343,9 @@ def _data(campaign: Campaign) -> dict[str, Any]:
         "gains": [_gain_data(gain) for gain in campaign.gains],
         "left_out": [_gain_data(gain) for gain in campaign.left_out],
         "curve": [_point_data(point) for point in campaign.curve],
+        "order": asdict(campaign.order),
+        "drift": asdict(campaign.drift),
+        "orders": [_order_data(one) for one in campaign.orders],
         "run_sheet": sheet_data(campaign.sheet),
         "plan": campaign.prediction.to_dict(),
     }
@@ -286,6 +357,13 @@ def _gain_data(gain: Gain) -> dict[str, Any]:
         "without": finite(gain.without),
         "with": finite(gain.with_),
         "seconds": gain.candidate.seconds,
+    }
+
+
+def _order_data(effect: DriftEffect) -> dict[str, Any]:
+    return {
+        key: finite(value) if isinstance(value, float) else value
+        for key, value in asdict(effect).items()
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -70,17 +70,20 @@ def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) ->
 def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
     """The experiment with what it says of single positions under their short names."""
     influences = tuple(
-        one.model_copy(update={"positions": renamed_keys(stated, names)})
-        if isinstance(stated := getattr(one, "positions", None), Mapping)
+        one.model_copy(update={"positions": renamed(stated, names)})
+        if (stated := getattr(one, "positions", None)) is not None
         else one
         for one in experiment.influences
     )
     return replace(experiment, influences=influences)
 
 
-def renamed_keys(stated: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
-    """What is stated by position, by short names."""
-    return {names.get(name, name): one for name, one in stated.items()}
+def renamed(stated: Mapping[str, Any] | Sequence[str], names: Mapping[str, str]) -> Any:
+    """What is stated by position, or a list of positions, by short names."""
+    if isinstance(stated, Mapping):
+        return {names.get(name, name): one for name, one in stated.items()}
+    found = [names.get(name, name) for name in stated]
+    return tuple(found) if isinstance(stated, tuple) else found
 
 
 def names_of_plan(chosen: Experiment, candidates: Collection[str]) -> dict[str, str]:

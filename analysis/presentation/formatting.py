@@ -12,7 +12,15 @@ import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
-SHOWN = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}
+SHOWN = {
+    "m": "µm",
+    "rad": "µrad",
+    "1": "ppm",
+    "1/K": "ppm/K",
+    "K": "µK",
+    "m/h": "µm/h",
+    "1/h": "ppm/h",
+}
 
 
 def amount_of(value: float, unit: str) -> tuple[float, str]:

@@ -515,5 +515,6 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}[unit]
-    return f"{printable(value * 1e6):.3g} {shown}"
+    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}
+    shown |= {"m/h": "µm/h", "1/h": "ppm/h"}
+    return f"{printable(value * 1e6):.3g} {shown[unit]}"

@@ -11,7 +11,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.arguments import ensure_type
+from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_type
 from ballplate.simulator.inputs.settings import hint, shorten
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
@@ -49,10 +49,18 @@ from .parts import (
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals
+from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
+
+    from .variance_components.components import VarianceComponents
+
+REWEIGHTED = (
+    "(everything below is as if these estimates had been stated, but for those of fewer than 10"
+    " degrees of freedom that are not larger than stated)"
+)
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
@@ -75,6 +83,8 @@ class Fit(FitResult):
     what the residuals make suspect, which nothing else here heeds, or `untested` says why there is
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
+    `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
+    estimates had been stated.
     """
 
     label: str
@@ -93,6 +103,8 @@ class Fit(FitResult):
     diagnosis: Diagnosis = Diagnosis()
     untested: str = ""
     estimated: EstimatedFunctions | None = None
+    variance_components: VarianceComponents | None = None
+    is_reweighted: bool = False
 
     @property
     def design(self) -> Design:
@@ -116,6 +128,8 @@ class Fit(FitResult):
         verdict = verdict_lines(self.verdict, with_values=True, lengths=self.quantities.get("U6"))
         lines = [f"{self.label}: {self.title}", *verdict]
         how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
+        if self.is_reweighted:
+            how = "those of groups as estimated below"
         summary = (
             f"{self.solution.status} after {len(record) - 1} iterations; S^2 ="
             f" {record[-1].sum_of_squares:.6g}"
@@ -137,6 +151,9 @@ class Fit(FitResult):
         lines += ["", *self._residual_table()]
         if self.diagnosis:
             lines += diagnosis_lines(self.diagnosis, self.observed.marks)
+        if self.variance_components is not None:
+            lines += ["", *self.variance_components.lines()]
+            lines += [REWEIGHTED] if self.is_reweighted else []
         lines += ["", *uncertainty_table(self.quantities), ""]
         lines += [*task_table(self.tasks), ""] if self.tasks else []
         rows = [["parameter", "value", "standard uncertainty", "unit"]]
@@ -194,6 +211,14 @@ class Fit(FitResult):
                 for one in self.largest
             ],
             **suspected,
+            **(
+                {}
+                if self.variance_components is None
+                else {
+                    "variance_components": self.variance_components.to_dict(),
+                    "reweighted": self.is_reweighted,
+                }
+            ),
             "estimates": self._estimates_data(),
             **(
                 {"plates": {plate.artefact: plate_data(plate) for plate in self.plates}}
@@ -253,6 +278,26 @@ class Fit(FitResult):
         spread = np.sqrt(np.diagonal(found))
         with np.errstate(invalid="ignore", divide="ignore"):
             return found / np.outer(spread, spread)
+
+    def components(self, by: Grouping = "axis") -> VarianceComponents:
+        """How uncertain groups of observations are against what is stated of them, by restricted
+        maximum likelihood; of a fit that is reweighted, against what has been estimated.
+
+        `by` is axis, probe, position, artefact or calibration.
+
+        :raises ValueError: another grouping, an estimate that has not converged, or more groups
+            than there is memory for.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> [group.verdict for group in fit.components("calibration").groups]
+        ['agrees with stated', 'agrees with stated']
+        """
+        from .variance_components.components import variance_components
+
+        ensure_one_of(GROUPINGS, by=by)
+        at = self.functions.at
+        return variance_components(self.label, self.title, at, self.observed.x, by)
 
     def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
         """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,9 +12,11 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.error_names import SquarenessError
 from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
+from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 
 from ..rank.verdict import verdict
@@ -23,11 +25,13 @@ from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, adjustments
 from .prediction import Prediction
+from .variance_components.groupings import Grouping
 
 if TYPE_CHECKING:
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
     from .fit import Fit
+    from .variance_components.components import VarianceComponents
 
 
 @dataclass(frozen=True)
@@ -88,11 +92,17 @@ def fit(
     observed: ObservedReadings,
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
+    components: Grouping | None = None,
+    reweight: bool = False,
 ) -> Fit:
     """Estimate machine errors, balls and poses from readings.
 
     `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as
-    the coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
+    the coefficients of t, t^2, ... on [0, 1] instead of in the stable basis. With `components` the
+    variances of such groups of observations are estimated as well; with `reweight` they take the
+    place of those stated, and sigma is 1.
+
+    :raises ExperimentError: variance components take more memory than there is.
     """
     # Loaded only now, so that what plans and checks need not load answers sooner.
     from ..gross_errors.cause_search import diagnosis
@@ -102,6 +112,7 @@ def fit(
     from .fit import Fit
     from .plates import plate_coordinates
     from .residuals import largest_residuals
+    from .variance_components.groups import groups_of, reweighted
 
     design = observed.design
     solution = estimate(design, observed.x)
@@ -110,6 +121,14 @@ def fit(
         names = experiment.label, experiment.title
         return Fit(*names, observed, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
+    found = None
+    if components is not None:
+        found = _variance_components(experiment, at, observed.x, components)
+    if found is not None and reweight:
+        groups = groups_of(design, components or "axis")
+        observed = replace(observed, design=reweighted(design, groups, np.array(found.weighting)))
+        anew = fit(experiment, observed, "given", monomials)
+        return replace(anew, variance_components=found, is_reweighted=True)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     freedom = design.observation_count - design.parameter_count + judged.deficiency
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
@@ -133,7 +152,19 @@ def fit(
         Diagnosis() if untested else diagnosis(at, observed.x, freedom, estimated),
         untested,
         functions,
+        found,
     )
+
+
+def _variance_components(
+    experiment: Experiment, at: Linearisation, x: Array, by: Grouping
+) -> VarianceComponents:
+    from .variance_components.components import variance_components
+
+    try:
+        return variance_components(experiment.label, experiment.title, at, x, by)
+    except ValueError as error:
+        raise refused(experiment.source, str(error), "positions") from None
 
 
 def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjustment, ...]:

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -38,13 +38,14 @@ LEFT_OUT = (
     "mark",
     "path",
     "doubts",
+    "notes",
     "tree",
     "builder",
     "_folder",
 )
 # The same, of single classes: how the laboratory's tables are read; and functions in Python, which
 # the text of their module and their options tell.
-LEFT_OUT_OF = {"Experiment": ("readings", "notes"), "PythonCalibration": ("functions",)}
+LEFT_OUT_OF = {"Experiment": ("readings",), "PythonCalibration": ("functions",)}
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
@@ -52,7 +53,7 @@ EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 # Keys that files did not have at first, by what has them: where they are left out, all is as it was
 # without them.
 LATER_KEYS = {
-    "Experiment": ("influences", "stars"),
+    "Experiment": ("influences", "noise", "stars"),
     "ArtefactSettings": ("reads", "flatness"),
     "DistanceCalibration": ("root",),
     "CoordinateCalibration": ("root",),
@@ -135,38 +136,42 @@ def _add(digest: _Digest, value: Any) -> None:
         _settings(digest, value)
     elif is_dataclass(value) and not isinstance(value, type):
         _text(digest, f"object {type(value).__name__}")
-        later = _later_keys(value)
         left_out = (*LEFT_OUT, *LEFT_OUT_OF.get(type(value).__name__, ()))
-        for field in fields(value):
-            found = getattr(value, field.name)
-            is_left_out = field.name in left_out or (field.name in later and found == field.default)
-            if is_left_out:
-                continue
-            _text(digest, EARLIER_NAMES.get(field.name, field.name))
-            if isinstance(value, Experiment) and field.name == "probes":
-                _add(digest, {name: probe.offset for name, probe in value.probes.items()})
-                continue
-            _add(digest, found)
-            if isinstance(value, Experiment) and field.name == "priors":
-                _text(digest, "offset_uncertainties")
-                _add(digest, _offset_uncertainties(value))
+        for name, found in _entries(value):
+            if name not in left_out and not _is_as_before(value, name, found):
+                _text(digest, EARLIER_NAMES.get(name, name))
+                _add(digest, found)
         if isinstance(value, PythonCalibration):
             _text(digest, module_text(value.object, value.source))
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
 
 
-def _later_keys(value: object) -> set[str]:
-    """Keys that a class, or one that it is made from, did not have at first."""
-    return {key for one in type(value).__mro__ for key in LATER_KEYS.get(one.__name__, ())}
+def _entries(value: Any) -> Iterator[tuple[str, Any]]:
+    """Fields of a data class with their values; probes are two mappings, as they were at first."""
+    for field in fields(value):
+        found = getattr(value, field.name)
+        if isinstance(value, Experiment) and field.name == "probes":
+            found = {name: probe.offset for name, probe in value.probes.items()}
+        yield field.name, found
+        if isinstance(value, Experiment) and field.name == "priors":
+            estimated = {k: one for k, one in value.probes.items() if one.is_estimated}
+            yield (
+                "offset_uncertainties",
+                {name: probe.standard_uncertainty for name, probe in estimated.items()},
+            )
 
 
-def _offset_uncertainties(experiment: Experiment) -> dict[str, Any]:
-    """Standard uncertainties of the offsets that are estimated, which experiments once had beside
-    their probes.
-    """
-    known = {name: probe.standard_uncertainty for name, probe in experiment.probes.items()}
-    return {name: u for name, u in known.items() if u is not None}
+def _is_as_before(value: Any, name: str, found: Any) -> bool:
+    """Whether this is the default of a key that files did not have at first."""
+    if not any(name in LATER_KEYS.get(one.__name__, ()) for one in type(value).__mro__):
+        return False
+    if isinstance(value, BaseModel):
+        of_settings = type(value).model_fields[name]
+        return bool(found == of_settings.get_default(call_default_factory=True))
+    default = next(field for field in fields(value) if field.name == name)
+    made = default.default_factory
+    return bool(found == (default.default if made is MISSING else made()))
 
 
 def _text(digest: _Digest, text: str) -> None:
@@ -177,12 +182,11 @@ def _text(digest: _Digest, text: str) -> None:
 
 def _settings(digest: _Digest, value: BaseModel) -> None:
     _text(digest, f"settings {type(value).__name__}")
-    later = _later_keys(value)
-    for name, field in type(value).model_fields.items():
-        is_left_out = name in later and getattr(value, name) == field.default
-        if name not in TOLD_LATER and not is_left_out:
+    for name in type(value).model_fields:
+        found = getattr(value, name)
+        if name not in TOLD_LATER and not _is_as_before(value, name, found):
             _text(digest, EARLIER_NAMES.get(name, name))
-            _add(digest, getattr(value, name))
+            _add(digest, found)
     for name, item in sorted((value.__pydantic_private__ or {}).items()):
         if name not in LEFT_OUT:
             _text(digest, name)

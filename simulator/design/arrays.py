@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
+from .noise import Noise
 from .objects import (
     Artefacts,
     Balls,
@@ -54,6 +55,7 @@ class Design:
     evaluation: EvaluationPoints
     tasks: Tasks
     influences: tuple[Influence, ...] = ()
+    noise: Noise = Noise()
 
     @property
     def dimension(self) -> int:
@@ -213,6 +215,19 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
     return np.asarray(turned + state.origins[readings.position])
 
 
+def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readings:
+    """All readings, in the order in which they are made, with what influence quantities say beside
+    them for that.
+    """
+    if not influences:
+        return readings
+    order = np.arange(len(readings), dtype=float)
+    found = replace(readings, beside={**(readings.beside or {}), "order": order})
+    for one in influences:
+        found = replace(found, beside={**(found.beside or {}), **one.in_sequence(found)})
+    return found
+
+
 def influence_shifts(
     design: Design, state: State, readings: Readings, x: Array
 ) -> tuple[Array, Array]:
@@ -339,6 +354,12 @@ class Observations(ABC):
     def given(self, **changed: Array) -> Self:
         """The same observations with other values or uncertainties (m,)."""
         return cast(Self, replace(cast(Any, self), **changed))
+
+    def enlarged(self, times: Array) -> Self:
+        """The same observations with uncertainties so many `times` (rows,) as large; of rows that
+        share errors, all the same.
+        """
+        return self.given(uncertainty=self.uncertainty * times)
 
     def whitened(self, rows: Array) -> Array:
         """What changes (m, ...) of the values are in uncorrelated rows (count, ...) of unit

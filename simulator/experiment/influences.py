@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design
+from ..design.arrays import Design, in_sequence
 from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
@@ -49,18 +49,23 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
     """
     if not experiment.influences:
         return design
-    order = np.arange(len(design.readings), dtype=float)
-    readings = replace(design.readings, beside={"order": order})
     parts = DesignParts(
         design.machine,
         design.probes,
         design.artefacts,
         design.balls,
         design.positions,
-        readings,
+        design.readings,
+        experiment.source.parent,
     )
-    influences = tuple(one.influence(parts) for one in experiment.influences)
-    disturbed = replace(design, readings=readings, influences=influences)
+    influences = []
+    for i, one in enumerate(experiment.influences):
+        try:
+            influences.append(one.influence(parts))
+        except ValueError as error:
+            raise ExperimentError([experiment.message(("influences", i), str(error))]) from None
+    readings = in_sequence(design.readings, tuple(influences))
+    disturbed = replace(design, readings=readings, influences=tuple(influences))
     parameters = disturbed.influence_parameters
     twice = [name for name, count in Counter(one.name for one in parameters).items() if count > 1]
     if twice:

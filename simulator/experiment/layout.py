@@ -132,6 +132,7 @@ def lay_out(experiment: Experiment) -> Design:
             ).reshape(-1, 2),
             tuple(task.target for task in tasks),
         ),
+        noise=experiment.noise,
     )
     return with_influences(design, experiment)
 
@@ -208,14 +209,16 @@ def _readings(
     """
     rows = []
     uncertainties = [experiment.machine.repeatability]
+    is_in_order = any(one.in_order for one in experiment.influences)
     for k, place in enumerate(experiment.positions):
         for group in place.readings:
             balls = first_ball[place.artefact] + group.ball_indices
-            # Readings of the same ball with different uncertainties stay apart.
-            kind = 0
-            if group.standard_uncertainty is not None:
+            # Readings of the same ball with different uncertainties stay apart, and where order
+            # counts those at different times.
+            kind, own = 0, group.standard_uncertainty
+            if own is not None or is_in_order:
                 kind = len(uncertainties)
-                uncertainties.append(group.standard_uncertainty)
+                uncertainties.append(experiment.machine.repeatability if own is None else own)
             for name in group.probes:
                 columns = np.full(
                     (len(balls), 5), (0, k, probe_index[name], kind, group.repeats), np.int64

@@ -28,7 +28,7 @@ from .checks import (
     check_use,
 )
 from .influences import resolve_influences
-from .machine import resolve_evaluation, resolve_machine, target_of
+from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Experiment
 from .modules import refused_modules
 from .placements import resolve_position
@@ -209,6 +209,7 @@ def _build(
     priors = resolve_priors(sections, machine, named, references)
     influences = resolve_influences(sections, named, references)
     check_size(sections, machine, positions, calibrations, probes, references)
+    noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
     check_readings(sections, references)
@@ -239,6 +240,7 @@ def _build(
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         influences=influences,
+        noise=noise,
         stars=stars,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),

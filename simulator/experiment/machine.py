@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..design.lookup import Floats, References
+from ..design.noise import Noise, NoiseSettings
 from ..design.objects import Machine, Volume
 from ..geometry.ball_layouts import frozen
 from ..inputs.messages import ExperimentError, Steps
@@ -72,6 +73,28 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     return Machine(
         Volume(frozen(lower_corner), frozen(upper_corner)), frozen(list(by_axis.values()))
     )
+
+
+def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> Noise:
+    """Return the distribution of noise after saying what is wrong, or what does not heed it."""
+    if settings is None:
+        return Noise()
+    if isinstance(settings, str):
+        settings = NoiseSettings.model_validate({"distribution": settings})
+    given, steps = settings.degrees_of_freedom, ("noise",)
+    if settings.distribution == "student t" and given is None:
+        text = "student t has no degrees of freedom; write {distribution: student t, degrees_of_"
+        problems.add(steps, text + "freedom: 5}")
+    elif settings.distribution != "student t" and given is not None:
+        text = f"{settings.distribution} noise has none; remove it, or write student t"
+        problems.add((*steps, "degrees_of_freedom"), text)
+    if settings.correlation:
+        text = (
+            "is that of simulated readings only: U1 to U6 take the noise of all readings as"
+            " independent; have uncertainties with it by Monte Carlo (run --trials)"
+        )
+        problems.doubt((*steps, "correlation"), text)
+    return Noise(settings.distribution, given or np.inf, settings.correlation)
 
 
 def resolve_evaluation(

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..design.influences.protocol import InfluenceSettings
 from ..design.lookup import Floats, Indices
+from ..design.noise import Noise
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
 from ..design.observations.star import Star
@@ -215,11 +216,11 @@ class Experiment:
     ``name``: of the variant, None without variants. ``probes``: by name. ``layouts``: name of an
     artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency`` are None where
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
-    meant for. ``pool``: what a plan may choose from. ``doubts``: what of the file is possible, and
-    unlikely to be meant. ``notes``: what was found in its tables
-    by itself. ``readings``: where tables of readings are and how they
-    are written. ``tree``: what was written, without variants, ``mark``: where the
-    experiment itself stands, and ``builder``: what makes an experiment of a tree.
+    meant for. ``noise``: of simulated readings. ``pool``: what a plan may choose from. ``doubts``:
+    what of the file is possible, and unlikely to be meant. ``notes``: what was found in its tables
+    by itself. ``readings``: where tables of readings are and how they are written. ``tree``: what
+    was written, without variants, ``mark``: where the experiment itself stands, and ``builder``:
+    what makes an experiment of a tree.
     """
 
     title: str
@@ -245,6 +246,7 @@ class Experiment:
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     influences: tuple[InfluenceSettings, ...] = ()
+    noise: Noise = Noise()
     stars: tuple[Star, ...] = ()
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StringConstraints
 
 from ..design.influences.kinds import AnyInfluence
+from ..design.noise import Distribution, NoiseSettings
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
@@ -169,7 +170,8 @@ class ExperimentSettings(Settings):
         None, description="the laboratory's readings: where they are and how they are written"
     )
     influences: NonEmpty[AnyInfluence] | None = Field(
-        None, description="what disturbs readings: temperature"
+        None,
+        description="what disturbs readings: temperature, probing, position scale, reproducibility",
     )
     evaluation: EvaluationSettings | None = Field(
         None, description="where the machine's uncertainty is evaluated"
@@ -197,6 +199,13 @@ class ExperimentSettings(Settings):
     )
     expected_rank_deficiency: Annotated[int, Field(ge=0, strict=True)] | None = Field(
         None, description="number of undetermined parameters that is accepted as intended"
+    )
+    noise: Forms[Distribution, NoiseSettings, NoiseSettings] = Field(
+        "normal",
+        description=(
+            "distribution of the noise of readings that are simulated: normal (default), uniform,"
+            " or {distribution: student t, degrees_of_freedom: 5, correlation: 0.2}"
+        ),
     )
     seed: Seed = Field(1, description="seed of simulated readings; default 1")
     variants: Annotated[dict[Name, dict[Text, Any]], Field(min_length=1)] | None = Field(

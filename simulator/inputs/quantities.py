@@ -71,6 +71,17 @@ DURATION_UNITS: Mapping[str, Fraction] = {
     "min": Fraction(60),
     "h": Fraction(3600),
 }
+# Drifts are kept per hour.
+LENGTH_DRIFT_UNITS: Mapping[str, Fraction] = {
+    f"{unit}/{time}": LENGTH_UNITS[unit] * 3600 / seconds
+    for time, seconds in sorted(DURATION_UNITS.items())
+    for unit in ("um", "nm", "mm", "m")
+}
+RATIO_DRIFT_UNITS: Mapping[str, Fraction] = {
+    f"{unit}/{time}": RATIO_UNITS[unit] * 3600 / seconds
+    for time, seconds in sorted(DURATION_UNITS.items())
+    for unit in ("ppm", "um/m", "nm/m", "m/m")
+}
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
 SMALLEST_FLOAT = float(SMALLEST)
@@ -82,6 +93,8 @@ BASE_UNITS: Mapping[str, str] = {
     "thermal expansion": "m/m/K",
     "angle per length": "rad/m",
     "duration": "s",
+    "length per time": "m/h",
+    "ratio per time": "m/m/h",
 }
 # Kind of quantity → its units and an example for the messages.
 UNITS: Mapping[str, Mapping[str, Fraction]] = {
@@ -92,6 +105,8 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "thermal expansion": EXPANSION_UNITS,
     "angle per length": BENDING_UNITS,
     "duration": DURATION_UNITS,
+    "length per time": LENGTH_DRIFT_UNITS,
+    "ratio per time": RATIO_DRIFT_UNITS,
 }
 EXAMPLES: Mapping[str, str] = {
     "length": "750 mm",
@@ -101,6 +116,8 @@ EXAMPLES: Mapping[str, str] = {
     "thermal expansion": "11 um/m/degC",
     "angle per length": "5 urad/m",
     "duration": "20 min",
+    "length per time": "0.5 um/h",
+    "ratio per time": "0.3 ppm/h",
 }
 LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 
@@ -320,6 +337,28 @@ def parse_duration(value: object) -> float:
     if found < 0:
         raise QuantityError(f'"{value}" is below zero; write for example "{EXAMPLES["duration"]}"')
     return found
+
+
+def parse_length_drift(value: object) -> float:
+    """Read a length per time and return it in metres per hour.
+
+    :raises QuantityError: not a number with um/h or the like.
+
+    >>> parse_length_drift("0.5 um/h"), parse_length_drift("1 nm/s")
+    (5e-07, 3.6e-06)
+    """
+    return _parse(value, "length per time")
+
+
+def parse_ratio_drift(value: object) -> float:
+    """Read a ratio per time and return it in metres per metre and hour.
+
+    :raises QuantityError: not a number with ppm/h or the like.
+
+    >>> parse_ratio_drift("-0.5 um/m/h")
+    -5e-07
+    """
+    return _parse(value, "ratio per time")
 
 
 def length_text(length: float) -> str:
@@ -707,4 +746,10 @@ Ratio = Annotated[
 ]
 Duration = Annotated[
     float, PlainValidator(parse_duration), _schema("duration", "20 min", "15 s", "1.5 h")
+]
+LengthDrift = Annotated[
+    float, PlainValidator(parse_length_drift), _schema("length per time", "0.5 um/h", "-2 nm/min")
+]
+RatioDrift = Annotated[
+    float, PlainValidator(parse_ratio_drift), _schema("ratio per time", "0.3 ppm/h")
 ]

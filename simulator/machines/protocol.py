@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Unit = Literal["m", "rad", "1", "K", "1/K"]
+Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from ..design.arrays import (
     Design,
     Readings,
     State,
+    in_sequence,
     influence_shifts,
     locations,
     nominal_state,
@@ -74,20 +75,17 @@ def true_readings(
 
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
-    readings = design.readings.expanded()
+    readings = in_sequence(design.readings.expanded(), design.influences)
     return readings, true_readings(design, truth, readings)
 
 
 def noisy_readings(
     design: Design, truth: State, generator: np.random.Generator
 ) -> tuple[Readings, Array]:
-    """The same with normal noise of the readings' standard uncertainties added to each
-    co-ordinate.
-    """
+    """The same with noise of the readings' standard uncertainties added to each co-ordinate."""
     readings, x = exact_readings(design, truth)
-    return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(
-        design, readings
-    )
+    noise = design.noise.draw(generator, x.shape, readings.position, 0)
+    return readings, x + noise * reading_uncertainties(design, readings)
 
 
 def true_influences(design: Design, generator: np.random.Generator) -> Array:

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Readings, measured, nominal_state
+from ..design.arrays import Design, Readings, in_sequence, measured, nominal_state
 from ..design.observations.lengths import Lengths
 from ..design.observations.readings import expected_readings
 from ..estimation.spheres import fit_sphere
@@ -153,8 +153,7 @@ def read_readings(
     given, stated = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
-        order = {"order": np.arange(len(rows), dtype=float)}
-        beside = order | dict(zip(units, lengths[:, d + 1 :].T, strict=True))
+        beside = dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     if empty and (
         settings.coordinates == "part" or settings.compensation not in (None, "off", "on")
@@ -171,6 +170,7 @@ def read_readings(
         else _planned_uncertainty(design, readings)
     )
     readings = replace(readings, uncertainty=uncertainty, beside=beside)
+    readings = in_sequence(readings, design.influences)
     missing, unplanned = _compare(design, readings, [row.mark for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
@@ -417,6 +417,7 @@ def _combine_standards(
         combined = replace(
             combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]])
         )
+    combined = in_sequence(combined, design.influences)
     observed = replace(design, readings=combined).observed(lengths)
     chosen_marks = tuple(marks[i] for i in chosen) if marks else ()
     return ObservedReadings(

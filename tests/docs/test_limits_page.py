@@ -16,6 +16,7 @@ from ballplate.gross_errors import leftover
 from ballplate.montecarlo import trials
 from ballplate.planning import criteria, information
 from ballplate.planning.requirements import root_search as search
+from ballplate.results.variance_components import components
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values
 from ballplate.simulator.experiment import (
@@ -69,6 +70,7 @@ LIMITS = {
     "`run --trials`": (trials.MOST_TRIALS,),
     "`sweep` | synthetic": (settings.MOST_TRIALS,),
     "`fit`, `reliability` |": (leftover.MOST_ENTRIES,),
+    "`fit --components` |": (components.MOST_ENTRIES,),
     "`compare`, `fit --estimator` |": (estimators.MOST_DERIVATIVES,),
     "`compare --points`": (estimators.MOST_POINTS,),
     "`sweep` | cells": (load.MOST_CELLS,),

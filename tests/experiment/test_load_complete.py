@@ -90,6 +90,7 @@ target_uncertainty: 0.5 um + L/1000000
 coverage_factor: 2
 sigma: given
 expected_rank_deficiency: 0
+noise: uniform
 seed: 7
 """
 

@@ -250,6 +250,12 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         rows = np.flatnonzero(here)
         places = x[rows] + state.probes[readings.probe[rows]]
         x[rows] += size * (places - places.mean(axis=0))
+    elif kind in ("drift", "scale drift"):
+        # From the first reading to the last, all taking as long, repeats as often as there are.
+        done = np.cumsum(readings.repeats)
+        middle = done - 0.5 * readings.repeats
+        share = (middle - np.average(middle, weights=readings.repeats)) / np.ptp(middle)
+        x = x + (share[:, None] * step if kind == "drift" else size * share[:, None] * x)
     elif kind == "probe":
         probes = design.probes.offsets.copy()
         probes[subject] += step
@@ -301,6 +307,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
             matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k]
         )
     wanted = {"reading", "distance", "moved", "shift", "turn", "probe", "expansion", "scale"}
+    wanted |= {"drift", "scale drift"}
     assert wanted <= seen and (
         text is not MIXED or {"ball", "length value", "coordinate", "prior"} <= seen
     )

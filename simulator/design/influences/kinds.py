@@ -10,14 +10,24 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
+from .drift import DriftSettings
+from .position_scale import PositionScaleSettings
+from .probing import ProbingSettings
 from .protocol import InfluenceSettings
 from .reindexing import ReindexingSettings
+from .reproducibility import ReproducibilitySettings
+from .sag import SagSettings
 from .temperature import TemperaturesSettings
 
 INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     # In the order of the documentation.
     TemperaturesSettings,
+    ProbingSettings,
+    PositionScaleSettings,
+    ReproducibilitySettings,
     ReindexingSettings,
+    DriftSettings,
+    SagSettings,
 )
 """Settings class of every kind of influence quantity."""
 

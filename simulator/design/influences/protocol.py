@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -31,6 +32,8 @@ class InfluenceParameter:
     An uncertainty of zero makes it a constant, an infinite one a free parameter. `effect` is what
     a unit of it displaces readings by, in metres, where it does most. `position` is the index of
     the position that it is of alone, -1 where it is of several.
+    Parameters of the same `component` are alike: values drawn from one distribution, the variance
+    of which can be estimated from them.
     """
 
     name: str
@@ -39,11 +42,14 @@ class InfluenceParameter:
     uncertainty: float
     effect: float
     position: int = -1
+    component: str = ""
 
 
 @dataclass(frozen=True)
 class DesignParts:
-    """What an influence quantity is laid out for; `readings` are those planned."""
+    """What an influence quantity is laid out for; `readings` are those planned. Names of files
+    begin in `folder`.
+    """
 
     machine: Machine
     probes: Probes
@@ -51,6 +57,7 @@ class DesignParts:
     balls: Balls
     positions: Positions
     readings: Readings
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -85,18 +92,17 @@ class Disturbed:
 
 
 class Influence(ABC):
-    """An influence quantity laid out for a design; a frozen dataclass of arrays.
-
-    Where it is `in_order` it depends on when readings are made, which no plan knows.
-    """
-
-    in_order: ClassVar[bool] = False
+    """An influence quantity laid out for a design; a frozen dataclass of arrays."""
 
     @property
     def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
         """Columns of a file of readings that it asks for, with the units that each may have; what
         a reading has there is a `column` of `Disturbed`.
         """
+        return {}
+
+    def in_sequence(self, readings: Readings) -> Mapping[str, Array]:
+        """Further columns (m,) of all readings, in the order in which they are made."""
         return {}
 
     @property
@@ -112,7 +118,12 @@ class Influence(ABC):
 
 
 class InfluenceSettings(Settings):
-    """Settings of one kind of influence quantity, with a `kind` of its own."""
+    """Settings of one kind of influence quantity, with a `kind` of its own.
+
+    Where it is `in_order` it depends on when readings are made: a plan chooses without it.
+    """
+
+    in_order: ClassVar[bool] = False
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
         """Report what is wrong with them where `positions` are names with those of their
@@ -120,5 +131,8 @@ class InfluenceSettings(Settings):
         """
 
     def influence(self, design: DesignParts) -> Influence:
-        """The influence quantity in a design."""
+        """The influence quantity in a design.
+
+        :raises ValueError: the design does not say what it needs.
+        """
         raise NotImplementedError

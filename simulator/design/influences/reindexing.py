@@ -70,6 +70,7 @@ class ReindexingSettings(InfluenceSettings):
                 u,
                 1.0,
                 k // count,
+                "re-indexing",
             )
             for k in used.tolist()
             for letter in AXIS_NAMES[:d]

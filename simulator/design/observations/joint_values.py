@@ -127,6 +127,11 @@ class JointValues(BallObservations):
         )
         return replace(self, roots=roots, uncertainty=own)
 
+    def enlarged(self, times: Array) -> JointValues:
+        parts = zip(self._parts, self.roots, strict=True)
+        roots = tuple(replace(root, own=root.own * times[part]) for part, root in parts)
+        return replace(self, roots=roots, uncertainty=self.uncertainty * times)
+
     def loosened(self, least: float) -> JointValues:
         """Combinations without variance have one that is as small beside that of their values."""
         roots = tuple(

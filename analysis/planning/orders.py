@@ -1,0 +1,118 @@
+"""Orders in which chosen positions can be read: the least change-over, or one that keeps drift from
+looking like errors of the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Literal
+
+import numpy as np
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
+
+from .changeover import Setup, cheapest, kind_of
+
+OrderName = Literal["change-over", "mirrored", "blocks", "least-drift"]
+ORDERS: Mapping[OrderName, str] = {
+    "change-over": "least change-over",
+    "mirrored": "mirrored",
+    "blocks": "random in blocks",
+    "least-drift": "least effect of drift",
+}
+
+
+@dataclass(frozen=True)
+class ReadingOrder:
+    """An order by name; `seed` is that of random ones, and `sequence` are the names of positions of
+    one that was searched for.
+    """
+
+    name: OrderName = "change-over"
+    seed: int = 1
+    sequence: tuple[str, ...] = ()
+
+
+LEAST_CHANGE_OVER = ReadingOrder()
+
+# Positions with their probes in order.
+Sequenced = tuple[tuple[Candidate, tuple[str, ...]], ...]
+
+
+def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder) -> Sequenced:
+    """Positions mirrored, random in blocks or in a stated sequence, their probes in the order that
+    costs least.
+
+    A mirrored order goes through the kinds of positions with the least change-over, reads half of
+    each, and goes back with the other half; what is single stands in the middle. A block has one
+    position of each kind that is left, in random order.
+    """
+    if order.sequence:
+        return with_probes(sorted(own, key=lambda one: order.sequence.index(one.name)), changes)
+    kinds: dict[Setup, list[Candidate]] = {}
+    for candidate in own:
+        kinds.setdefault(kind_of(candidate), []).append(candidate)
+    if order.name == "blocks":
+        return with_probes(_blocks(list(kinds.values()), order.seed), changes)
+    visits = cheapest([(kind, len(some)) for kind, some in kinds.items()], changes).visits
+    return with_probes(_mirrored([kinds[visit.kind] for visit in visits]), changes)
+
+
+def _mirrored(groups: Sequence[Sequence[Candidate]]) -> list[Candidate]:
+    """A half of each group, those of one in the middle, the other halves backwards."""
+    there: list[Candidate] = []
+    back: list[Candidate] = []
+    longer_there = True
+    for some in groups:
+        if len(some) == 1:
+            continue
+        half = len(some) // 2
+        # Of odd numbers, the one more is read going there and coming back by turns.
+        if len(some) % 2:
+            half += longer_there
+            longer_there = not longer_there
+        there += some[:half]
+        back = [*some[half:], *back]
+    return [*there, *(some[0] for some in groups if len(some) == 1), *back]
+
+
+def _blocks(groups: Sequence[Sequence[Candidate]], seed: int) -> list[Candidate]:
+    """Blocks of one of each group that is left, in random order; so is the order in a group."""
+    generator = np.random.default_rng(np.random.SeedSequence(seed))
+    mixed = [[some[k] for k in generator.permutation(len(some))] for some in groups]
+    found = []
+    for block in zip_longest(*mixed):
+        here = [candidate for candidate in block if candidate is not None]
+        found += [here[k] for k in generator.permutation(len(here))]
+    return found
+
+
+def with_probes(sequence: Sequence[Candidate], changes: ChangeTimes) -> Sequenced:
+    """Positions in this order, each with the order of its probes that leaves the fewest changes
+    between positions.
+    """
+    # By the last probe: what it cost, and the orders of probes so far.
+    states: dict[str, tuple[float, tuple[tuple[str, ...], ...]]] = {}
+    for k, candidate in enumerate(sequence):
+        assert isinstance(candidate.item, Position)
+        probes = candidate.item.probes
+        found: dict[str, tuple[float, tuple[tuple[str, ...], ...]]] = {}
+        for first in probes:
+            before = min(
+                (
+                    (cost + changes.probe * (last != first), n, orders)
+                    for n, (last, (cost, orders)) in enumerate(states.items())
+                ),
+                default=(0.0, 0, ()),
+            )
+            for last in probes:
+                if (first == last) != (len(probes) == 1):
+                    continue
+                between = tuple(probe for probe in probes if probe not in (first, last))
+                own = (first,) if len(probes) == 1 else (first, *between, last)
+                if k == 0 or last not in found or before[0] < found[last][0]:
+                    found[last] = (before[0], (*before[2], own))
+        states = found
+    _, orders = min(states.values(), key=lambda one: one[0], default=(0.0, ()))
+    return tuple(zip(sequence, orders, strict=True))

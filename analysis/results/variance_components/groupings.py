@@ -1,0 +1,9 @@
+"""Names of the ways in which observations are grouped for variance components."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+Grouping = Literal["axis", "probe", "position", "artefact", "calibration"]
+
+GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)

@@ -1,0 +1,104 @@
+"""Groups of observations that have a variance component each, and designs with other ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design, Observations, measured, reading_uncertainties
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.estimation.hat import row_count, row_places
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .groupings import Grouping
+
+
+@dataclass(frozen=True)
+class ObservationGroup:
+    """Observations that have their actual uncertainties in one ratio to the stated ones; `rows`
+    (k,) are those among the whitened rows of the design.
+    """
+
+    name: str
+    rows: Integers
+
+
+def groups_of(design: Design, by: Grouping) -> tuple[ObservationGroup, ...]:
+    """All whitened rows of a design in groups: readings of plates by axis, probe, position or
+    artefact, or as one, and all other observations by kind and artefact.
+
+    Values that influence quantities have by the same statement are a group, as what is stated of
+    them is the variance that these values have.
+    """
+    d, readings = design.dimension, design.readings.select(design.plate_readings)
+    words, member = {
+        "axis": (
+            [f"readings along {axis}" for axis in AXIS_NAMES[:d]],
+            np.tile(np.arange(d), len(readings)),
+        ),
+        "probe": (
+            [f"readings with {name}" for name in design.probes.names],
+            np.repeat(readings.probe, d),
+        ),
+        "position": (
+            [f"readings in {name}" for name in design.positions.names],
+            np.repeat(readings.position, d),
+        ),
+        "artefact": (
+            [f"readings of {name}" for name in design.artefacts.names],
+            np.repeat(design.balls.artefact[readings.ball], d),
+        ),
+        "calibration": (["readings"], np.zeros(d * len(readings), np.int64)),
+    }[by]
+    # Holes are read in two co-ordinates.
+    member = np.where(measured(design, readings).ravel(), member, -1)
+    found = [ObservationGroup(word, np.flatnonzero(member == k)) for k, word in enumerate(words)]
+    places = row_places(design)
+    for one in design.observations:
+        start = places[one.word].start
+        names = _names(design, one)
+        for name in dict.fromkeys(names):
+            rows = np.flatnonzero([own == name for own in names])
+            found.append(ObservationGroup(name, start + rows))
+    return tuple(group for group in found if len(group.rows))
+
+
+def _names(design: Design, one: Observations) -> list[str]:
+    """The group of each row of a kind of observations."""
+    if isinstance(one, Priors):
+        parameters = design.influence_parameters
+        return [
+            "priors" if k < 0 else parameters[k].component or "influence quantities"
+            for k in one.of_influence.tolist()
+        ]
+    count = one.count(design)
+    if isinstance(one, Lengths) or not one.balls.shape[1]:
+        return [f"{one.word}s"] * count
+    artefacts = design.balls.artefact[one.balls[:, 0]].tolist()
+    return [f"{one.word}s of {design.artefacts.names[k]}" for k in artefacts]
+
+
+def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array) -> Design:
+    """The design with the variances (g,) of groups that many times what is stated."""
+    d, chosen = design.dimension, design.plate_readings
+    times = np.ones(row_count(design))
+    for group, ratio in zip(groups, ratios.tolist(), strict=True):
+        times[group.rows] = np.sqrt(ratio)
+    places = row_places(design)
+    uncertainty = reading_uncertainties(design, design.readings).copy()
+    uncertainty[chosen] *= times[places["reading"]].reshape(-1, d)
+    changed: list[Observations] = []
+    for one in design.observations:
+        own = times[places[one.word]]
+        if isinstance(one, Lengths):
+            # Lengths share the noise of readings, which are of standards only: all are one group.
+            own = np.full(len(one), own[0] if len(own) else 1.0)
+            others = np.setdiff1d(np.arange(len(design.readings)), chosen)
+            uncertainty[others] *= own[0] if len(own) else 1.0
+        changed.append(one.enlarged(own))
+    return replace(design, readings=replace(design.readings, uncertainty=uncertainty)).observed(
+        *changed
+    )

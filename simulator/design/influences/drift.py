@@ -1,0 +1,234 @@
+"""Drift of the scale readings over a campaign, linear in time: of the reference point along each
+axis, and of the scales.
+
+What the scales say grows by c t along an axis and by s t x along with x, where t is the time from
+the mean of all readings on: the machine is described as it is then. The time is that of the file of
+readings where it has one, else what the readings take in their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...geometry.ball_layouts import Name
+from ...geometry.motions import AXIS_NAMES
+from ...inputs.messages import Steps
+from ...inputs.quantities import DURATION_UNITS, Duration, LengthDrift, RatioDrift
+from ...inputs.settings import Forms, NonEmpty, Settings, hint
+from ...machines.protocol import Array
+from ..lookup import References
+from ..objects import Readings
+from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+
+HOUR = 3600.0
+TIME = "time"
+
+# What a drift is told for at least, in hours: one within a second still has a size.
+LEAST_HOURS = 1e-3
+
+
+class PointDriftSettings(Settings):
+    """How the reference point drifts along an axis."""
+
+    value: LengthDrift = Field(0.0, description="by how much readings grow; default 0 um/h")
+    standard_uncertainty: LengthDrift | None = Field(
+        None, description="of it; 0 um/h: exactly known; left out: unknown"
+    )
+
+
+class ScaleDriftSettings(Settings):
+    """How lengths that the scales say drift."""
+
+    value: RatioDrift = Field(0.0, description="by how much they grow; default 0 ppm/h")
+    standard_uncertainty: RatioDrift | None = Field(
+        None, description="of it; 0 ppm/h: exactly known; left out: unknown"
+    )
+
+
+class DriftTimesSettings(Settings):
+    """How long readings take where a file has no times of theirs."""
+
+    set_up: Duration = Field(0.0, description="before each position; default 0 s")
+    reading: Duration = Field(15.0, description="of a reading of a ball; default 15 s")
+    probe_change: Duration = Field(0.0, description="between probes in a position; default 0 s")
+
+
+class DriftPositionSettings(Settings):
+    """When a position is read."""
+
+    start: Duration | None = Field(
+        None, description="when its first reading begins, from any zero on"
+    )
+    reading: Duration | None = Field(None, description="how long a reading takes there")
+
+
+class DriftSettings(InfluenceSettings):
+    """Drift of the readings over the campaign, linear in time."""
+
+    in_order: ClassVar[bool] = True
+
+    kind: Literal["drift"] = Field(description="drift of readings, linear in time")
+    axes: Forms[PointDriftSettings, NonEmpty[PointDriftSettings], PointDriftSettings] | None = (
+        Field(None, description="of the reference point, the same of each axis, or a list by axis")
+    )
+    scale: Forms[ScaleDriftSettings, NonEmpty[ScaleDriftSettings], ScaleDriftSettings] | None = (
+        Field(None, description="of all scales together, or a list by axis")
+    )
+    times: DriftTimesSettings | None = Field(
+        None, description="how long readings take where a file has no times of theirs"
+    )
+    positions: dict[Name, DriftPositionSettings] | None = Field(
+        None, description="name of a position → when it is read"
+    )
+
+    def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
+        """Report that nothing drifts, unknown names, wrong lengths of lists and negative
+        uncertainties.
+        """
+        references.require(
+            self.axes is not None or self.scale is not None,
+            steps,
+            "nothing drifts; add axes or scale",
+        )
+        for name in self.positions or {}:
+            references.require(
+                name in positions,
+                (*steps, "positions", name),
+                f'unknown position "{name}"; {hint(name, positions)}',
+            )
+        for key, stated in (("axes", self.axes), ("scale", self.scale)):
+            if isinstance(stated, tuple) and references.dimension is not None:
+                references.require(
+                    len(stated) == references.dimension,
+                    (*steps, key),
+                    f"has {len(stated)} axes, but the experiment has {references.dimension}",
+                )
+            for one in stated if isinstance(stated, tuple) else [stated]:
+                u = getattr(one, "standard_uncertainty", None)
+                references.require(
+                    u is None or u >= 0.0,
+                    (*steps, key, "standard_uncertainty"),
+                    "is below zero; give it without the sign",
+                )
+
+    def influence(self, design: DesignParts) -> Drift:
+        """The drift in a design."""
+        d, times = design.machine.dimension, self.times or DriftTimesSettings.model_construct()
+        none = DriftPositionSettings.model_construct()
+        places = [(self.positions or {}).get(name, none) for name in design.positions.names]
+        clock = Clock(
+            times.set_up,
+            times.probe_change,
+            tuple(times.reading if one.reading is None else one.reading for one in places),
+            tuple(np.nan if one.start is None else one.start for one in places),
+        )
+        hours = max(float(np.abs(clock.hours(design.readings)).max(initial=0.0)), LEAST_HOURS)
+        reach = float(np.abs(design.machine.volume.corners).max())
+        parts: list[tuple[int, bool]] = []
+        parameters: list[InfluenceParameter] = []
+        if self.axes is not None:
+            listed = self.axes if isinstance(self.axes, tuple) else (self.axes,) * d
+            for axis, one in enumerate(listed):
+                words, u = f"drift along {AXIS_NAMES[axis]}", one.standard_uncertainty
+                u = np.inf if u is None else u
+                parts.append((axis, False))
+                parameters.append(InfluenceParameter(words, "m/h", one.value, u, hours))
+        if self.scale is not None:
+            by_axis = isinstance(self.scale, tuple)
+            for axis, scale in enumerate(
+                self.scale if isinstance(self.scale, tuple) else [self.scale]
+            ):
+                words = f"scale {AXIS_NAMES[axis]}" if by_axis else "the scales"
+                u = np.inf if scale.standard_uncertainty is None else scale.standard_uncertainty
+                parts.append((axis if by_axis else -1, True))
+                words = f"drift of {words}"
+                parameters.append(InfluenceParameter(words, "1/h", scale.value, u, hours * reach))
+        return Drift(clock, tuple(parts), tuple(parameters))
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When readings are made, in seconds: how long set-ups and changes of probe take and, by
+    position, what a reading takes and when the first begins, NaN where that follows from what comes
+    before.
+    """
+
+    set_up: float
+    probe_change: float
+    reading: tuple[float, ...]
+    starts: tuple[float, ...]
+
+    def hours(self, readings: Readings) -> Array:
+        """Time (m,) of all readings in their order from the mean of them on, in hours."""
+        beside = readings.beside or {}
+        seconds = beside.get(TIME, np.full(len(readings), np.nan))
+        if np.isnan(seconds).any():
+            seconds = self.seconds(readings)
+        return np.asarray((seconds - np.average(seconds, weights=readings.repeats)) / HOUR)
+
+    def seconds(self, readings: Readings) -> Array:
+        """Seconds (m,) at which readings are made, one after the other, repeats together."""
+        position, probe = readings.position, readings.probe
+        is_next = np.append(True, position[1:] != position[:-1])
+        is_changed = np.append(False, probe[1:] != probe[:-1]) & ~is_next
+        before = self.set_up * is_next + self.probe_change * is_changed
+        taken = np.array(self.reading)[position] * readings.repeats
+        seconds = np.cumsum(before + taken) - 0.5 * taken
+        seen: set[int] = set()
+        for first in np.flatnonzero(is_next).tolist():
+            start = self.starts[position[first]]
+            if not np.isnan(start) and int(position[first]) not in seen:
+                seconds[first:] += start - (seconds[first] - 0.5 * taken[first])
+            seen.add(int(position[first]))
+        return np.asarray(seconds)
+
+
+def even_clock(positions: int) -> Clock:
+    """A clock by which each reading takes as long as the others."""
+    return Clock(0.0, 0.0, (1.0,) * positions, (np.nan,) * positions)
+
+
+@dataclass(frozen=True)
+class Drift(Influence):
+    """Drifts by a clock; `parts` (p,) tell the axis of each parameter, -1 for all, and whether it
+    is of a scale.
+    """
+
+    clock: Clock
+    parts: tuple[tuple[int, bool], ...]
+    listed: tuple[InfluenceParameter, ...]
+
+    @property
+    def parameters(self) -> tuple[InfluenceParameter, ...]:
+        return self.listed
+
+    @property
+    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+        """The time of each reading, from any zero on."""
+        return {TIME: DURATION_UNITS}
+
+    @property
+    def column(self) -> str:
+        """Where the hours of its clock stand beside readings."""
+        return f"hours by {self.clock}"
+
+    def in_sequence(self, readings: Readings) -> Mapping[str, Array]:
+        """Hours from the mean of all readings on."""
+        return {self.column: self.clock.hours(readings)}
+
+    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
+        """What the scales say too much is taken off, and so locations grow with it."""
+        m, d = at.x.shape
+        hours = at.column(self.column)
+        derivative = np.zeros((m, d, len(self.parts)))
+        for k, (axis, of_scale) in enumerate(self.parts):
+            for j in range(d) if axis < 0 else (axis,):
+                derivative[:, j, k] = hours * at.x[:, j] if of_scale else hours
+        values = np.array([one.value for one in self.listed], float)
+        return derivative @ values, derivative

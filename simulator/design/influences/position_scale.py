@@ -1,0 +1,108 @@
+"""Scale of a position: in each position all lengths of an artefact seem longer, or shorter, by a
+ratio of their own.
+
+A ball at R y + o is found at R y + o + s R y, or with s for each axis; s is the same for all
+readings of a position. Temperatures that were not measured do that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...geometry.ball_layouts import Name
+from ...geometry.motions import AXIS_NAMES
+from ...inputs.messages import Steps
+from ...inputs.quantities import Ratio
+from ...inputs.settings import NonEmpty, hint
+from ...machines.protocol import Array, Integers
+from ..lookup import References
+from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+
+# Balls of a position that extend along an axis by less than this, in metres, tell nothing of the
+# scale there.
+LEAST_EXTENT = 1e-3
+
+
+class PositionScaleSettings(InfluenceSettings):
+    """How much scales differ from position to position."""
+
+    kind: Literal["position scale"] = Field(description="scale error of each position")
+    standard_uncertainty: Ratio | None = Field(
+        None,
+        description="of the scale in each position, independent of all others; left out: unknown",
+    )
+    by_axis: bool = Field(
+        False, description="whether the scale of each axis varies by itself; default: all as one"
+    )
+    positions: NonEmpty[Name] | None = Field(
+        None, description="positions whose scale varies; default: all"
+    )
+
+    def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
+        """Report unknown positions and an uncertainty below zero."""
+        for i, name in enumerate(self.positions or ()):
+            references.require(
+                name in positions,
+                (*steps, "positions", i),
+                f'unknown position "{name}"; {hint(name, positions)}',
+            )
+        u = self.standard_uncertainty
+        references.require(
+            u is None or u >= 0.0,
+            (*steps, "standard_uncertainty"),
+            "is below zero; give it without the sign",
+        )
+
+    def influence(self, design: DesignParts) -> PositionScale:
+        """The scales in a design."""
+        u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
+        names, d = design.positions.names, design.machine.dimension
+        place = np.full((len(names), d), -1)
+        parameters: list[InfluenceParameter] = []
+        for k in np.unique(design.readings.position).tolist():
+            if names[k] not in (self.positions or names):
+                continue
+            read = design.readings.position == k
+            balls = design.balls.places[np.unique(design.readings.ball[read])]
+            arms = balls @ design.positions.rotations[k].T
+            extent = arms.max(axis=0) - arms.min(axis=0)
+            reach = float(np.abs(arms).max(initial=LEAST_EXTENT))
+            for axes in [[axis] for axis in range(d)] if self.by_axis else [list(range(d))]:
+                if extent[axes].max() < LEAST_EXTENT:
+                    continue
+                place[k, axes] = len(parameters)
+                what = f"scale {AXIS_NAMES[axes[0]]}" if self.by_axis else "scale"
+                words = f"{what} in {names[k]}"
+                parameters.append(
+                    InfluenceParameter(words, "1", 0.0, u, reach, k, "scales of positions")
+                )
+        return PositionScale(place, tuple(parameters))
+
+
+@dataclass(frozen=True)
+class PositionScale(Influence):
+    """Scales of positions; `place` (k, d) is that of the parameter of each position and axis, -1
+    without one.
+    """
+
+    place: Integers
+    listed: tuple[InfluenceParameter, ...]
+
+    @property
+    def parameters(self) -> tuple[InfluenceParameter, ...]:
+        return self.listed
+
+    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
+        """Balls are found farther from the origin of their artefact."""
+        arms = at.arms
+        derivative = np.zeros((*arms.shape, len(self.listed)))
+        for axis in range(arms.shape[1]):
+            place = self.place[at.position, axis]
+            rows = np.flatnonzero(place >= 0)
+            derivative[rows, axis, place[rows]] = arms[rows, axis]
+        return np.zeros(arms.shape), derivative

@@ -1,0 +1,434 @@
+"""Drift of the reference point and of the scales against what is written down beside the program:
+the law itself, in dense computations and in simulated campaigns.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+import yaml
+from ballplate.montecarlo.experiments import trials
+from ballplate.rank.verdict import verdict
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.estimation.functions import linear_functions
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import simulated_readings
+from ballplate.uncertainty.quantities import QUANTITIES
+
+from tests.influences.campaigns import (
+    Real,
+    assert_covered,
+    coverage,
+    dense_spread,
+    file_with,
+    plain,
+    told_on_page,
+)
+from tests.reference import dense
+
+# Seconds: set-up, reading, change of probe.
+SET_UP, READING, CHANGE = 1800.0, 20.0, 90.0
+TIMES = {"set_up": "30 min", "reading": "20 s", "probe_change": "90 s"}
+POINT, SCALE = 2e-6, 1e-6
+SPREAD = np.array([POINT, POINT, POINT, SCALE])
+STATED = {
+    "kind": "drift",
+    "axes": {"standard_uncertainty": "2 um/h"},
+    "scale": {"standard_uncertainty": "1 ppm/h"},
+    "times": TIMES,
+}
+
+
+def hours(design: Design) -> Real:
+    """When readings are made, one after the other, from their mean on."""
+    clock, middles, before = 0.0, [], (-1, -1)
+    readings = design.readings
+    for position, probe, repeats in zip(
+        readings.position, readings.probe, readings.repeats, strict=True
+    ):
+        if position != before[0]:
+            clock += SET_UP
+        elif probe != before[1]:
+            clock += CHANGE
+        middles.append(clock + repeats * READING / 2)
+        clock += repeats * READING
+        before = (position, probe)
+    weights = readings.repeats / readings.repeats.sum()
+    return (np.array(middles) - float(np.array(middles) @ weights)) / 3600.0
+
+
+def law(design: Design, x: Any, e: Any) -> Any:
+    """What drifts e (4,) of the point and of the scales add to locations."""
+    t = hours(design)[:, None]
+    return t * e[:3] + e[3] * t * x
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return file_with(tmp_path_factory.mktemp("drawn"), [STATED])
+
+
+def test_the_parameters_are_those_stated(tmp_path: Path) -> None:
+    listed = STATED | {
+        "axes": [
+            {"value": "1 um/h", "standard_uncertainty": "0.5 um/h"},
+            {"standard_uncertainty": "0 um/h"},
+            {"value": "-3 nm/min"},
+        ],
+        "scale": [{}, {"value": "0.2 ppm/h"}, {"standard_uncertainty": "1 um/m/h"}],
+    }
+    design = lay_out(file_with(tmp_path, [listed]))
+    (drift,) = design.influences
+    found = [(p.name, p.unit, p.value, p.uncertainty) for p in drift.parameters]
+    assert found == [
+        ("drift along x", "m/h", 1e-6, 5e-7),
+        ("drift along y", "m/h", 0.0, 0.0),
+        ("drift along z", "m/h", pytest.approx(-1.8e-7), np.inf),
+        ("drift of scale x", "1/h", 0.0, np.inf),
+        ("drift of scale y", "1/h", 2e-7, np.inf),
+        ("drift of scale z", "1/h", 0.0, 1e-6),
+    ]
+    assert len(design.influence_parameters) == 5
+
+
+def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -> None:
+    design = lay_out(drawn)
+    (found, of), at = dense_spread(design, law, SPREAD), linearise(design)
+    assert at.deficiency == found.deficiency == 0
+    widened = {
+        symbol: found.of(np.pad(dense.jacobian(function, of.parameters), ((0, 0), (0, 4))))
+        for symbol, function in dense.quantities(of).items()
+    }
+    for symbol, expected in widened.items():
+        (functions,) = QUANTITIES[symbol].functions(design, at.layout)
+        values = at.uncertainty(linear_functions(at, functions))
+        np.testing.assert_allclose(values, expected, rtol=1e-6)
+    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
+    np.testing.assert_allclose(own, np.sqrt(np.diag(found.covariance))[-4:], rtol=1e-6)
+    # Of no use if drift had no part in them.
+    without = dense.standard_uncertainties(of)["U6"].mean()
+    assert widened["U6"].mean() > 1.01 * without
+
+
+def test_the_derivative_is_that_of_the_law(drawn: Experiment) -> None:
+    design = lay_out(drawn)
+    state, readings = nominal_state(design), design.readings
+    x = np.random.default_rng(3).random((len(readings), 3))
+    blocks = reading_blocks(design, state, readings, x)
+    assert blocks.by_influence is not None
+    for k, e in enumerate(np.eye(4)):
+        expected = -law(design, x, e) / design.machine.repeatability
+        np.testing.assert_allclose(blocks.by_influence[:, :, k], expected, rtol=1e-9, atol=1e-6)
+
+
+def test_a_drift_within_one_position_is_as_large_as_its_time_says(tmp_path: Path) -> None:
+    """On a perfect machine, one plate read once in rows of three: c t is all that is left, and
+    along a row t grows by a reading, from row to row by three.
+    """
+    told = {
+        "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": "1e-3 nm"},
+        "calibration": [],
+        "priors": [
+            {"parameter": name, "standard_uncertainty": "1e-3 nm"}
+            for name in ("EXX t", "EXY t", "EYY t", "EXZ t", "EYZ t", "EZZ t")
+        ],
+        "positions": [
+            {
+                "name": "one",
+                "plane": "z",
+                "level": "250 mm",
+                "corner": {"x": "0 mm", "y": "0 mm"},
+                "probes": ["down"],
+            }
+        ],
+        "evaluation": {"points": {"random": 5, "seed": 1}, "probe": "down"},
+        "error_model": {
+            "kind": "kinematic",
+            "arrangement": "MB2",
+            "position_coefficients": 2,
+            "rotation_coefficients": 1,
+        },
+    }
+    axes = [
+        {"standard_uncertainty": "3 um/h"},
+        {"standard_uncertainty": "0 um/h"},
+        {"standard_uncertainty": "0 um/h"},
+    ]
+    design = lay_out(file_with(tmp_path, [{"kind": "drift", "axes": axes, "times": TIMES}], **told))
+    at = linearise(design)
+    (functions,) = QUANTITIES["U5"].functions(design, at.layout)
+    found = at.uncertainty(linear_functions(at, functions))
+    first, second = np.triu_indices(9, 1)
+    between = design.balls.places[first] - design.balls.places[second]
+    along = between[:, 0] / np.linalg.norm(between, axis=1)
+    apart = np.abs(first - second) * READING / 3600.0
+    expected = np.abs(along) * apart * 3e-6
+    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-11)
+
+
+UNKNOWN = {"kind": "drift", "axes": {}, "scale": {}}
+
+
+@pytest.mark.parametrize(
+    ("times", "deficiency"),
+    [
+        # A point that drifts between positions alone is where these stand.
+        ({"set_up": "1 h", "reading": "0 s"}, 3),
+        # Nothing at all takes time.
+        ({"reading": "0 s"}, 4),
+        ({"set_up": "1 h", "reading": "20 s"}, 0),
+    ],
+)
+def test_the_verdict_tells_what_cannot_be_told_apart(
+    tmp_path: Path, times: dict[str, str], deficiency: int
+) -> None:
+    design = lay_out(file_with(tmp_path, [UNKNOWN | {"times": times}]))
+    found = verdict(linearise(design))
+    assert found.deficiency == deficiency
+    told = "; ".join(map(str, found.null))
+    for axis in "xyz":
+        assert (f"drift along {axis}" in told) == (deficiency > 0)
+    assert ("drift of the scales" in told) == (deficiency > 3)
+
+
+def test_one_plate_in_one_position_does_not_tell_its_drift(tmp_path: Path) -> None:
+    """Balls that are read once each, of a plate of which no more is known: the deficiency is that
+    of the dense computation, and the drift is named.
+    """
+    place = {"name": "one", "plane": "z", "level": "250 mm", "probes": ["down"]}
+    place |= {"corner": {"x": "0 mm", "y": "0 mm"}}
+    design = lay_out(
+        file_with(
+            tmp_path,
+            [{"kind": "drift", "axes": {}, "times": TIMES}],
+            positions=[place],
+            calibration=[],
+        )
+    )
+    found, of = dense_spread(
+        design, lambda d, x, e: law(d, x, np.append(e, 0.0)), np.full(3, np.inf)
+    )
+    judged = verdict(linearise(design))
+    without = verdict(linearise(plain(design)))
+    assert judged.deficiency == found.deficiency == without.deficiency + 3
+    assert "drift along x" in "; ".join(map(str, judged.null))
+    assert of.parameters
+
+
+def with_times(path: Path, values: Real, column: str) -> Path:
+    """The file of readings with a column of times."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    told = [f"{lines[0]},{column}"]
+    told += [f"{line},{value!r}" for line, value in zip(lines[1:], values.tolist(), strict=True)]
+    found = path.with_name(f"{column}.csv")
+    found.write_text("\n".join(told) + "\n", encoding="utf-8")
+    return found
+
+
+def test_times_of_the_file_replace_those_of_the_order(drawn: Experiment, tmp_path: Path) -> None:
+    simulated = simulated_readings(drawn, seed=4)
+    with (tmp_path / "plain.csv").open("w", encoding="utf-8", newline="") as stream:
+        write_readings(stream, simulated.design, simulated.readings, simulated.x)
+    design = lay_out(drawn)
+    # From any zero on, in any unit.
+    t = 3600.0 * hours(design) + 35000.0
+    files = [
+        (tmp_path / "plain.csv", design),
+        (with_times(tmp_path / "plain.csv", t, "time_s"), lay_out(other_times(tmp_path))),
+        (with_times(tmp_path / "plain.csv", t / 60.0, "time_min"), lay_out(other_times(tmp_path))),
+        (tmp_path / "plain.csv", lay_out(other_times(tmp_path))),
+    ]
+    one, same, again, wrong = (
+        estimate(seen.design, seen.x).state
+        for seen in (read_readings(path, of) for path, of in files)
+    )
+    for other in (same, again):
+        np.testing.assert_allclose(other.balls, one.balls, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(other.influences, one.influences, rtol=0, atol=1e-12)
+    assert np.abs(wrong.balls - one.balls).max() > 1e-8
+
+
+def test_ball_centres_are_found_where_readings_drift(drawn: Experiment, tmp_path: Path) -> None:
+    simulated = simulated_readings(drawn, seed=3)
+    centres = simulated.x + simulated.design.probes.offsets[simulated.readings.probe]
+    with (tmp_path / "centres.csv").open("w", encoding="utf-8", newline="") as stream:
+        write_readings(stream, simulated.design, simulated.readings, centres)
+    with pytest.raises(ExperimentError, match="as ball centres, but only to 50 mm"):
+        read_readings(tmp_path / "centres.csv", lay_out(drawn))
+
+
+def other_times(folder: Path) -> Experiment:
+    return file_with(folder, [STATED | {"times": {"set_up": "10 h", "reading": "1 s"}}])
+
+
+def test_stated_starts_are_those_of_the_clock(drawn: Experiment, tmp_path: Path) -> None:
+    """Positions that begin when they would by the times are read at the same time."""
+    design = lay_out(drawn)
+    t, position = hours(design), design.readings.position
+    starts = {
+        name: {"start": f"{3600.0 * (t[position == k][0] - t[0]):.9f} s"}
+        for k, name in enumerate(design.positions.names)
+    }
+    times = {"reading": "20 s", "probe_change": "90 s"}
+    other = lay_out(file_with(tmp_path, [STATED | {"times": times, "positions": starts}]))
+    for of, label in ((design, "stated"), (other, "starts")):
+        beside = of.readings.beside
+        assert beside is not None
+        (column,) = [values for name, values in beside.items() if name.startswith("hours")]
+        np.testing.assert_allclose(column, t, rtol=0, atol=1e-9, err_msg=label)
+
+
+def test_simulated_readings_without_noise_give_the_truth_back(tmp_path: Path) -> None:
+    """Each repeat at its own time, as in a file that has them one after the other."""
+    known = STATED | {
+        "axes": {"value": "3 um/h", "standard_uncertainty": "2 um/h"},
+        "scale": {"value": "2 ppm/h", "standard_uncertainty": "1 ppm/h"},
+    }
+    places = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))[
+        "positions"
+    ]
+    experiment = file_with(tmp_path, [known], positions=[one | {"repeats": 2} for one in places])
+    simulated = simulated_readings(experiment, exact=True)
+    with (tmp_path / "exact.csv").open("w", encoding="utf-8", newline="") as stream:
+        write_readings(stream, simulated.design, simulated.readings, simulated.x)
+    observed = read_readings(tmp_path / "exact.csv", lay_out(experiment))
+    found = estimate(observed.design, observed.x)
+    np.testing.assert_allclose(found.state.influences, [3e-6] * 3 + [2e-6], rtol=0, atol=2e-9)
+    np.testing.assert_allclose(found.state.balls, simulated.truth.balls, rtol=0, atol=1e-10)
+
+
+def test_balls_read_again_in_a_position_stay_apart(tmp_path: Path) -> None:
+    """Balls at the end of a position that stood at its beginning as well show the drift of the
+    point; read twice at once they show much less.
+    """
+    places = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))[
+        "positions"
+    ]
+    all_balls, corners = {"balls": "all"}, {"balls": ["r1c1", "r1c3", "r3c1", "r3c3"]}
+
+    def uncertainty(again: bool) -> Real:
+        groups = [all_balls, corners] if again else [all_balls]
+        changed = [
+            {key: value for key, value in one.items() if key != "probes"}
+            | {"readings": [group | {"probes": one["probes"]} for group in groups]}
+            for one in places
+        ]
+        influences = [{"kind": "drift", "axes": {}, "times": {"reading": "20 s"}}]
+        design = lay_out(file_with(tmp_path, influences, positions=changed))
+        at = linearise(design)
+        return at.of_shared(np.eye(len(at.layout))[at.layout.influences])
+
+    assert (uncertainty(True) < 0.6 * uncertainty(False)).all()
+
+
+def test_declared_drifts_are_covered(drawn: Experiment) -> None:
+    design = lay_out(drawn)
+    assert_covered(coverage(design, design, law, SPREAD, 40), 40)
+
+
+@pytest.mark.long
+def test_declared_drifts_are_covered_in_many_campaigns(drawn: Experiment) -> None:
+    design = lay_out(drawn)
+    assert_covered(coverage(design, design, law, SPREAD, 3000), 3000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["drift declared", "drift unknown", "drift not declared"])
+def test_the_page_states_what_is_wrong_otherwise(
+    name: str, drawn: Experiment, tmp_path: Path
+) -> None:
+    design = lay_out(drawn)
+    told = {
+        "drift declared": design,
+        "drift unknown": lay_out(file_with(tmp_path, [UNKNOWN | {"times": TIMES}])),
+        "drift not declared": plain(design),
+    }[name]
+    found = coverage(design, told, law, SPREAD, 400)
+    assert told_on_page(name) == pytest.approx(found.row, rel=0.01, abs=0.5)
+
+
+def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
+    outcome = trials(drawn, 1024).outcome
+    assert outcome is not None and not outcome.failed
+    for one in outcome.comparisons.values():
+        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
+
+
+def test_fit_tells_the_drift(drawn: Experiment) -> None:
+    fitted = bp.fit(drawn, bp.simulate(drawn, seed=5))
+    truth = simulated_readings(drawn, seed=5).truth.influences
+    told = {one.name: one for one in fitted.estimates if one.kind == "influence"}
+    off = np.array([one.value for one in told.values()]) - truth
+    u = np.array([one.standard_uncertainty for one in told.values()])
+    assert len(told) == 4 and (np.abs(off) < 4.5 * u).all() and (u <= SPREAD * 1.001).all()
+    (line,) = [one for one in fitted.lines() if one.startswith("drift of the scales")]
+    assert line.split()[-1] == "ppm/h"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"axes": None, "scale": None}, "nothing drifts; add axes or scale"),
+        ({"axes": {"value": "1 um"}}, "is a length; a length per time is expected"),
+        ({"scale": {"value": "1 um/h"}}, "is a length per time; a ratio per time is expected"),
+        ({"axes": [{}, {}]}, "has 2 axes, but the experiment has 3"),
+        ({"scale": {"standard_uncertainty": "-1 ppm/h"}}, "is below zero"),
+        ({"positions": {"z lwo": {"start": "1 h"}}}, 'did you mean "z low"?'),
+    ],
+)
+def test_what_is_wrong_is_told_at_its_place(
+    tmp_path: Path, change: dict[str, Any], expected: str
+) -> None:
+    told = {key: value for key, value in (STATED | change).items() if value is not None}
+    with pytest.raises(ExperimentError) as caught:
+        file_with(tmp_path, [told])
+    assert expected in str(caught.value) and "influences[0]" in str(caught.value)
+
+
+# What is read again, by the name of the row on the documentation's page.
+def _again(name: str) -> list[dict[str, Any]]:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    places: list[dict[str, Any]] = yaml.safe_load(text)["positions"]
+    if name == "the first position once more at the end":
+        return [*places, places[0] | {"name": "z low again"}]
+    if name == "the corners once more at the end of each position":
+        groups = [{"balls": "all"}, {"balls": ["r1c1", "r1c3", "r3c1", "r3c3"]}]
+        return [
+            {key: value for key, value in one.items() if key != "probes"}
+            | {"readings": [group | {"probes": one["probes"]} for group in groups]}
+            for one in places
+        ]
+    return places
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "nothing",
+        "the first position once more at the end",
+        "the corners once more at the end of each position",
+    ],
+)
+def test_the_page_states_what_reading_again_buys(name: str, tmp_path: Path) -> None:
+    """The uncertainties of unknown drifts, and the mean U6 with them, by the dense computation."""
+    places = _again(name)
+    design = lay_out(file_with(tmp_path, [UNKNOWN | {"times": TIMES}], positions=places))
+    found, of = dense_spread(design, law, np.full(4, np.inf))
+    u = np.sqrt(np.diag(found.covariance))[-4:]
+    rows = np.pad(dense.jacobian(dense.quantities(of)["U6"], of.parameters), ((0, 0), (0, 4)))
+    without = dense.standard_uncertainties(of)["U6"].mean()
+    expected = [1e6 * u[:3].max(), 1e6 * u[3], 1e6 * found.of(rows).mean(), 1e6 * without]
+    assert told_on_page(name) == pytest.approx(expected, rel=0.01)
+    at = linearise(design)
+    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
+    np.testing.assert_allclose(own, u, rtol=1e-6)

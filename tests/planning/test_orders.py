@@ -1,0 +1,287 @@
+"""Orders of a plan against all orders that there are, and what drift does against readings that
+are estimated again.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+import yaml
+from ballplate.planning.changeover import kind_of
+from ballplate.planning.drift_in_orders import DriftSize, drift_effect
+from ballplate.planning.orders import ORDERS, ReadingOrder, in_order, with_probes
+from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.planning.selection import Campaign
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Candidate, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.uncertainty.quantities import evaluation_points
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+TOP = Path(__file__).parents[2]
+SET_UP, READING, PROBE, PLANE = 900.0, 12.0, 120.0, 1500.0
+TIMES = {"set_up": "15 min", "reading": "12 s", "probe_change": "2 min", "plane_change": "25 min"}
+DRIFT = {
+    "kind": "drift",
+    "axes": {"standard_uncertainty": "0.5 um/h"},
+    "scale": {"standard_uncertainty": "0.3 ppm/h"},
+}
+
+
+def pool_file(folder: Path, count: int = 6, **changed: Any) -> Path:
+    """The first example's positions as a pool, with a smaller plate and fewer coefficients."""
+    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
+    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    told["true_machine"] = {"kind": "zero"}
+    told["evaluation"]["points"] = {"random": 12, "seed": 3}
+    first, *others = told["positions"][:count]
+    told |= {"positions": [first], "pool": {"candidates": others, "times": TIMES}}
+    path = folder / "pool.yaml"
+    path.write_text(yaml.safe_dump(told | changed), encoding="utf-8")
+    return path
+
+
+def planned(folder: Path, order: Any = None, count: int = 6, **changed: Any) -> Campaign:
+    return bp.plan(pool_file(folder, count, **changed), positions=count, order=order)
+
+
+def positions_of(campaign: Campaign) -> list[Candidate]:
+    return [one for one in campaign.chosen if isinstance(one.item, Position)]
+
+
+def changes_of(sequence: Any) -> float:
+    """Seconds of change-over between positions with their probes in order."""
+    seconds = 0.0
+    for (one, probes), (other, others) in zip(sequence, sequence[1:], strict=False):
+        seconds += PLANE * (kind_of(one).plane != kind_of(other).plane)
+        seconds += PROBE * (probes[-1] != others[0])
+    return seconds
+
+
+def probe_orders(own: Any) -> Any:
+    """All ways to read positions in this order with their probes in any."""
+    return (
+        list(zip(own, probes, strict=True))
+        for probes in product(*(permutations(one.item.probes) for one in own))
+    )
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    return planned(tmp_path_factory.mktemp("five"), "least-drift", 5)
+
+
+def test_probes_leave_the_fewest_changes(campaign: Campaign) -> None:
+    own = positions_of(campaign)
+    generator = np.random.default_rng(5)
+    for _ in range(12):
+        mixed = [own[k] for k in generator.permutation(len(own))]
+        least = min(changes_of(one) for one in probe_orders(mixed))
+        assert changes_of(with_probes(mixed, campaign.pool.changes)) == least
+
+
+def test_the_least_change_over_is_that_of_all_orders(campaign: Campaign) -> None:
+    own = positions_of(campaign)
+    every = min(
+        changes_of(with_probes(mixed, campaign.pool.changes)) for mixed in permutations(own)
+    )
+    told = {one.order: one.change_seconds for one in campaign.orders}
+    assert told["change-over"] == every
+    assert list(told) == list(ORDERS) and min(told.values()) == every
+
+
+def test_mirrored_orders_go_there_and_back(tmp_path: Path) -> None:
+    campaign = planned(tmp_path, "mirrored")
+    planes = [step.plane for step in campaign.sheet.steps]
+    assert planes == planes[::-1] and len(set(planes)) == 3
+    names = sorted(step.name for step in campaign.sheet.steps)
+    assert names == sorted(one.name for one in campaign.chosen)
+
+
+def test_single_positions_stand_in_the_middle(campaign: Campaign) -> None:
+    """Of five positions one plane has one alone."""
+    sequence = in_order(positions_of(campaign), campaign.pool.changes, ReadingOrder("mirrored"))
+    planes = [one.plane for one, _ in sequence]
+    assert planes[2] == "y" and planes[:2] == planes[:2:-1] and len(set(planes)) == 3
+
+
+def test_blocks_have_each_plane_once_and_are_those_of_the_seed(tmp_path: Path) -> None:
+    path, found = pool_file(tmp_path), []
+    for seed in (1, 1, 2):
+        campaign = bp.plan(path, positions=6, order="blocks", seed=seed)
+        planes = [step.plane for step in campaign.sheet.steps]
+        assert sorted(planes[:3]) == sorted(planes[3:]) == ["x", "y", "z"]
+        found.append([step.name for step in campaign.sheet.steps])
+    assert found[0] == found[1] and found[1] != found[2]
+
+
+def middles(sheet: RunSheet) -> dict[tuple[str, str], Real]:
+    """When balls are read, in seconds, by position and probe, as the times are stated."""
+    found, clock = {}, 0.0
+    for step in sheet.steps:
+        clock += step.change_seconds + SET_UP
+        count = step.readings // len(step.probes)
+        for k, probe in enumerate(step.probes):
+            clock += PROBE * (k > 0)
+            found[step.name, probe] = clock + READING * (np.arange(count) + 0.5)
+            clock += READING * count
+    return found
+
+
+def changed_distances(campaign: Campaign, sheet: RunSheet, axis: int) -> Real:
+    """By how much distances of a fit are wrong that knows of no drift, of 1 um/h along an axis, or
+    of 1 ppm/h of the scales where that is -1.
+    """
+    chosen = with_chosen(campaign.experiment, sheet.written)
+    design = lay_out(chosen)
+    state, readings = nominal_state(design), design.readings
+    x = expected_readings(design, state, readings)
+    by_step = middles(sheet)
+    t = np.concatenate(
+        [
+            by_step[design.positions.names[k], design.probes.names[probe]]
+            for k, probe in dict.fromkeys(
+                zip(readings.position.tolist(), readings.probe.tolist(), strict=True)
+            )
+        ]
+    )
+    hours = (t - t.mean())[:, None] / 3600.0
+    drifted = x + 1e-6 * hours * (x if axis < 0 else np.eye(3)[axis])
+    lengths = []
+    for seen in (drifted, x):
+        places = evaluation_points(design).at(design, estimate(design, seen).state)
+        first, second = np.triu_indices(len(places), 1)
+        lengths.append(np.linalg.norm(places[first] - places[second], axis=1))
+    return np.abs(lengths[0] - lengths[1])
+
+
+def test_what_a_drift_does_is_what_readings_with_it_do(campaign: Campaign) -> None:
+    for told in campaign.orders:
+        sheet = run_sheet(
+            campaign.chosen,
+            campaign.pool.changes,
+            order=campaign.order if told.order == "least-drift" else ReadingOrder(told.order, 1),
+        )
+        assert told.seconds == pytest.approx(sheet.seconds)
+        of_scale = changed_distances(campaign, sheet, -1).max()
+        of_point = max(changed_distances(campaign, sheet, axis).max() for axis in range(3))
+        assert told.of_scale == pytest.approx(of_scale, rel=1e-3)
+        assert told.of_point == pytest.approx(of_point, rel=1e-3)
+
+
+def test_no_order_has_less_drift_of_the_scales(campaign: Campaign) -> None:
+    """All 120 orders of five positions, each computed by itself."""
+    own, size = positions_of(campaign), DriftSize()
+    others = [one for one in campaign.chosen if not isinstance(one.item, Position)]
+    found = []
+    for mixed in permutations(own):
+        order = ReadingOrder("least-drift", 1, tuple(one.name for one in mixed))
+        sheet = run_sheet([*own, *others], campaign.pool.changes, order=order)
+        effect = drift_effect(
+            campaign.experiment, "least-drift", sheet, campaign.pool.changes, size
+        )
+        found.append(effect.of_scale)
+    told = {one.order: one.of_scale for one in campaign.orders}
+    assert told["least-drift"] == pytest.approx(min(found), rel=1e-6)
+    assert told["least-drift"] <= min(told.values()) and max(found) > 1.5 * min(found)
+
+
+def test_exchanges_find_an_order_near_the_least(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = pool_file(tmp_path)
+    least = {one.order: one.of_scale for one in bp.plan(path, positions=6, order="blocks").orders}
+    monkeypatch.setattr("ballplate.planning.least_drift.MOST_TRIED", 3)
+    near = {one.order: one.of_scale for one in bp.plan(path, positions=6, order="blocks").orders}
+    assert least["least-drift"] <= near["least-drift"] * 1.02 < 1.1 * least["least-drift"]
+
+
+def test_the_file_of_a_plan_has_the_times_of_its_order(tmp_path: Path) -> None:
+    for order in ("change-over", "blocks"):
+        campaign = planned(tmp_path, order, influences=[DRIFT])
+        (tmp_path / "chosen.yaml").write_text(campaign.to_yaml(tmp_path), encoding="utf-8")
+        (chosen,) = load(tmp_path / "chosen.yaml")
+        assert [one.name for one in chosen.positions] == [one.name for one in campaign.sheet.steps]
+        told = bp.run(chosen).to_dict()["quantities"]["U6"]["average"]
+        expected = campaign.prediction.to_dict()["quantities"]["U6"]["average"]
+        assert told == pytest.approx(expected, rel=1e-9)
+        beside = lay_out(chosen).readings.beside
+        assert beside is not None
+        (hours,) = [values for name, values in beside.items() if name.startswith("hours")]
+        t = np.concatenate([np.asarray(one) for one in middles(campaign.sheet).values()])
+        np.testing.assert_allclose(hours, (t - t.mean()) / 3600.0, rtol=0, atol=1e-6)
+
+
+def test_a_drift_has_no_part_in_the_choice_and_is_told(tmp_path: Path) -> None:
+    with_drift, without = planned(tmp_path, influences=[DRIFT]), planned(tmp_path)
+    assert with_drift.value == pytest.approx(without.value, rel=1e-12)
+    lines = "\n".join(with_drift.lines())
+    assert "positions were chosen as if nothing drifted" in lines and "0.3000 ppm/h" in lines
+    assert not without.orders and "drift" not in "\n".join(without.lines())
+    u6 = [one.prediction.to_dict()["quantities"]["U6"]["average"] for one in (with_drift, without)]
+    assert u6[0] > u6[1]
+
+
+def test_sizes_of_drift_scale_what_it_does(tmp_path: Path) -> None:
+    path = pool_file(tmp_path)
+    one = bp.plan(path, positions=6, drift=["1 um/h", "1 ppm/h"])
+    other = bp.plan(path, positions=6, drift=["3 um/h", "0.5 ppm/h"])
+    for first, second in zip(one.orders, other.orders, strict=True):
+        assert second.of_point == pytest.approx(3.0 * first.of_point, rel=1e-6)
+        assert second.of_scale == pytest.approx(0.5 * first.of_scale, rel=1e-6)
+        assert second.estimated == pytest.approx(first.estimated, rel=1e-6)
+        assert first.estimated > first.without
+
+
+def test_more_hours_than_allowed_are_told(tmp_path: Path) -> None:
+    campaign = bp.plan(pool_file(tmp_path), hours=3.0, order="mirrored")
+    (line,) = [one for one in campaign.lines() if one.startswith("mirrored")]
+    assert line.endswith("chosen, more hours than allowed")
+
+
+def test_a_campaign_that_has_begun_has_its_order(tmp_path: Path) -> None:
+    path = pool_file(tmp_path)
+    readings = bp.simulate(load(_drawn(tmp_path))[0], seed=1)
+    done = readings[readings["position"] == "z low"]
+    with pytest.raises(ExperimentError, match="has begun, and its times are unknown"):
+        bp.plan(path, positions=3, done=done, order="mirrored")
+
+
+def _drawn(folder: Path) -> Path:
+    told = yaml.safe_load((folder / "pool.yaml").read_text(encoding="utf-8"))
+    told["positions"] += told.pop("pool")["candidates"]
+    (folder / "drawn.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
+    return folder / "drawn.yaml"
+
+
+def test_drift_of_length_standards_is_refused_or_told(tmp_path: Path) -> None:
+    told = yaml.safe_load(pool_file(tmp_path).read_text(encoding="utf-8"))
+    bar = {"kind": "two_spheres", "length": "500 mm", "role": "length_standard"}
+    told["artefacts"]["bar"] = bar
+    places = [one | {"artefact": "plate"} for one in told["pool"]["candidates"]]
+    bars = {"name": "bar", "artefact": "bar", "plane": "z", "level": "300 mm", "probes": ["down"]}
+    bars |= {"corner": {"x": "100 mm", "y": "100 mm"}}
+    told["pool"]["candidates"] = [*places, bars]
+    told["positions"] = [one | {"artefact": "plate"} for one in told["positions"]]
+    told["pool"]["limits"] = {"keep": ["bar"]}
+    calibration = [told["calibration"][0] | {"artefact": "plate"}]
+    length = {"kind": "distances", "artefact": "bar", "pairs": "all"}
+    told["calibration"] = [*calibration, length | {"standard_uncertainty": "0.2 um"}]
+    path = tmp_path / "bar.yaml"
+    path.write_text(yaml.safe_dump(told), encoding="utf-8")
+    lines = "\n".join(bp.plan(path, positions=7, order="mirrored").lines())
+    assert "no figures of drift: that of length standards is not followed" in lines
+    with pytest.raises(ExperimentError, match="has length standards"):
+        bp.plan(path, positions=7, order="least-drift")
