@@ -142,12 +142,14 @@ def read_readings(
     has_uncertainty = not np.isnan(lengths[:, d]).all()
     if has_uncertainty:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
-        none = "no standard uncertainty, and other rows have one; write it, or leave the column out"
-        wrong = [row for row in rows if not row.lengths[d] > 0.0]
-        messages += [
-            row.mark.message("", none if np.isnan(row.lengths[d]) else text)
-            for row in wrong[:MOST_MESSAGES]
-        ]
+        wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
+        messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
+    for k, name in enumerate(("standard uncertainty", *units), start=d):
+        blank = np.isnan(lengths[:, k])
+        if blank.any() and not blank.all():
+            text = f"no {name}, and other rows have one; write it, or leave the column out"
+            marks = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
+            messages += [mark.message("", text) for mark in marks]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     given, stated = lengths[:, :d], lengths[:, d]

@@ -147,3 +147,34 @@ def test_a_plan_goes_on_from_readings_of_holes(
     status = main(["plan", "holes.yaml", *options])
     captured = capsys.readouterr()
     assert status == 0, captured.err
+
+
+@pytest.mark.parametrize(
+    ("influence", "column"),
+    [
+        ("{kind: drift, scale: {standard_uncertainty: 0.3 ppm/h}}", "time_h"),
+        (
+            "{kind: temperature, artefact_expansion: {value: 11 um/m/K},"
+            " artefact_temperature: {value: 21 degC}}",
+            "temperature_artefact_degC",
+        ),
+    ],
+)
+def test_some_times_or_temperatures_are_missing(
+    folder: Path, capsys: pytest.CaptureFixture[str], influence: str, column: str
+) -> None:
+    """Otherwise those that are there would count for nothing, or others be made up."""
+    text = Path("holes.yaml").read_text(encoding="utf-8")
+    Path("holes.yaml").write_text(f"{text}influences: [{influence}]\n", encoding="utf-8")
+    lines = Path("readings.csv").read_text(encoding="utf-8").splitlines()
+    for sign in ",;":
+        for wanted in (0, 3):
+            rows = [
+                f"{line},{'' if k == 1 and wanted else 20 + 0.01 * k}"
+                for k, line in enumerate(lines[1:])
+            ]
+            table = "\n".join([f"{lines[0]},{column}", *rows]).replace(",", sign)
+            Path("lab.csv").write_text(table, encoding="utf-8")
+            status, _, complaint = fitted(capsys, "lab.csv")
+            assert status == wanted, complaint
+            assert not wanted or complaint.startswith("lab.csv:3:")
