@@ -148,8 +148,8 @@ def read_readings(
         blank = np.isnan(lengths[:, k])
         if blank.any() and not blank.all():
             text = f"no {name}, and other rows have one; write it, or leave the column out"
-            marks = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
-            messages += [mark.message("", text) for mark in marks]
+            without = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
+            messages += [mark.message("", text) for mark in without]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     given, stated = lengths[:, :d], lengths[:, d]
