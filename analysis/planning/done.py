@@ -14,6 +14,7 @@ from ballplate.simulator.design.arrays import Readings
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
 from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.quantities import length_text
 from ballplate.simulator.inputs.settings import hint
@@ -71,7 +72,9 @@ def done_candidates(
     wrong: list[Message] = []
     settings, d = experiment.readings, experiment.dimension
     # Where decimals could be thousands, the whole is refused when it is read below.
-    table = read_source(path, known, settings, wrong, lambda x: False, d, {})
+    in_plane = any(one.reads == "in plane" for one in experiment.artefacts.values())
+    empty = AXIS_NAMES[:d] if in_plane else ()
+    table = read_source(path, known, settings, wrong, lambda x: False, d, {}, empty)
     if wrong:
         raise ExperimentError(wrong)
     messages: dict[str, Message] = {}

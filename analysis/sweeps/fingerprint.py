@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from ballplate.simulator.design.observations.python_values import PythonCalibration
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.settings import Settings
 from ballplate.simulator.machines.settings import PythonSettings
 from pydantic import BaseModel
 
@@ -43,6 +43,9 @@ LEFT_OUT = (
     "builder",
     "_folder",
 )
+# The same, of single classes: how the laboratory's tables are read; and functions in Python, which
+# the text of their module and their options tell.
+LEFT_OUT_OF = {"Experiment": ("readings",), "PythonCalibration": ("functions",)}
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
@@ -50,7 +53,7 @@ EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 # Keys that files did not have at first, by what has them: where they are left out, all is as it was
 # without them.
 LATER_KEYS = {
-    "Experiment": ("influences", "noise", "stars", "readings"),
+    "Experiment": ("influences", "noise", "stars"),
     "ArtefactSettings": ("reads", "flatness"),
     "DistanceCalibration": ("root",),
     "CoordinateCalibration": ("root",),
@@ -133,10 +136,13 @@ def _add(digest: _Digest, value: Any) -> None:
         _settings(digest, value)
     elif is_dataclass(value) and not isinstance(value, type):
         _text(digest, f"object {type(value).__name__}")
+        left_out = (*LEFT_OUT, *LEFT_OUT_OF.get(type(value).__name__, ()))
         for name, found in _entries(value):
-            if name not in LEFT_OUT and not _is_as_before(value, name, found):
+            if name not in left_out and not _is_as_before(value, name, found):
                 _text(digest, EARLIER_NAMES.get(name, name))
                 _add(digest, found)
+        if isinstance(value, PythonCalibration):
+            _text(digest, module_text(value.object, value.source))
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
 
@@ -186,13 +192,14 @@ def _settings(digest: _Digest, value: BaseModel) -> None:
             _text(digest, name)
             _add(digest, item)
     if isinstance(value, PythonSettings):
-        _text(digest, module_text(value))
+        _text(digest, module_text(value.object, value._folder))
 
 
-def module_text(settings: Settings) -> str:
-    """The text of the module with a user's own error model; empty where Python has none of it."""
-    name = str(getattr(settings, "object", "")).partition(":")[0]
-    folder = getattr(settings, "_folder", None)
+def module_text(made_by: str, folder: Path | None) -> str:
+    """The text of the module with a user's own error model or calibration, `made_by` an object
+    there; empty where Python has none of it.
+    """
+    name = made_by.partition(":")[0]
     places = [] if folder is None else [folder.joinpath(*name.split(".")).with_suffix(".py")]
     try:
         found = importlib.util.find_spec(name)

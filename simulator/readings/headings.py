@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -143,7 +143,7 @@ class Headings:
 @dataclass(frozen=True)
 class Vocabulary:
     """What headings may name: probes and positions, by their names, columns `stated`, and `further`
-    ones of numbers, with the units that each may have.
+    ones of numbers, with the units that each may have. Cells of the axes `empty` may be so.
     """
 
     axes: tuple[str, ...]
@@ -151,6 +151,7 @@ class Vocabulary:
     positions: tuple[str, ...]
     stated: ColumnsSettings | None = None
     further: Mapping[str, Mapping[str, Fraction]] = field(default_factory=dict)
+    empty: Collection[str] = ()
 
     @cached_property
     def beside_axes(self) -> dict[str, dict[str, str]]:

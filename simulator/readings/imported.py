@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -37,7 +38,8 @@ IN_WORDS = {
 @dataclass(frozen=True, eq=False)
 class ImportedReading:
     """A ball's centre (3,) in metres, with the names that its feature has; `uncertainty` is that of
-    a centre from points on the surface, of its least certain axis.
+    a centre from points on the surface, of its least certain axis. Its co-ordinate along the axis
+    `across` is not read, -1 where all are.
     """
 
     mark: Mark
@@ -46,6 +48,7 @@ class ImportedReading:
     probe: str
     centre: tuple[float, float, float]
     uncertainty: float | None = None
+    across: int = -1
 
 
 @dataclass(frozen=True)
@@ -63,8 +66,8 @@ class ImportedReadings:
     dimension: int = 3
 
     def columns(self, uncertainties: bool = False) -> dict[str, list[str] | list[float]]:
-        """The columns of a table of readings, in millimetres; without one of probes where no
-        report names any.
+        """The columns of a table of readings, in millimetres, NaN where a co-ordinate is not read;
+        without one of probes where no report names any.
         """
         rows = self.readings
         columns: dict[str, list[str] | list[float]] = {
@@ -74,7 +77,10 @@ class ImportedReadings:
         if any(one.probe for one in rows):
             columns["probe"] = [one.probe for one in rows]
         for i, axis in enumerate("xyz"[: self.dimension]):
-            columns[f"{axis}_mm"] = [round(1e3 * one.centre[i], DECIMALS) for one in rows]
+            columns[f"{axis}_mm"] = [
+                math.nan if one.across == i else round(1e3 * one.centre[i], DECIMALS)
+                for one in rows
+            ]
         if uncertainties and all(one.uncertainty is not None for one in rows):
             columns["u_um"] = [1e6 * (one.uncertainty or 0.0) for one in rows]
         return columns
@@ -86,7 +92,8 @@ class ImportedReadings:
         writer = CsvWriter(stream)
         columns = self.columns(uncertainties)
         writer.writerow(list(columns))
-        writer.writerows(list(zip(*columns.values(), strict=True)))
+        for row in zip(*columns.values(), strict=True):
+            writer.writerow(["" if cell != cell else cell for cell in row])
 
     @property
     def key(self) -> str:
@@ -178,6 +185,11 @@ def import_readings(
             " surface, which leave"
             f" {1e6 * variance**0.5:.3g} µm ({freedom} degrees of freedom):"
             f" standard uncertainty of a co-ordinate of a centre up to {1e6 * worst:.3g} µm"
+        )
+    left_out = sum(one.across >= 0 for one in readings)
+    if left_out:
+        told.append(
+            f"the co-ordinates across plates that are read in their plane, {left_out}, are left out"
         )
     remarks = [remark for one in found for remark in (*one.report.remarks, *one.remarks)]
     systems = {feature.system for one in found for feature, _, _ in one.features}
@@ -308,9 +320,13 @@ def _readings(
         if not probe:
             probe = _probe(feature, parts["position"], design, str(path))
         assert feature.centre is not None
+        name, across = parts["position"], -1
+        if design is not None and design.positions.across is not None:
+            positions = design.positions.names
+            across = design.positions.across[positions.index(name)] if name in positions else -1
         readings.append(
             ImportedReading(
-                feature.mark, parts["position"], parts["ball"], probe, feature.centre, uncertainty
+                feature.mark, name, parts["ball"], probe, feature.centre, uncertainty, int(across)
             )
         )
     return readings

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Readings, locations, measured, nominal_state
 from ..estimation.consensus import consensus_motion
 from ..estimation.initial import initial_state
 from ..experiment.readings_section import CompensationSettings, ReadingsSettings
@@ -82,15 +82,18 @@ def judge_offsets(
     design.
     """
     plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
-    own, offsets = readings.select(plate), design.probes.offsets[readings.probe[plate]]
+    own = readings.select(plate)
+    # What is not read across a plate is where it was drawn, whatever the offset.
+    is_read = measured(design, own)
+    offsets = np.where(is_read, design.probes.offsets[own.probe], 0.0)
+    x = np.where(is_read, x[plate], locations(design, nominal_state(design), own))
     telling = _of_several_offsets(own, offsets)
     if not telling.any():
         return OffsetVerdict({}, None)
     pitch = ball_pitches(design)[own.ball]
-    left = offsets if applied is None else applied[own.probe]
+    left = offsets if applied is None else np.where(is_read, applied[own.probe], 0.0)
     seen = {
-        one.name: x[plate] + (one.times * offsets if one.times else offsets - left)
-        for one in HYPOTHESES
+        one.name: x + (one.times * offsets if one.times else offsets - left) for one in HYPOTHESES
     }
     scatter = {
         name: float(np.median(_apart(design, own, places)[telling]))
@@ -149,7 +152,8 @@ def doubt_about_offsets(
     :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
     """
     stated = settings.coordinates
-    if not design.probes.offsets.any():
+    is_read = measured(design, readings)
+    if not (is_read & (design.probes.offsets[readings.probe] != 0.0)).any():
         return ()
     verdict = judge_offsets(design, readings, x, controller_offsets(design, settings))
     taken = "ball centres" if stated == "part" else stated or HYPOTHESES[0].name
@@ -165,7 +169,7 @@ def doubt_about_offsets(
         f"readings with different probes agree to {shown[verdict.right]} (the median) as"
         f" {verdict.right}, but only to {shown[taken]} as {taken}, {why}; {REMEDIES[verdict.right]}"
     )
-    if verdict.right == "ball centres":
+    if verdict.right == "ball centres" and is_read.all():
         found = poses_found(design, readings, x) or {}
         if any(angle > TURNED for angle, _ in found.values()):
             text += (

@@ -95,6 +95,12 @@ def read_readings(
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
         wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
         messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
+    for k, name in enumerate(("standard uncertainty", *units), start=d):
+        blank = np.isnan(lengths[:, k])
+        if blank.any() and not blank.all():
+            text = f"no {name}, and other rows have one; write it, or leave the column out"
+            without = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
+            messages += [mark.message("", text) for mark in without]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     given, stated = lengths[:, :d], lengths[:, d]
@@ -134,7 +140,7 @@ def read_readings(
             ]
         )
     marks = tuple(row.mark for row in rows)
-    doubt = () if empty else doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
     observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks)

@@ -122,7 +122,7 @@ def read_source(
         if not wrong:
             return TableRows(rows)
     words = Vocabulary(
-        axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units
+        axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units, empty
     )
     try:
         return read_any_table(text, encoding, words, settings, is_possible)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from ..experiment.readings_section import ReadingsSettings
@@ -146,7 +146,7 @@ def forms_of(lines: Sequence[Line], words: Vocabulary, settings: ReadingsSetting
             continue
         for decimal in decimals:
             # Of a table of commas, they separate columns unless quoted.
-            found.append(_form(lines, header, headings, separator, decimal))
+            found.append(_form(lines, header, headings, separator, decimal, words.empty))
     if found:
         return found
     raise max(reasons, key=lambda error: len(error.cells))
@@ -195,7 +195,12 @@ def _is_number(cell: str) -> bool:
 
 
 def _form(
-    lines: Sequence[Line], header: int, headings: Headings, separator: str, decimal: str
+    lines: Sequence[Line],
+    header: int,
+    headings: Headings,
+    separator: str,
+    decimal: str,
+    may_be_empty: Collection[str] = (),
 ) -> Form:
     """The rows below the headings, and what is wrong with them in this form."""
     sign = SEPARATORS[separator][0]
@@ -230,7 +235,7 @@ def _form(
         if all(i >= len(cells) or cells[i].casefold() in NOTHING for i in places):
             (empty if cells[ball] else remarks).append(at)
             continue
-        if reason := _wrong_row(cells, headings, number, decimal):
+        if reason := _wrong_row(cells, headings, number, decimal, may_be_empty):
             wrong.append((at, reason))
         rows.append((at, cells))
     # In between they may say what is true of the rows below only.
@@ -280,7 +285,11 @@ def _holds_no_number(cells: Sequence[str], places: Sequence[int], number: re.Pat
 
 
 def _wrong_row(
-    cells: Sequence[str], headings: Headings, number: re.Pattern[str], decimal: str
+    cells: Sequence[str],
+    headings: Headings,
+    number: re.Pattern[str],
+    decimal: str,
+    may_be_empty: Collection[str],
 ) -> str:
     """What is wrong with a row; empty where nothing is."""
     for group in headings.groups:
@@ -288,6 +297,8 @@ def _wrong_row(
         if len(headings.groups) > 1 and all(cell.casefold() in NOTHING for cell in own):
             continue
         for name, cell in zip("xyz", own, strict=False):
+            if name in may_be_empty and cell.casefold() in NOTHING:
+                continue
             if not number.fullmatch(cell):
                 return wrong_number(cell, name, decimal)
     return ""

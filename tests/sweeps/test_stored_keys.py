@@ -32,3 +32,20 @@ def test_fingerprints_are_those_of_earlier_versions(file: str, label: str, kept:
     assert METHOD == 2
     found = {one.label: fingerprint(one) for one in load(Path("designs", file))}
     assert found[label] == kept
+
+
+def test_offsets_that_are_estimated_keep_their_keys(tmp_path: Path) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    for name, old, known in (
+        ("right", "[50 mm, 0 mm, 0 mm]", "unknown: true"),
+        ("left", "[-50 mm, 0 mm, 0 mm]", "standard_uncertainty: 3 um"),
+    ):
+        assert f"{name}: {old}" in text
+        text = text.replace(f"{name}: {old}", f"{name}: {{offset: {old}, {known}}}")
+    (tmp_path / "plate.yaml").write_text(text, encoding="utf-8")
+    kept = "f5e0993b067b5d08a77c2478653adb6195baf134"
+    assert fingerprint(load(tmp_path / "plate.yaml")[0]) == kept
+    # How the laboratory's tables are read says nothing of what is planned.
+    more = "\nreadings: {coordinates: ball centres}\n"
+    (tmp_path / "plate.yaml").write_text(text + more, encoding="utf-8")
+    assert fingerprint(load(tmp_path / "plate.yaml")[0]) == kept

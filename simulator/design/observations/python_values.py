@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
@@ -101,9 +101,15 @@ class PythonValues(BallObservations):
 
 @dataclass(frozen=True, eq=False)
 class PythonCalibration(Calibration):
-    """Values (m,) of functions of the balls (k,) of an artefact, in the functions' unit."""
+    """Values (m,) of functions of the balls (k,) of an artefact, in the functions' unit.
+
+    `functions` are what the `object` of a module in the folder `source` makes with `options`.
+    """
 
     artefact: str
+    object: str
+    options: Mapping[str, Any]
+    source: Path
     functions: BallFunctions
     balls: Integers
     values: Array
@@ -191,6 +197,9 @@ def read_python_values(
     root = known.root or covariance_root(np.diag(known.standard**2))
     return PythonCalibration(
         artefact,
+        settings.object,
+        settings.options,
+        folder,
         functions,
         np.asarray(balls, np.int64),
         frozen(values),
