@@ -214,11 +214,11 @@ def _campaign(
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
         predict(replace(timed, expected_rank_deficiency=left_open or None)),
-        order,
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
         left_open,
+        order=order,
         drift=size,
         orders=tuple(
             drift_effect(

@@ -13,7 +13,7 @@ from .constraints import Budget, Spent
 from .criteria import CriterionName
 from .done import REST
 from .drift_in_orders import DriftEffect, DriftSize
-from .orders import ReadingOrder
+from .orders import LEAST_CHANGE_OVER, ReadingOrder
 from .schedule import Completion
 
 
@@ -79,12 +79,12 @@ class Selection:
     gains: tuple[Gain, ...]
     left_out: tuple[Gain, ...]
     prediction: Prediction
-    order: ReadingOrder
     curve: tuple[CurvePoint, ...] = ()
     completed: Completion | None = None
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
+    order: ReadingOrder = LEAST_CHANGE_OVER
     drift: DriftSize = DriftSize()
     orders: tuple[DriftEffect, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)

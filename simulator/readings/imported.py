@@ -219,8 +219,12 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
         found.leave([one for one in candidates if one.lacks == why], why)
     complete = [one for one in map(found.centred, candidates) if one is not None]
     if not complete:
-        told = "; ".join(_counted(found.left)) or "nothing"
-        raise refused(report.file, f"no measured centre of a sphere in this {report.title}: {told}")
+        told = ", ".join(_counted(found.left)) or "nothing"
+        text = (
+            f"no measured centre of a sphere in this {report.title}, which holds {told}; give a"
+            " report of measured spheres"
+        )
+        raise refused(report.file, text)
     features = [one for one, _ in complete]
     names, whose = _named(features, rule or None, settings.design, report.file)
     is_of_file = "{position}" not in names.rule

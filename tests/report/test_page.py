@@ -192,8 +192,9 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
 def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     mark = tmp_path / "has run"
     module = (
-        "from pathlib import Path\nfrom ballplate.simulator.machines.settings import"
-        " KinematicSettings, build_error_model\ndef build(lower, upper):\n   "
+        "from pathlib import Path\nfrom ballplate.simulator.machines.kinematic_settings import"
+        " KinematicSettings\nfrom ballplate.simulator.machines.settings import"
+        " build_error_model\ndef build(lower, upper):\n   "
         f" Path({str(mark)!r}).touch()\n    return"
         " build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower,"
         " upper)\n"

@@ -125,7 +125,7 @@ def make_kit(folder: Path) -> None:
             "hocken_borchardt/angles.yaml",
             "park/machines/gec-like.yaml",
         ),
-        *("park/machines/measured/exx.csv", "certified/deficient.yaml"),
+        *("park/machines/measured/exx.csv", "certified/deficient.yaml", "reports/z-low.dmo"),
     )
     for name in copied:
         shutil.copy(DESIGNS / name, folder)

@@ -74,6 +74,10 @@ RECIPES = (
     "report sweep.sqlite --format markdown",
     "report trials.sqlite --format latex",
     "report trials.sqlite --format text",
+    "sheet small.yaml",
+    "sheet small.yaml -o sheet.html --readings template.csv --points points.csv",
+    "import z-low.dmo --for quickstart.yaml -o out.csv",
+    "import z-low.dmo --from dmis --unit mm -o out.csv",
     "map machine.yaml --grid 3,3,2",
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
     "map gec-like.yaml --error EXX --format csv",
@@ -94,6 +98,7 @@ RECIPES = (
     "reproduce certified --designs certified --experiment weak --json",
     "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
+    "schema sweep",
     "init out.yaml",
     "init --machine out.yaml",
 )
