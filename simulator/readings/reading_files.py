@@ -32,6 +32,7 @@ from .gross_error_messages import (
     doubts_about_volume,
     refuse_gross_errors,
 )
+from .implausible_temperatures import doubts_about_temperatures
 from .offsets_applied import doubt_about_offsets, said_of
 from .reading_sources import Source, source_rows
 
@@ -71,7 +72,7 @@ class ObservedReadings:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """What of them is possible, and unlikely to be meant: lengths and places."""
+        """What of them is possible, and unlikely to be meant: lengths, places, temperatures."""
         of_volume = doubts_about_volume(self.design, self.x, self.marks)
         of_poses = doubts_about_poses(self.design, self.x)
         return (
@@ -79,6 +80,7 @@ class ObservedReadings:
             *of_poses,
             *doubts_about_lengths(self.design, self.x),
             *of_volume,
+            *doubts_about_temperatures(self.design, self.marks),
         )
 
 
