@@ -100,16 +100,18 @@ def uncertainty_words(coverage_factor: float) -> str:
 
 
 def to_uncertainty(value: float, uncertainty: float) -> str:
-    """A value to the third digit of its standard uncertainty.
+    """A value to the third digit of its standard uncertainty, zero without a sign.
 
     >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597)
     ('50000.213', '-0.042')
+    >>> to_uncertainty(-1e-9, 30.0)
+    '0.0'
     >>> to_uncertainty(12.0, float("nan"))
     '12.0000'
     """
     if math.isnan(value) or not uncertainty > 0.0:
         return number(value, 6)
-    return f"{value:.{max(2 - math.floor(math.log10(uncertainty)), 0)}f}"
+    return f"{value:z.{max(2 - math.floor(math.log10(uncertainty)), 0)}f}"
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:

@@ -16,6 +16,7 @@ from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
+from .influences import InfluenceUncertainty, influence_data, influence_table
 from .parts import (
     quantities_data,
     quantity_data,
@@ -53,7 +54,7 @@ class Prediction(Result):
 
     `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if
     that was asked for and is determined. `monte_carlo` has replicates, and `advice` what a check
-    was asked for besides the rank, if they were asked for.
+    was asked for besides the rank, if they were asked for. `influences` go with the quantities.
     """
 
     label: str
@@ -65,6 +66,7 @@ class Prediction(Result):
     scale: Scale | None = None
     monte_carlo: Trials | None = None
     advice: Advice | None = None
+    influences: tuple[InfluenceUncertainty, ...] = ()
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
@@ -93,6 +95,7 @@ class Prediction(Result):
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += scale_lines(self.scale)
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
+        lines += ["", *influence_table(self.influences)] if self.influences else []
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines
 
     def to_dict(self) -> dict[str, Any]:
@@ -108,6 +111,7 @@ class Prediction(Result):
                 else {"lengths": quantity_data(self.lengths)}
             ),
             **({"tasks": task_data(self.tasks)} if self.tasks else {}),
+            **({"influences": influence_data(self.influences)} if self.influences else {}),
             "scale": scale_data(self.scale),
             **({} if self.advice is None else self.advice.data),
         }

@@ -24,6 +24,7 @@ from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, adjustments
+from .influences import influence_uncertainties
 from .prediction import Prediction
 from .variance_components.groupings import Grouping
 
@@ -82,7 +83,14 @@ def _predict(
         lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
     scale = scale_of(experiment, at) if with_scale else None
     return Prediction(
-        experiment.label, experiment.title, design, judged, quantities, lengths, scale
+        experiment.label,
+        experiment.title,
+        design,
+        judged,
+        quantities,
+        lengths,
+        scale,
+        influences=influence_uncertainties(at) if with_quantities else (),
     )
 
 

@@ -228,13 +228,9 @@ def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readin
     return found
 
 
-def influence_shifts(
-    design: Design, state: State, readings: Readings, x: Array
-) -> tuple[Array, Array]:
-    """What influence quantities add to the locations of readings (m, d), and its derivative by
-    their parameters (m, d, p), where the scales say `x` (m, d); metres.
-    """
-    at = Disturbed(
+def disturbed_readings(state: State, readings: Readings, x: Array) -> Disturbed:
+    """Readings where the scales say `x` (m, d), in metres, as influence quantities see them."""
+    return Disturbed(
         readings.ball,
         readings.position,
         readings.probe,
@@ -244,6 +240,15 @@ def influence_shifts(
         state.probes[readings.probe],
         readings.beside or {},
     )
+
+
+def influence_shifts(
+    design: Design, state: State, readings: Readings, x: Array
+) -> tuple[Array, Array]:
+    """What influence quantities add to the locations of readings (m, d), and its derivative by
+    their parameters (m, d, p), where the scales say `x` (m, d); metres.
+    """
+    at = disturbed_readings(state, readings, x)
     shift, parts = np.zeros(x.shape), [np.zeros((*x.shape, 0))]
     for one in design.influences:
         stated, derivative = one.shifts(at)

@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design, in_sequence
+from ..design.arrays import (
+    Design,
+    disturbed_readings,
+    in_sequence,
+    locations,
+    nominal_state,
+)
+from ..design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
 from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
@@ -45,7 +52,8 @@ def resolve_influences(
 def with_influences(design: Design, experiment: Experiment) -> Design:
     """The design with the influence quantities of its experiment, and what is known of them.
 
-    :raises ExperimentError: they have more parameters than there is memory for, or one twice.
+    :raises ExperimentError: they have more parameters than there is memory for, or one twice; a
+        class does not keep to what `Influence` says.
     """
     if not experiment.influences:
         return design
@@ -64,8 +72,19 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
             influences.append(one.influence(parts))
         except ValueError as error:
             raise ExperimentError([experiment.message(("influences", i), str(error))]) from None
+        text = wrong_of_parameters(influences[-1].parameters, len(design.positions.names))
+        if text:
+            raise _of_class(experiment, i, text)
     readings = in_sequence(design.readings, tuple(influences))
     disturbed = replace(design, readings=readings, influences=tuple(influences))
+    chosen = readings.select(few(len(readings)))
+    state = nominal_state(disturbed)
+    x = locations(disturbed, state, chosen) - state.probes[chosen.probe]
+    at = disturbed_readings(state, chosen, x)
+    for i, one in enumerate(experiment.influences):
+        text = wrong_of_shifts(influences[i], one, at, lambda other: other.influence(parts))
+        if text:
+            raise _of_class(experiment, i, text)
     parameters = disturbed.influence_parameters
     twice = [name for name, count in Counter(one.name for one in parameters).items() if count > 1]
     if twice:
@@ -94,3 +113,9 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
             np.append(np.full(len(priors), -1), known),
         )
     )
+
+
+def _of_class(experiment: Experiment, i: int, text: str) -> ExperimentError:
+    """What is wrong with the class of the i-th influence quantity."""
+    name = type(experiment.influences[i]).__name__
+    return ExperimentError([experiment.message(("influences", i), f"the class {name}: {text}")])

@@ -19,6 +19,7 @@ from ..inputs.yamltree import written
 from .model import Probe
 from .probe_sections import HeadSettings, ProbeSettings, StarSettings
 from .references import DEFAULT_PROBE
+from .star_tables import doubt_of_table
 from .structure import Sections
 
 
@@ -129,7 +130,12 @@ def resolve_stars(
                 continue
             coordinates = found
         has_place = settings.place == "stated"
-        stars.append(Star(names, frozen(coordinates), settings.standard_uncertainty, has_place))
+        star = Star(names, frozen(coordinates), settings.standard_uncertainty, has_place)
+        if settings.values is not None:
+            offsets = np.array([probes[name].offset for name in names])
+            if text := doubt_of_table(star, offsets):
+                references.problems.doubt((*steps, "values"), text)
+        stars.append(star)
     return tuple(stars)
 
 

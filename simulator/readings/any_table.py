@@ -47,6 +47,10 @@ ABOVE = {
 }
 # Characters of such a line.
 LONGEST_LINE = 300
+TEMPERATURES = (
+    "temperature_artefact_degC and temperature_scales_degC are used where the experiment has"
+    " influences of kind: temperature for them"
+)
 
 
 @dataclass(frozen=True)
@@ -332,7 +336,8 @@ class _Reader:
         parts += others
         if headings.unused:
             names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
-            parts.append(f"not used: {names}")
+            warm = any("temperature" in cell.casefold() for cell in headings.unused)
+            parts.append(f"not used: {names}{f' ({TEMPERATURES})' if warm else ''}")
         if form.empty:
             parts.append(f"without co-ordinates, left out: line{_numbers(form.empty)}")
         return f"{self.source}: read as: {', '.join(parts)}"

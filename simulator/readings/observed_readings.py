@@ -18,6 +18,7 @@ from ..inputs.yamltree import Mark
 from ..machines.protocol import Array, Integers
 from .common_causes import doubts_about_poses
 from .gross_error_messages import doubts_about_lengths, doubts_about_volume
+from .implausible_temperatures import doubts_about_temperatures
 
 # A gauge whose directions are no further from the planned ones than this (rad) has them.
 AS_PLANNED = 0.01
@@ -53,7 +54,7 @@ class ObservedReadings:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """What of them is possible, and unlikely to be meant: lengths and places."""
+        """What of them is possible, and unlikely to be meant: lengths, places, temperatures."""
         of_volume = doubts_about_volume(self.design, self.x, self.marks)
         of_poses = doubts_about_poses(self.design, self.x)
         return (
@@ -61,6 +62,7 @@ class ObservedReadings:
             *of_poses,
             *doubts_about_lengths(self.design, self.x),
             *of_volume,
+            *doubts_about_temperatures(self.design, self.marks),
         )
 
 

@@ -6,10 +6,12 @@ line in `INFLUENCES`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Union
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Union, get_args
 
 from pydantic import Field
 
+from ...inputs.messages import ExperimentError, Message
 from .drift import DriftSettings
 from .position_scale import PositionScaleSettings
 from .probing import ProbingSettings
@@ -30,6 +32,23 @@ INFLUENCES: tuple[type[InfluenceSettings], ...] = (
     SagSettings,
 )
 """Settings class of every kind of influence quantity."""
+
+
+def once_each(classes: Iterable[type[InfluenceSettings]]) -> None:
+    """Say where a kind is one that exists already.
+
+    :raises ExperimentError: two classes have the same kind.
+    """
+    found: dict[str, str] = {}
+    for one in classes:
+        for kind in get_args(one.model_fields["kind"].annotation):
+            if kind in found:
+                text = f'{one.__name__} has the kind "{kind}", as {found[kind]} has; name another'
+                raise ExperimentError([Message(__file__, 1, 1, "INFLUENCES", text)])
+            found[kind] = one.__name__
+
+
+once_each(INFLUENCES)
 
 if TYPE_CHECKING:
     AnyInfluence = InfluenceSettings

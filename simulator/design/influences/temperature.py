@@ -9,7 +9,7 @@ position.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
@@ -33,6 +33,10 @@ ARTEFACT_COLUMN = "temperature_artefact"
 SCALES_COLUMN = "temperature_scales"
 AXIS_COLUMNS = ("temperature_x", "temperature_y", "temperature_z")
 UNITS = {"degC": Fraction(1)}
+
+# What is outside these limits, in degC, K and 1/K, is possible and hardly meant.
+COLDEST, WARMEST = -50.0, 100.0
+LARGEST_UNCERTAINTY, LARGEST_EXPANSION = 10.0, 1e-4
 
 # What the effects of parameters are told for at least, in K and 1/K: a coefficient matters little
 # where a temperature is just the reference, and still has a size.
@@ -145,6 +149,7 @@ class TemperaturesSettings(InfluenceSettings):
                     (*steps, "positions", name, key),
                     "is a temperature of what does not expand; add its expansion, or remove it",
                 )
+        self._doubt(steps, references)
         for path, value in listed:
             if isinstance(value, tuple) and references.dimension is not None:
                 references.require(
@@ -152,6 +157,39 @@ class TemperaturesSettings(InfluenceSettings):
                     (*steps, *path),
                     f"has {len(value)} axes, but the experiment has {references.dimension}",
                 )
+
+    def _doubt(self, steps: Steps, references: References) -> None:
+        """Doubt temperatures, expansions and uncertainties that no laboratory has."""
+        temperatures: list[tuple[Steps, object]] = [(("reference",), self.reference)]
+        for key in ("artefact_temperature", "scale_temperature"):
+            measured = getattr(self, key)
+            if measured is not None:
+                temperatures.append(((key, "value"), measured.value))
+                for name in ("standard_uncertainty", "sensor_uncertainty"):
+                    u = getattr(measured, name)
+                    if u > LARGEST_UNCERTAINTY:
+                        text = f"is {u:g} K, more than {LARGEST_UNCERTAINTY:g} K; check it"
+                        references.problems.doubt((*steps, key, name), text)
+        for name, place in (self.positions or {}).items():
+            temperatures.append((("positions", name, "artefact"), place.artefact))
+            temperatures.append((("positions", name, "scales"), place.scales))
+        for path, value in _one_by_one(temperatures):
+            if isinstance(value, float) and not COLDEST <= value <= WARMEST:
+                text = (
+                    f"is {value:g} degC, and temperatures of measurements are {COLDEST:g} to"
+                    f" {WARMEST:g} degC; check it"
+                )
+                references.problems.doubt((*steps, *path), text)
+        expansions = [(("artefact_expansion",), self.artefact_expansion)]
+        for path, one in _one_by_one([*expansions, (("scale_expansion",), self.scale_expansion)]):
+            for name in ("value", "standard_uncertainty"):
+                size = getattr(one, name, None)
+                if size is not None and abs(size) > LARGEST_EXPANSION:
+                    text = (
+                        f"is {1e6 * size:g} um/m/K, more than {1e6 * LARGEST_EXPANSION:g} um/m/K,"
+                        " which solids hardly have; check it"
+                    )
+                    references.problems.doubt((*steps, *path, name), text)
 
     def influence(self, design: DesignParts) -> Temperatures:
         """The temperatures in a design."""
@@ -340,3 +378,12 @@ def _check_uncertainties(stated: object, steps: Steps, references: References) -
             references.require(
                 u is None or u >= 0.0, (*steps, key), "is below zero; give it without the sign"
             )
+
+
+def _one_by_one(stated: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Steps, object]]:
+    """Paths and what is stated there, lists taken apart."""
+    for path, value in stated:
+        if isinstance(value, tuple):
+            yield from (((*path, i), one) for i, one in enumerate(value))
+        else:
+            yield path, value

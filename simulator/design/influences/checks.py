@@ -1,0 +1,132 @@
+"""What a kind of influence quantity must keep to, checked where it is laid out: its parameters, and
+at a few readings what it adds to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+
+from ...inputs.settings import listing
+from ...machines.protocol import Integers, Unit
+from .protocol import Disturbed, Influence, InfluenceParameter, InfluenceSettings
+
+# Readings by which a kind is checked. More than there are axes, so that axes are not taken for
+# them.
+FEW = 7
+# By which a changed value displaces readings, in metres: most of all and at least to be compared.
+STEP = 1e-6
+# What quotients of differences may miss derivatives by, in parts of the largest: shifts need be
+# linear about the stated values only, and rounding of them is far smaller.
+DERIVATIVE = 1e-3
+
+
+def few(count: int) -> Integers:
+    """Indices of a few of so many readings, spread over all."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, FEW)).astype(np.int64))
+
+
+def wrong_of_parameters(parameters: tuple[InfluenceParameter, ...], positions: int) -> str:
+    """What is wrong with parameters where there are so many positions; empty if nothing is."""
+    return next(iter(_of_parameters(parameters, positions)), "")
+
+
+def _of_parameters(parameters: tuple[InfluenceParameter, ...], positions: int) -> Iterator[str]:
+    units = get_args(Unit)
+    for one in parameters:
+        words = f'parameter "{one.name}"'
+        if not one.name:
+            yield "a parameter has no name; give one"
+        if one.unit not in units:
+            yield f'{words} has the unit "{one.unit}"; give one of {listing(units)}'
+        if not np.isfinite(one.value):
+            yield f"{words} has the value {one.value}; give a finite one"
+        if not one.uncertainty >= 0.0:
+            yield (
+                f"{words} has the uncertainty {one.uncertainty:g}; give 0 for a constant, inf where"
+                " nothing is known, or a positive number"
+            )
+        if not (np.isfinite(one.effect) and one.effect > 0.0):
+            yield (
+                f"{words} has the effect {one.effect:g}; give what a unit of it moves readings by"
+                " where it does most, a positive number of metres"
+            )
+        if not -1 <= one.position < positions:
+            yield (
+                f"{words} is of position {one.position}; give an index below {positions}, or -1"
+                " where it is of several"
+            )
+
+
+def wrong_of_shifts(
+    influence: Influence,
+    settings: InfluenceSettings,
+    at: Disturbed,
+    again: Callable[[InfluenceSettings], Influence],
+) -> str:
+    """What is wrong with shifts and their derivatives at readings `at`; empty if nothing is.
+
+    Where a number among the settings is the value of a parameter, the influence is made `again`
+    with others, and the derivative compared with differences. Other derivatives are not.
+    """
+    shift, derivative = influence.shifts(at)
+    m, d, p = *at.x.shape, len(influence.parameters)
+    for array, shape, what in (
+        (shift, (m, d), "shifts"),
+        (derivative, (m, d, p), "the derivative of shifts"),
+    ):
+        if np.shape(array) != shape:
+            return f"{what} of {m} readings has the shape {np.shape(array)}; it must be {shape}"
+        if not np.isfinite(array).all():
+            return f"{what} has values that are not finite"
+    for key, k in _stated(settings, influence):
+        name, effect = influence.parameters[k].name, influence.parameters[k].effect
+        steps, found = [], []
+        for step in (STEP / effect, -STEP / effect):
+            value = getattr(settings, key) + step
+            try:
+                other = again(settings.model_copy(update={key: value}))
+            except ValueError:
+                # No value that is possible.
+                break
+            if not _differ_in_value_only(influence, other, k):
+                break
+            steps.append(other.parameters[k].value)
+            found.append(other.shifts(at)[0])
+        if len(found) < 2 or steps[0] == steps[1]:
+            continue
+        quotient = (found[0] - found[1]) / (steps[0] - steps[1])
+        largest = float(max(np.abs(quotient).max(initial=0), np.abs(derivative[..., k]).max()))
+        if np.abs(quotient - derivative[..., k]).max(initial=0) > DERIVATIVE * largest:
+            reading = np.abs(quotient - derivative[..., k]).max(axis=1).argmax()
+            axis = np.abs(quotient - derivative[..., k])[reading].argmax()
+            return (
+                f'the derivative of shifts by "{name}" is {derivative[reading, axis, k]:.3g}'
+                f" along {'xyz'[axis]} of a reading where differences give"
+                f" {quotient[reading, axis]:.3g}; correct it, or the shifts"
+            )
+    return ""
+
+
+def _stated(settings: InfluenceSettings, influence: Influence) -> Iterator[tuple[str, int]]:
+    """Settings that are numbers, with the parameters that have them as values."""
+    for key in type(settings).model_fields:
+        value = getattr(settings, key)
+        if isinstance(value, float):
+            for k, one in enumerate(influence.parameters):
+                if one.value == value:
+                    yield key, k
+
+
+def _differ_in_value_only(one: Influence, other: Influence, k: int) -> bool:
+    """Whether two influences have the same parameters but for the value of one of them."""
+    if len(one.parameters) != len(other.parameters):
+        return False
+    value = one.parameters[k].value
+    return other.parameters[k].value != value and all(
+        replace(theirs, value=own.value) == own if i == k else theirs == own
+        for i, (own, theirs) in enumerate(zip(one.parameters, other.parameters, strict=True))
+    )

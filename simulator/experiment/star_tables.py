@@ -1,0 +1,87 @@
+"""Tables of stars beside the stated offsets of their probes: tips that are exchanged, and tips that
+lie elsewhere.
+
+A table has axes of its own, so that it is turned, and shifted where the star's place is unknown, to
+where its tips are nearest to the offsets. A mirror image is no turn, and two tips of a symmetric
+star that are exchanged make one: distances would not tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..design.observations.star import Star
+from ..inputs.settings import listing
+from ..machines.protocol import Array
+
+# Stated offsets are nominal, and wrong by this much in metres before anybody need be told; of an
+# exchange, which leaves far less when it is undone, less is enough.
+NOMINAL, EXCHANGED = 3e-3, 1e-3
+# By which factor the misfit is smaller without an exchange.
+CLEARLY = 4.0
+# So many standard uncertainties of a tip are possible.
+POSSIBLE = 5.0
+# Exchanges are looked for among so many tips at most; there are as many as pairs.
+MOST_TIPS = 100
+
+
+def doubt_of_table(star: Star, offsets: Array) -> str:
+    """What is unlikely to be meant where a star's table is beside the offsets (l, d) that are
+    stated of its probes, in metres; empty if nothing is.
+    """
+    misfit = _misfit(star, offsets)
+    worst, possible = float(misfit.max()), POSSIBLE * star.standard_uncertainty
+    if worst <= max(EXCHANGED, possible):
+        return ""
+    exchanged = _exchange(star, offsets) if len(offsets) <= MOST_TIPS else None
+    if exchanged is not None:
+        (i, j), left = exchanged
+        if left * CLEARLY < worst:
+            return (
+                f"its tips are up to {_length(worst)} from the stated offsets, however it is"
+                f' turned, and within {_length(left)} if "{star.probes[i]}" and'
+                f' "{star.probes[j]}" are exchanged; check which is which, in the table and among'
+                " the probes"
+            )
+    if worst <= max(NOMINAL, possible):
+        return ""
+    far = [f'"{name}"' for name, own in zip(star.probes, misfit, strict=True) if own > 0.5 * worst]
+    return (
+        f"its tips are up to {_length(worst)} from the stated offsets, however it is turned, most"
+        f" of all {listing(far)}; correct the table or the offsets"
+    )
+
+
+def _misfit(star: Star, offsets: Array) -> Array:
+    """Distances (..., l) between offsets (..., l, d) and the table, turned to be nearest."""
+    placed = star.coordinates @ star.rotation(offsets).swapaxes(-1, -2)
+    difference = offsets - placed
+    if not star.has_place:
+        difference = difference - difference.mean(axis=-2, keepdims=True)
+    return np.asarray(np.linalg.norm(difference, axis=-1))
+
+
+def _exchange(star: Star, offsets: Array) -> tuple[tuple[int, int], float]:
+    """The two tips that, exchanged, bring the table nearest to offsets, and what is left.
+
+    Exchanges in a symmetric star differ by a turn: of those that leave as little, that with the
+    least turn is likeliest, as tables are mostly made in axes like the machine's.
+    """
+    found: list[tuple[float, float, tuple[int, int]]] = []
+    for i in range(len(offsets) - 1):
+        others = np.arange(i + 1, len(offsets))
+        tried = np.repeat(offsets[None], len(others), axis=0)
+        tried[:, i] = offsets[others]
+        tried[np.arange(len(others)), others] = offsets[i]
+        left = _misfit(star, tried).max(axis=-1)
+        turns = np.trace(star.rotation(tried), axis1=-2, axis2=-1)
+        for j, own, turn in zip(others.tolist(), left.tolist(), turns.tolist(), strict=True):
+            found.append((own, -round(turn, 3), (i, j)))
+    least = min(own for own, _, _ in found)
+    alike = [one for one in found if one[0] <= least + EXCHANGED]
+    left_over, _, pair = min(alike, key=lambda one: (one[1], one[2]))
+    return pair, left_over
+
+
+def _length(value: float) -> str:
+    return f"{1e3 * value:.1f} mm"

@@ -1,0 +1,98 @@
+"""Tables of stars beside stated offsets, against rotations that are searched for by another library
+and exchanges that are made by hand.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from ballplate.simulator.design.observations.star import Star
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.star_tables import doubt_of_table
+from scipy.spatial.transform import Rotation
+
+NAMES = ("down", "right", "left", "back", "front")
+TIPS = np.array(
+    [[0.0, 0.0, -0.05], [0.05, 0.0, 0.0], [-0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, -0.05, 0.0]]
+)
+
+
+def doubted(table: np.ndarray, offsets: np.ndarray = TIPS, place: bool = True) -> str:
+    return doubt_of_table(Star(NAMES[: len(table)], table, 2e-7, place), offsets)
+
+
+@pytest.mark.parametrize("place", [True, False])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_table_in_any_axes_with_nominal_offsets_is_not_doubted(seed: int, place: bool) -> None:
+    generator = np.random.default_rng(seed)
+    near = TIPS + generator.uniform(-1.0, 1.0, TIPS.shape) * 1e-3
+    turn = Rotation.random(random_state=seed).as_matrix()
+    shift = 0.0 if place else generator.standard_normal(3)
+    assert doubted(near @ turn.T + shift, place=place) == ""
+
+
+@pytest.mark.parametrize("place", [True, False])
+@pytest.mark.parametrize("pair", [(1, 2), (3, 4), (0, 1), (0, 4)])
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_an_exchange_is_named(pair: tuple[int, int], noise: float, place: bool) -> None:
+    table = TIPS + noise * np.random.default_rng(1).uniform(-1.0, 1.0, TIPS.shape)
+    table[list(pair)] = table[list(pair[::-1])]
+    found = doubted(table, place=place)
+    assert f'if "{NAMES[pair[0]]}" and "{NAMES[pair[1]]}" are exchanged' in found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_exchange_is_named_in_any_axes_where_no_turn_is_like_it(seed: int) -> None:
+    """Arms of lengths of their own tell which two are exchanged whatever the axes are."""
+    offsets = TIPS * np.array([1.0, 1.2, 1.5, 1.9, 2.4])[:, None]
+    turn = Rotation.random(random_state=seed).as_matrix()
+    for pair in [(1, 2), (3, 4), (0, 3)]:
+        table = offsets @ turn.T
+        table[list(pair)] = table[list(pair[::-1])]
+        found = doubted(table, offsets)
+        assert f'if "{NAMES[pair[0]]}" and "{NAMES[pair[1]]}" are exchanged' in found
+
+
+def test_a_mirror_image_has_the_same_distances_and_is_doubted() -> None:
+    offsets = TIPS * np.array([1.0, 1.2, 1.5, 1.9, 2.4])[:, None]
+    assert doubted(-offsets, offsets)
+
+
+def test_a_tip_that_is_longer_is_named_with_what_another_library_finds() -> None:
+    table = TIPS.copy()
+    table[0, 2] = -0.06
+    turn, _ = Rotation.align_vectors(TIPS, table)
+    worst = np.linalg.norm(TIPS - turn.apply(table), axis=1).max()
+    found = doubted(table)
+    assert f"up to {1e3 * worst:.1f} mm" in found and 'most of all "down";' in found
+    moved = doubted(table, place=False)
+    assert 'most of all "down";' in moved
+
+
+def test_offsets_that_are_wrong_by_millimetres_are_usual() -> None:
+    table = TIPS.copy()
+    table[0, 2] = -0.052
+    assert doubted(table) == ""
+
+
+def test_the_file_says_so_once_and_loads(tmp_path: Path) -> None:
+    told = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
+    names = list(told["probes"])
+    rows = [[name, *told["probes"][name]] for name in names]
+    swapped = dict(zip(names, names, strict=True)) | {names[1]: names[2], names[2]: names[1]}
+    told["stars"] = [{"standard_uncertainty": "0.2 um", "values": "star.csv"}]
+    (tmp_path / "a.yaml").write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
+    for exchange in (False, True):
+        lines = ["probe,x_mm,y_mm,z_mm"]
+        for name, *place in rows:
+            texts = [text.removesuffix(" mm") for text in place]
+            lines.append(",".join([swapped[name] if exchange else name, *texts]))
+        (tmp_path / "star.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        (found,) = load(tmp_path / "a.yaml")
+        assert len(found.doubts) == exchange
+        if exchange:
+            assert "stars[0].values" in found.doubts[0]
+            assert f'"{names[1]}" and "{names[2]}" are exchanged' in found.doubts[0]
