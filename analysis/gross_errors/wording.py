@@ -72,10 +72,15 @@ def unexplained_words(unexplained: Unexplained) -> str:
         if unexplained.words
         else f"{_significance(unexplained)[1:-1]}"
     )
-    return (
+    told = (
         "the error model, a drift or the noise: no single gross error explains the residuals,"
-        f" which are {number(unexplained.times, 3)} times as large as stated; {best}; try a"
-        f" richer error model{', or larger uncertainties' if unexplained.too_large else ''}"
+        f" which are {number(unexplained.times, 3)} times as large as stated"
+    )
+    if unexplained.too_large:
+        return f"{told}; {best}; try a richer error model, or larger uncertainties"
+    return (
+        f"{told}, and so not too large; {best}; their pattern is no chance: look at it before the"
+        " error model is changed"
     )
 
 

@@ -70,7 +70,9 @@ class Campaign(Selection, Result):
         source = self.experiment.source.name
         header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
         header += f" than {self.budget}."
-        deficiency = self.left_open or None
+        deficiency, stated = self.left_open or None, self.experiment.expected_rank_deficiency
+        if stated == self.prediction.verdict.deficiency:
+            deficiency = stated
         written = self.sheet.written
         return experiment_text(
             self.experiment,

@@ -7,6 +7,7 @@ deformation of the artefact, the motion of positions.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,6 +111,15 @@ class Direction:
     points: int = 0
     beyond: int = 0
     limit: float = float("inf")
+
+    def is_pose_of(self, positions: Collection[str]) -> bool:
+        """Whether it changes nothing but poses of some positions."""
+        others = self.functions, self.artefacts, self.probes, self.lengths, self.influences
+        return (
+            not any(others)
+            and bool(self.positions)
+            and all(part.name in positions for part in self.positions)
+        )
 
     def __str__(self) -> str:
         return in_words(self)

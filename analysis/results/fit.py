@@ -38,6 +38,7 @@ from .estimates import (
 from .parts import (
     adjustment_data,
     adjustment_lines,
+    not_read,
     plate_data,
     plate_table,
     quantities_data,
@@ -126,7 +127,8 @@ class Fit(FitResult):
 
     def lines(self) -> list[str]:
         record = self.solution.iterations
-        verdict = verdict_lines(self.verdict, with_values=True, lengths=self.quantities.get("U6"))
+        lengths = self.quantities.get("U6")
+        verdict = verdict_lines(self.verdict, True, lengths, self.unread)
         lines = [f"{self.label}: {self.title}", *verdict]
         how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
         if self.is_reweighted:
@@ -410,8 +412,17 @@ class Fit(FitResult):
         return tuple(filter(None, found))
 
     @property
+    def unread(self) -> tuple[str, ...]:
+        """Names of positions that have no reading."""
+        read = set(self.design.readings.position.tolist())
+        return tuple(name for k, name in enumerate(self.design.positions.names) if k not in read)
+
+    @property
     def complaint(self) -> str:
         if self.converged:
+            if self.verdict.complaint and self.unread:
+                # The file need not expect what is no fault of the plan.
+                return f"{rank_words(self.verdict)}; {not_read(self.unread)}"
             return self.verdict.complaint
         return (
             f"the estimate has {self.solution.status}; no results are reported: see the record of"

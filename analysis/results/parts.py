@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from ballplate.simulator.computing.rounding import printable
+from ballplate.simulator.inputs.settings import listing
 
 from ..presentation.formatting import (
     aligned,
@@ -122,10 +123,13 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
 
 
 def verdict_lines(
-    judged: Verdict, with_values: bool = False, lengths: Quantity | None = None
+    judged: Verdict,
+    with_values: bool = False,
+    lengths: Quantity | None = None,
+    unread: Collection[str] = (),
 ) -> list[str]:
     """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of
-    them.
+    them, and `unread` names positions that were not read, whose poses are told in one line.
     """
     lines = []
     rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
@@ -143,14 +147,32 @@ def verdict_lines(
             text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
         lines.append(text + ", in standard deviations per micrometre")
     for title, directions in (("undetermined", judged.null), ("weakly determined", judged.weak)):
-        for k, direction in enumerate(directions[:20], start=1):
+        told = [
+            (k, direction)
+            for k, direction in enumerate(directions, start=1)
+            if not direction.is_pose_of(unread)
+        ]
+        if len(told) < len(directions):
+            count = len(directions) - len(told)
+            poses = f"{count} direction{'s' * (count > 1)} of poses"
+            lines.append(f"{title}: {not_read(unread)}, which leaves {poses} open")
+        for k, direction in told[:20]:
             lines.append(f"{title} {k}: {direction}")
-        if len(directions) > 20:
-            lines.append(f"{title}: {len(directions) - 20} directions more")
+        if len(told) > 20:
+            lines.append(f"{title}: {len(told) - 20} directions more")
     if judged.weak and lengths is not None:
         lines.append(f"all directions together: {_lengths_words(lengths)}")
     lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
+
+
+def not_read(unread: Collection[str]) -> str:
+    """A sentence that names positions without readings.
+
+    >>> not_read(["P3"]), not_read(["P3", "P4"])
+    ('P3 was not read', 'P3, P4 were not read')
+    """
+    return f"{listing(unread)} {'was' if len(unread) == 1 else 'were'} not read"
 
 
 def _lengths_words(lengths: Quantity) -> str:

@@ -28,7 +28,8 @@ SAME_DIGITS = 2.0
 @dataclass(frozen=True, eq=False)
 class NamedMatrix:
     """A covariance matrix (m, m), in square metres, or a correlation matrix of values with `names`;
-    entries are known to `rounding` (m, m), half a unit of their last digit. `marks` are the rows'.
+    entries are known to `rounding` (m, m), half a unit of their last digit. `marks` are the rows',
+    and `unit` the length whose square the file has, for messages.
     """
 
     names: tuple[str, ...]
@@ -36,6 +37,24 @@ class NamedMatrix:
     rounding: Floats
     is_correlation: bool
     marks: tuple[Mark, ...]
+    unit: str = "um"
+
+    def shown(self, value: float) -> str:
+        """An entry as the file has it, with its unit."""
+        if self.is_correlation:
+            return f"{value:.6g}"
+        area = float(LENGTH_UNITS[self.unit] ** 2)
+        return f"{value / area:.6g} {self.unit.replace('u', 'µ')}²"
+
+
+def unit_of_area(area: float) -> str:
+    """The length whose square is an area in square metres; the micrometre where none is.
+
+    >>> unit_of_area(1e-6), unit_of_area(1e-18), unit_of_area(2.0)
+    ('mm', 'nm', 'um')
+    """
+    apart = {name: abs(area / float(one**2) - 1.0) for name, one in LENGTH_UNITS.items()}
+    return next((name for name, one in apart.items() if one < 1e-9), "um")
 
 
 def half_digit(text: str) -> float:
@@ -107,7 +126,8 @@ def read_matrix(path: Path) -> NamedMatrix:
     is_correlation = factor is None
     scale = 1.0 if factor is None else factor
     found_matrix = NamedMatrix(
-        tuple(names), values * scale, rounding * scale, is_correlation, tuple(marks)
+        *(tuple(names), values * scale, rounding * scale, is_correlation, tuple(marks)),
+        unit=unit_of_area(scale),
     )
     wrong = matrix_problems(found_matrix)
     if wrong:
@@ -132,8 +152,9 @@ def matrix_problems(matrix: NamedMatrix) -> list[Message]:
     )
     for k, j in np.argwhere(np.triu(apart)).tolist():
         text = (
-            f'not symmetric: "{matrix.names[k]}" with "{matrix.names[j]}" is {values[k, j]:.6g},'
-            f" the other way round {values[j, k]:.6g}; correct one of the two"
+            f'not symmetric: "{matrix.names[k]}" with "{matrix.names[j]}" is'
+            f" {matrix.shown(values[k, j])}, the other way round {matrix.shown(values[j, k])};"
+            " correct one of the two"
         )
         messages.append(matrix.marks[k].message("", text))
     bound = np.outer(size, size)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .covariances import MOST_NAMES, Floats, NamedMatrix, half_digit, matrix_problems
+from .covariances import MOST_NAMES, Floats, NamedMatrix, half_digit, matrix_problems, unit_of_area
 from .dsi_units import celsius, length_factor
 from .messages import ExperimentError, Message
 from .quantities import QuantityError, metres_or_radians
@@ -321,7 +321,7 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
         raise ExperimentError([region.mark.message("", text)])
     columns = [one for one in region.walk() if one.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
-    marks = []
+    marks, factors = [], set[float]()
     for k, column in enumerate(columns):
         marks.append(column.mark)
         numbers, units = list[str](), list[str]()
@@ -340,12 +340,14 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
                 factor = float(length_factor(_one_of(units, j, count) or "", 2))
             except QuantityError as error:
                 raise ExperimentError([column.mark.message("", f"covariance: {error}")]) from None
+            factors.add(factor)
             values[j, k], rounding[j, k] = _plain(number) * factor, half_digit(number) * factor
             if not math.isfinite(values[j, k]):
                 text = f'covariance: "{shorten(number)}" is not a number'
                 raise ExperimentError([column.mark.message("", text)])
     names = tuple(f"value {k + 1}" for k in range(count))
-    found = NamedMatrix(names, values, rounding, False, tuple(marks))
+    unit = unit_of_area(factors.pop()) if len(factors) == 1 else "um"
+    found = NamedMatrix(names, values, rounding, False, tuple(marks), unit)
     wrong: list[Message] = matrix_problems(found)
     if wrong:
         raise ExperimentError(wrong)

@@ -15,9 +15,11 @@ import numpy as np
 
 from ..design.arrays import Design, Readings
 from ..estimation.consensus import consensus_motion
+from ..experiment.readings_section import ReadingsSettings
 from ..geometry.motions import AXIS_NAMES, fixes_pose
 from ..inputs.settings import listing
 from ..machines.protocol import Array
+from .coordinate_kinds import controller_offsets
 from .gross_errors import AGAINST_DRAWING, ball_pitches
 
 # Units that are taken for one another, with their ratio.
@@ -69,15 +71,31 @@ def _as_planned(design: Design, readings: Readings, seen: Array) -> bool:
     return bool(found) and all(angle < TURNED for angle, _ in (found or {}).values())
 
 
-def common_cause(design: Design, x: Array) -> str:
-    """What would let all readings x (readings, d) fit, in words; empty where nothing does."""
+def common_cause(design: Design, x: Array, settings: ReadingsSettings) -> str:
+    """What would let all readings fit, in words; empty where nothing does.
+
+    x (readings, d) are scale readings, made of what the table has as the settings state.
+    """
     readings = design.readings
     offsets = design.probes.offsets[readings.probe]
+    if settings.coordinates in ("ball centres", "part"):
+        # What is wrong with centres is wrong before the controller's offsets are taken off.
+        applied = controller_offsets(design, settings)[readings.probe]
+        given, offsets = x + applied, offsets - applied
+    else:
+        given = x
+    if settings.coordinates == "part":
+        # Of these only the unit tells: they may be turned in any way.
+        changes = ((text, ratio * given) for text, ratio in _units())
+        fitting = [text for text, changed in changes if poses_found(design, readings, changed)]
+        return ", or ".join(fitting)
     causes = [
-        text for text, changed in _changed(x) if _as_planned(design, readings, changed + offsets)
+        text
+        for text, changed in _changed(given)
+        if _as_planned(design, readings, changed + offsets)
     ]
     if not causes:
-        found = poses_found(design, readings, x)
+        found = poses_found(design, readings, given)
         if found and any(angle > TURNED for angle, _ in found.values()):
             causes.append(
                 "if they are centres in co-ordinates of a part, another in each position; then"
@@ -99,8 +117,13 @@ def _changed(x: Array) -> Iterator[tuple[str, Array]]:
                 if (i, 1) != (k, sign)
             )
             yield f"if {names}", x[:, order] * np.array(signs)
+    for text, ratio in _units():
+        yield text, x * ratio
+
+
+def _units() -> Iterator[tuple[str, float]]:
     for ratio, what in RATIOS.items():
-        yield f"if lengths are in {what}", x * ratio
+        yield f"if lengths are in {what}", ratio
 
 
 def doubts_about_poses(design: Design, x: Array) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from ..design.arrays import Design
 from ..design.objects import SLIGHTLY
 from ..estimation.length_ratios import LengthRatio, doubtful_lengths
+from ..experiment.readings_section import ReadingsSettings
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
@@ -17,18 +18,21 @@ from .common_causes import common_cause
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 
 
-def refuse_gross_errors(design: Design, x: Array, marks: Sequence[Mark]) -> None:
+def refuse_gross_errors(
+    design: Design, x: Array, marks: Sequence[Mark], settings: ReadingsSettings
+) -> None:
     """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they
     are said to be of.
 
-    `marks` tell where each of the design's readings stands. The rules are those of
+    `marks` tell where each of the design's readings stands, and `settings` what the scale readings
+    x (readings, d) were made of. The rules are those of
     `readings.gross_errors` and `estimation.length_ratios`.
 
     :raises ExperimentError: some readings are wrong; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
     if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
-        cause = common_cause(design, x)
+        cause = common_cause(design, x, settings)
         if cause:
             text = (
                 f"the readings of most positions do not fit; all do {cause}: correct the columns,"

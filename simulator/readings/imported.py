@@ -197,11 +197,55 @@ def import_readings(
         remarks.append(
             "warning: centres in the machine's and in a part's system; import each apart"
         )
+    if settings.design is not None:
+        remarks += _against_plan(readings, settings.design)
     coordinates = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
     return ImportedReadings(
         tuple(readings), tuple(told), tuple(dict.fromkeys(remarks)), coordinates, dimension
     )
+
+
+def _against_plan(readings: Sequence[ImportedReading], design: Design) -> list[str]:
+    """Which planned readings the reports do not have, and which they have that are not planned."""
+    balls, positions, probes = design.balls.names, design.positions.names, design.probes.names
+    planned = {
+        (positions[position], balls[ball], probes[probe])
+        for position, ball, probe in zip(
+            *(design.readings.position, design.readings.ball, design.readings.probe), strict=True
+        )
+    }
+    read = {(one.position, one.ball, one.probe) for one in readings}
+    remarks = []
+    missing, more = planned - read, read - planned
+    if missing:
+        told = f"{len(missing)} of {len(planned)} planned readings are missing"
+        remarks.append(f"{told}: {_summed_up(missing, planned, design)}")
+    if more:
+        verb = "reading is" if len(more) == 1 else "readings are"
+        told = f"{len(more)} {verb} not planned"
+        remarks.append(f"{told}: {_summed_up(more, set(), design)}")
+    return remarks
+
+
+def _summed_up(
+    some: set[tuple[str, str, str]], planned: set[tuple[str, str, str]], design: Design
+) -> str:
+    """Readings by position, ball and probe, abbreviated; a position all of whose planned readings
+    are among them is told as one.
+    """
+    words = []
+    for name in design.positions.names:
+        own = [one for one in some if one[0] == name]
+        if own and len(own) == sum(one[0] == name for one in planned):
+            words.append(f"all of {name}")
+        elif own:
+            several = len(design.probes.names) > 1
+            order = {ball: k for k, ball in enumerate(design.balls.names)}
+            own.sort(key=lambda one: (order[one[1]], one[2]))
+            told = (f"{ball} ({probe})" if several else ball for _, ball, probe in own)
+            words.append(f"{listing(told, 4)} in {name}")
+    return listing(words)
 
 
 def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:

@@ -149,9 +149,8 @@ def _matched_positions(
     known = design.positions.names
     used = list(dict.fromkeys(row.texts[0] for row in rows))
     strange = [name for name in used if name not in known]
-    # A few are slips of the pen.
     if 2 * len(strange) <= len(used):
-        return rows
+        return _others_by_place(rows, used, strange, design, places, found)
     numbers = _numbers(used, len(known)) or {}
     by_number = {name: known[k] for name, k in numbers.items()}
     if places is None and len(by_number) == len(known):
@@ -170,6 +169,27 @@ def _matched_positions(
         f" are ({doubt}); write the names that it has: {listing(known)}"
     )
     return rows
+
+
+def _others_by_place(
+    rows: Sequence[FileRow],
+    used: Sequence[str],
+    strange: Sequence[str],
+    design: Design,
+    places: Callable[[Sequence[FileRow]], Array] | None,
+    found: Names,
+) -> Sequence[FileRow]:
+    """Rows of a table most of whose positions are known, with the others known by place.
+
+    A few strange names among those of a position that is known are slips of the pen, and stay.
+    """
+    if not strange or places is None:
+        return rows
+    by_place, _ = _positions_by_place(rows, strange, design, places, {})
+    if not by_place or not set(by_place.values()).isdisjoint(used):
+        return rows
+    found.told.append(f"positions matched by place among those left: {_pairs(by_place, 8)}")
+    return _renamed(rows, 0, by_place)
 
 
 def _positions_by_place(

@@ -143,7 +143,7 @@ def read_readings(
     doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
     observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
-    refuse_gross_errors(observed.design, observed.x, observed.marks)
+    refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)
     return observed
 

@@ -53,6 +53,7 @@ THOUSANDS = re.compile(
 )
 # What could be thousands just as well as three decimals.
 EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
+OTHER_DECIMALS = "and others have decimal"
 NOTHING = frozenset(("", "-", "--", "---", "n/a", "na", "nan", "none", "null"))
 
 Line = tuple[int, str]
@@ -312,7 +313,7 @@ def wrong_number(cell: str, name: str, decimal: str) -> str:
         return f'"{shorten(cell)}" has signs between thousands; write it without them'
     other = "comma" if decimal == "point" else "point"
     if NUMBERS[other].fullmatch(cell):
-        return f'"{cell}" has a decimal {other}, and others have decimal {decimal}s; write one kind'
+        return f'"{cell}" has a decimal {other}, {OTHER_DECIMALS} {decimal}s; write one kind'
     return f'"{shorten(cell)}" is not a number; write for example "500{DECIMALS[decimal]}0003"'
 
 
@@ -323,7 +324,8 @@ def chosen_form(forms: Sequence[Form]) -> Form:
     """
     right = [form for form in forms if form.rows and not form.wrong]
     if not right:
-        return min(forms, key=_share_wrong)
+        # Of a number with thousands and decimals, the sign of the decimals is the last one.
+        return min(forms, key=lambda form: (_share_wrong(form), _of_other_decimals(form)))
     first = right[0]
     for other in right[1:]:
         if other.content() != first.content():
@@ -338,6 +340,11 @@ def chosen_form(forms: Sequence[Form]) -> Form:
 
 def _share_wrong(form: Form) -> float:
     return len(form.wrong) / max(len(form.rows) + len(form.wrong), 1)
+
+
+def _of_other_decimals(form: Form) -> int:
+    """How many rows are wrong for the sign of their decimals alone."""
+    return sum(OTHER_DECIMALS in text for _, text in form.wrong)
 
 
 def doubtful_decimals(form: Form) -> str:

@@ -9,6 +9,7 @@ import re
 from itertools import pairwise
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
@@ -63,6 +64,21 @@ def planned(pool: Path, name: str, *more: str, status: int = 0) -> dict[str, obj
 def poses(path: Path) -> dict[str, Position]:
     (experiment,) = load(path)
     return {one.name: one for one in experiment.positions}
+
+
+@pytest.mark.parametrize("stated", [0, 5])
+def test_a_stated_rank_deficiency_is_kept_where_the_choice_has_it(pool: Path, stated: int) -> None:
+    """As a check of what was written finds it, which a full one then agrees with."""
+    pool.write_text(
+        POOL.replace("expected_rank_deficiency: 5", f"expected_rank_deficiency: {stated}  # mine")
+    )
+    planned(pool, "day.yaml", "--positions", "6")
+    path = pool.with_name("day.yaml")
+    deficiency = bp.check(path).to_dict()["rank_deficiency"]
+    (experiment,) = load(path)
+    assert experiment.expected_rank_deficiency == (stated if stated == deficiency else None)
+    assert deficiency == 0
+    assert ("# mine" in path.read_text("utf-8")) == (stated == 0)
 
 
 def test_composed_names_alone_become_short_and_none_is_there_twice(pool: Path) -> None:

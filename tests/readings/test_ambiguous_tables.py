@@ -105,6 +105,24 @@ def test_signs_between_thousands_are_refused_in_words(experiment: Experiment, ce
     assert f'2:1: "{" ".join(cell.split())}" has signs between thousands' in asked(text, experiment)
 
 
+@pytest.mark.parametrize("signs", [".,", ",.", "',", "'."])
+def test_beside_thousands_decimals_are_not_said_to_be_of_two_kinds(
+    experiment: Experiment, signs: str
+) -> None:
+    """Every number is written in one and the same way."""
+    rows = [("-0.1", "100.25", "1012.5"), ("1000.5", "0.5", "-1012.5"), ("3.25", "1100.0", "7.5")]
+    text = HEAD
+    for k, row in enumerate(rows, start=1):
+        cells = [
+            f"{float(cell):,}".translate(str.maketrans({",": signs[0], ".": signs[1]}))
+            for cell in row
+        ]
+        text += f"z low;r1c{k};down;{';'.join(cells)}\n"
+    told = asked(text, experiment)
+    assert told.count("has signs between thousands") == 3
+    assert "others have decimal" not in told
+
+
 def test_two_kinds_of_decimals(experiment: Experiment) -> None:
     text = HEAD + "z low;r1c1;down;1,5;2,5;3,5\nz low;r1c2;down;4,5;2.25;3,5\n"
     assert '3:1: "2.25" has a decimal point, and others have decimal commas' in asked(

@@ -12,6 +12,7 @@ import pandas
 import pytest
 import yaml
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.offsets_applied import judge_offsets
 from ballplate.simulator.readings.reading_files import read_readings
 from scipy.spatial.distance import pdist
@@ -273,3 +274,53 @@ def test_too_few_balls_do_not_place_part_co_ordinates(
     assert bp.fit(DESIGN, few).warnings == ()
     with pytest.raises(bp.ExperimentError, match="too few balls were read in z high"):
         bp.fit(DESIGN, centres(few), coordinates="part")
+
+
+UNITS = {
+    "inches that are read as millimetres": 1 / 25.4,
+    "centimetres that are read as millimetres": 0.1,
+}
+
+
+@pytest.mark.parametrize("what", UNITS)
+@pytest.mark.parametrize("kind", ["ball centres", "part"])
+@pytest.mark.parametrize("controller", [None, OFFSETS])
+def test_a_wrong_unit_of_centres_is_told_once(
+    readings: pandas.DataFrame,
+    kind: str,
+    what: str,
+    controller: dict[str, tuple[float, ...]] | None,
+) -> None:
+    """Whatever the controller applied: its offsets are in the wrong unit, too."""
+    applied = (
+        OFFSETS
+        if controller is None
+        else {name: tuple(1.02 * value + 0.3 for value in one) for name, one in OFFSETS.items()}
+    )
+    table = centres(readings, applied)
+    table = in_parts(table, 4) if kind == "part" else table
+    (experiment,) = load(DESIGN)
+    stated = {name: [f"{value} mm" for value in one] for name, one in applied.items()}
+    settings = {"coordinates": kind} | ({"offsets_in_controller": stated} if controller else {})
+    experiment = experiment.with_(readings=settings)
+    wrong = table.assign(**{axis: table[axis] * UNITS[what] for axis in AXES})
+    with pytest.raises(bp.ExperimentError) as refused:
+        bp.fit(experiment, wrong)
+    (message,) = refused.value.messages
+    assert what in message.text and "otherwise the names of balls are wrong" in message.text
+    assert ", or lengths" not in message.text and ", or if" not in message.text
+    assert bp.fit(experiment, table).converged
+
+
+@pytest.mark.parametrize("kind", ["ball centres", "part"])
+def test_wrong_names_of_centres_are_no_wrong_unit(readings: pandas.DataFrame, kind: str) -> None:
+    table, generator = centres(readings), np.random.default_rng(12)
+    table = in_parts(table, 5) if kind == "part" else table
+    for name in table["position"].unique():
+        own = table["position"] == name
+        table.loc[own, "ball"] = generator.permutation(table.loc[own, "ball"].to_numpy())
+    (experiment,) = load(DESIGN)
+    with pytest.raises(bp.ExperimentError) as refused:
+        bp.fit(experiment.with_(readings={"coordinates": kind}), table)
+    assert len(refused.value.messages) > 1
+    assert all("lengths are in" not in one.text for one in refused.value.messages)

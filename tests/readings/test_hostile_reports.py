@@ -68,6 +68,43 @@ def test_a_file_cut_anywhere_gives_no_centre_that_was_not_written(kind: str) -> 
     assert refused > len(content) // 20
 
 
+@pytest.mark.parametrize("kind", ["pcdmis", "pcdmis newer"])
+def test_a_dimension_that_has_begun_is_refused_or_told(kind: str) -> None:
+    content = WRITTEN[kind][1]()
+    for end in range(content.index(BALLS[0].name), len(content)):
+        cut = content[:end]
+        whole_lines, _, last = cut.rpartition("\n")
+        begun = [ball.name for ball in BALLS if ball.name in whole_lines]
+        found = read(kind, cut.encode())
+        if found is None:
+            continue
+        assert [one.name for one in found.features if one.kind != "plane"] == begun, cut[-60:]
+        assert all(one.centre is not None or one.lacks for one in found.features)
+        # Rows that end behind their measured value are whole.
+        if last.strip() and last.split()[0] not in tuple("XYZM"):
+            assert found.remarks or last.startswith("END OF DIMENSION "), cut[-60:]
+        assert not last.startswith("DIM")
+
+
+@pytest.mark.parametrize("end", ["DIM L", "DIM LOC9= LOCATION OF SPHERE A_1\nAX    NOMINAL    "])
+def test_what_begins_at_the_end_of_a_file_is_refused(end: str) -> None:
+    assert read("pcdmis", (WRITTEN["pcdmis"][1]() + end).encode()) is None
+    # Where others follow, it is one that is left.
+    found = read("pcdmis", (end + "\n" + WRITTEN["pcdmis"][1]()).encode())
+    assert found is not None
+    lacking = [one.lacks for one in found.features if one.name == "A_1"]
+    lacking += [kind for kind in found.others if "without its name" in kind]
+    assert len(lacking) == 1 and lacking[0]
+
+
+def test_a_table_that_ends_within_a_name_is_told() -> None:
+    content = WRITTEN["calypso"][1]()
+    found = read("calypso", (content.rstrip("\n") + "\nPLA").encode())
+    assert found is not None and "may have been cut off" in found.remarks[-1]
+    found = read("calypso", content.encode())
+    assert found is not None and not found.remarks
+
+
 @pytest.mark.parametrize("kind", WRITTEN)
 def test_damaged_bytes_are_refused_or_change_no_more_than_they_hit(kind: str) -> None:
     content, generator, read_ones = WRITTEN[kind][1]().encode(), random.Random(11), 0

@@ -212,6 +212,10 @@ def test_what_the_stated_uncertainties_explain_is_laid_to_the_model_only_where_s
             if found.unexplained:
                 advice = "larger uncertainties" in unexplained_words(found.unexplained)
                 assert advice == (found.unexplained.times > 1.0) == (share == 1.0)
+                richer = "try a richer error model" in unexplained_words(found.unexplained)
+                assert richer != is_explained(design, solution)
+                calm = "and so not too large" in unexplained_words(found.unexplained)
+                assert calm == is_explained(design, solution)
 
 
 def test_scatter_below_what_is_stated_is_told_only_where_sigma_is_estimated(tmp_path: Path) -> None:

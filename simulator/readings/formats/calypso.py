@@ -155,6 +155,7 @@ class _Reader:
     located: dict[str, _Located] = field(default_factory=dict)
     complete: list[_Located] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
+    ends_in_text: bool = False
 
     def rows(self) -> Iterator[tuple[Mark, dict[str, str]]]:
         """Cells of each row by their columns; rows that end before the last needed one are told."""
@@ -168,6 +169,7 @@ class _Reader:
                 continue
             if len(cells) == 1 or (not table.is_of_features and not _has_number(cells)):
                 self.others["line (text)"] += 1
+                self.ends_in_text = text.is_cut and number == len(text.lines)
                 continue
             mark = text.mark(number)
             is_cut = text.is_cut and number == len(text.lines)
@@ -286,7 +288,14 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
         reader.take(mark, row)
     problems.finish()
     features = tuple(one.feature() for one in reader.complete)
-    return Report(file, CALYPSO.title, features, reader.others, text.remarks)
+    remarks = text.remarks
+    if reader.ends_in_text:
+        last = shorten(text.lines[-1].strip(), 30)
+        remarks += (
+            f'{file}: the last line, "{last}", is no row, and has no end; the file may have been'
+            " cut off",
+        )
+    return Report(file, CALYPSO.title, features, reader.others, remarks)
 
 
 CALYPSO = Format("calypso", "Calypso table", recognises, read)

@@ -28,6 +28,7 @@ LOCATION = re.compile(r"LOCATION OF\s+(\S+)\s+(\S+)", re.IGNORECASE)
 HEADED = re.compile(r"\s*(?:\S{1,3}\s+)?(MM|IN|INCH)\s+(\S.*?)\s+-\s+(\S.*?)\s*", re.IGNORECASE)
 MEASURED = ("MEAS", "MEASURED")
 NOMINALS = {"NOMINAL", "NOM"}
+ENDING = re.compile(r"\s*END OF DIMENSION\s+\S.*", re.IGNORECASE)
 PROBE = re.compile(r"\s*(TIP|LOADPROBE)\s*/\s*([^,\s]+).*", re.IGNORECASE)
 BEGINNING = re.compile(
     r"^[ \t]*(?:DIM(?:ENSION)?[ \t][^=\n]*=|AX[ \t]+(?:NOM|MEAS|\+TOL))|\bPC-?DMIS\b",
@@ -42,15 +43,17 @@ AGREEMENT = Fraction(2)
 
 @dataclass
 class _Dimension:
-    """The location of a feature that is being read, its unit, and its columns: what each is called
-    and where it ends.
+    """The location of a feature that is being read, its unit, its columns (what each is called and
+    where it ends), and whether it has had a row.
     """
 
+    mark: Mark
     name: str
     title: str
     kind: str
     unit: Fraction | None
     columns: list[tuple[str, int]] = field(default_factory=list)
+    has_row: bool = False
 
 
 @dataclass
@@ -97,11 +100,14 @@ class _Reader:
         found = DIMENSION.fullmatch(line)
         if found is not None:
             unit = UNIT.search(found[2])
+            self._end()
             self._start(found[1], found[2], unit[1] if unit else None, mark)
             return
         headed = HEADED.fullmatch(line)
         if headed is not None:
-            self.dimension = _Dimension(headed[3], headed[2], UNSTATED, UNITS[headed[1].upper()])
+            self._end()
+            own = UNITS[headed[1].upper()]
+            self.dimension = _Dimension(mark, headed[3], headed[2], UNSTATED, own)
             return
         probe = PROBE.fullmatch(line)
         if probe is not None:
@@ -111,15 +117,59 @@ class _Reader:
         if not words:
             return
         first = words[0].upper()
-        if line.strip().upper().startswith(("END OF DIMENSION", "DIM ", "DIMENSION ")):
-            self.dimension = None
+        if first in ("DIM", "DIMENSION"):
+            self._end()
+            self.others["dimension (without its name and =)"] += 1
+        elif ENDING.fullmatch(line):
+            self._end()
         elif self.dimension is None:
             return
         elif first == "AX":
             headings = list(re.finditer(r"\S+", line))[1:]
             self.dimension.columns = [(word[0].upper(), word.end()) for word in headings]
         elif first in AXES and len(first) == 1:
+            self.dimension.has_row = True
             self._row(first, line, mark, number == len(self.text.lines))
+
+    def _end(self) -> None:
+        """End the dimension that is being read; a location that had no row is left, and told."""
+        ended, self.dimension = self.dimension, None
+        if ended is None or ended.has_row:
+            return
+        if ended.kind != UNSTATED:
+            one = _Located(ended.mark, ended.name, ended.title, ended.kind, self.probe)
+            self.complete.append(one)
+        elif ended.columns:
+            self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
+
+    def finish(self) -> tuple[str, ...]:
+        """End the file; a remark where its last line has no end and is of no known form.
+
+        :raises ExperimentError: something was wrong, or the file ends before the first row of a
+            dimension or within its name.
+        """
+        last = self.text.lines[-1]
+        if self.dimension is not None and not self.dimension.has_row:
+            told = (
+                f'the file ends before the first row of "{shorten(self.dimension.title, 30)}"; it'
+                " was cut off, take a whole copy"
+            )
+            self.problems.add(self.dimension.mark, told)
+        elif self.text.is_cut and last.split()[0].upper() in ("DIM", "DIMENSION"):
+            told = "the file ends within this line; it was cut off, take a whole copy"
+            self.problems.add(self.text.mark(len(self.text.lines)), told)
+        self.problems.finish()
+        return self.text.remarks + self._about_the_end(last)
+
+    def _about_the_end(self, last: str) -> tuple[str, ...]:
+        words = last.split()
+        is_row = self.dimension is not None and words[:1] and words[0].upper() in tuple(AXES)
+        if not self.text.is_cut or is_row or ENDING.fullmatch(last) or PROBE.fullmatch(last):
+            return ()
+        return (
+            f'{self.text.file}: the last line, "{shorten(last.strip(), 30)}", has no end; the file'
+            " may have been cut off",
+        )
 
     def _start(self, title: str, words: str, unit: str | None, mark: Mark) -> None:
         located = LOCATION.match(words)
@@ -131,7 +181,7 @@ class _Reader:
         if unit is not None and unit.upper() not in UNITS:
             self.problems.add(mark, f'unknown unit "{shorten(unit)}"; PC-DMIS has MM and IN')
         own = UNITS.get(unit.upper(), self.unit) if unit is not None else self.unit
-        self.dimension = _Dimension(located[2].rstrip(","), title, located[1].lower(), own)
+        self.dimension = _Dimension(mark, located[2].rstrip(","), title, located[1].lower(), own)
 
     def _row(self, axis: str, line: str, mark: Mark, is_last: bool) -> None:
         assert self.dimension is not None
@@ -215,9 +265,9 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     reader = _Reader(text, ReportProblems(file), unit)
     for number, line in enumerate(text.lines, start=1):
         reader.take(number, line)
-    reader.problems.finish()
+    remarks = reader.finish()
     features = tuple(one.feature() for one in reader.complete)
-    return Report(file, PCDMIS.title, features, reader.others, text.remarks)
+    return Report(file, PCDMIS.title, features, reader.others, remarks)
 
 
 PCDMIS = Format("pcdmis", "PC-DMIS report", lambda text: BEGINNING.search(text) is not None, read)
