@@ -16,6 +16,7 @@ from ballplate.simulator.inputs.settings import hint, shorten
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
 
+from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
@@ -388,6 +389,8 @@ class Fit(FitResult):
                 "no single gross error explains that: try a richer error model or larger"
                 " uncertainties, and consider drifts"
             )
+            if has_exact_values(self.design):
+                cure += "; several values that are stated as exact may be wrong, too"
             if self.diagnosis.suspects or self.diagnosis.scatter:
                 cure = "see what is suspected"
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
@@ -412,9 +415,11 @@ class Fit(FitResult):
     def complaint(self) -> str:
         if self.converged:
             return self.verdict.complaint
+        exact = ", and for wrong values among those that are stated as exact"
         return (
             f"the estimate has {self.solution.status}; no results are reported: see the record of"
             " iterations, and look for wrong units, balls or probes among the readings"
+            f"{exact if has_exact_values(self.design) else ''}"
         )
 
     @property

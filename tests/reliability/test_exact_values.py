@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,3 +95,19 @@ def test_a_reading_that_is_wrong_beside_exact_values_is_named_and_they_are_not(
 def test_exact_values_that_are_right_are_not_suspected(tmp_path: Path) -> None:
     given = experiment(tmp_path, stated(SIX))
     assert not suspected(bp.fit(given, bp.simulate(given)))
+
+
+@pytest.mark.parametrize(("uncertainty", "is_exact"), [("0 um", True), ("0.2 um", False)])
+def test_what_nothing_explains_may_be_exact_values_where_there_are_any(
+    tmp_path: Path, uncertainty: str, is_exact: bool
+) -> None:
+    given = experiment(tmp_path, stated(FIVE, uncertainty))
+    readings = bp.simulate(given)
+    noise = 1e-3 * np.random.default_rng(5).standard_normal((len(readings), 3))
+    readings[["x_mm", "y_mm", "z_mm"]] += noise
+    fit = bp.fit(given, readings)
+    assert fit.too_large and not fit.diagnosis.suspects
+    told = "stated as exact"
+    assert any(told in one for one in fit.cautions) == is_exact
+    failed = replace(fit, solution=replace(fit.solution, status="diverged"))
+    assert (told in failed.complaint) == is_exact
