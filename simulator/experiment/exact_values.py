@@ -18,7 +18,8 @@ from ..design.observations.stated_values import value_name
 from ..inputs.settings import listing
 from ..machines.protocol import Array, Integers
 
-# Values that balls meet within this, in metres, agree but for the rounding of the computation.
+# Values that balls meet within this, in metres, or in parts of the largest if that is longer, agree
+# but for the rounding of the computation.
 AGREE = 1e-11
 
 # Places (m, per length of the artefact) that the search begins at: the drawing, and about it, since
@@ -54,6 +55,11 @@ class _Exact:
     def balls(self) -> Integers:
         """The balls (k,) that they are of."""
         return np.unique(np.concatenate([one.balls[at].ravel() for one, at in self.parts]))
+
+    @cached_property
+    def rounding(self) -> float:
+        """What misfits are no larger than that are mere rounding, in metres."""
+        return AGREE * max(1.0, *(float(np.abs(one.value).max()) for one, _ in self.parts))
 
     def misfit(self, balls: Array) -> tuple[Array, Array]:
         """Values less those stated (m,) at `balls` (n, d), and their derivatives (m, k, d)."""
@@ -135,7 +141,7 @@ def _least_misfit(exact: _Exact, drawn: Array) -> tuple[Array, Array] | None:
     for start in STARTS:
         off = start * extent * generator.standard_normal(drawn.shape)
         balls, misfit = _solved(exact, drawn + off)
-        if np.abs(misfit).max() <= AGREE:
+        if np.abs(misfit).max() <= exact.rounding:
             return None
         if best is None or (misfit**2).sum() < (best[1] ** 2).sum():
             best = balls, misfit
@@ -147,7 +153,7 @@ def _solved(exact: _Exact, balls: Array) -> tuple[Array, Array]:
     misfit, rows = exact.misfit(balls)
     damping = 0.0
     for _ in range(STEPS):
-        if np.abs(misfit).max() <= AGREE:
+        if np.abs(misfit).max() <= exact.rounding:
             break
         u, values, vh = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
         known = values > KNOWN * values.max(initial=0.0)
@@ -156,8 +162,11 @@ def _solved(exact: _Exact, balls: Array) -> tuple[Array, Array]:
         step[exact.balls] = -(vh.T @ (gain * (u.T @ misfit))).reshape(rows.shape[1:])
         if np.abs(step).max() <= 1e-16:
             break
-        new, new_rows = exact.misfit(balls + step)
-        if (new**2).sum() < (misfit**2).sum():
+        # Balls may come to be at one place, or far out.
+        with np.errstate(all="ignore"):
+            new, new_rows = exact.misfit(balls + step)
+            is_better = (new**2).sum() < (misfit**2).sum() and np.isfinite(new_rows).all()
+        if is_better:
             balls, misfit, rows, damping = balls + step, new, new_rows, damping / 10.0
         else:
             damping = max(10.0 * damping, 1e-6)

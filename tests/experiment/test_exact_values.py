@@ -115,3 +115,20 @@ def test_co_ordinates_and_distances_that_differ_are_refused(tmp_path: Path) -> N
     (told,) = complaints(tmp_path, exact, item({("r1c1", "r1c5"): 0.7501}))
     assert "x of r1c1" in told and "r1c1–r1c5" in told and "r5c1" not in told
     assert not complaints(tmp_path, exact, item({("r1c1", "r1c5"): 0.75}))
+
+
+@pytest.mark.parametrize(("away", "second"), [(1e8 / 3.0, 375.0), (0.0, 0.0)])
+def test_exact_co_ordinates_far_out_or_in_one_place_contradict_a_distance_alone(
+    tmp_path: Path, away: float, second: float
+) -> None:
+    given = 1e3 * places(NINE)
+    given[1, 0] = second
+    drawn = (given + away).tolist()
+    rows = [f"{name},{x},{y},{z}" for name, (x, y, z) in zip(NINE, drawn, strict=True)]
+    lines = ["ball,x_mm,y_mm,z_mm", *rows]
+    (tmp_path / "c.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    exact = {"kind": "coordinates", "balls": NINE, "values": "c.csv"}
+    exact["standard_uncertainty"] = "0 um"
+    assert not complaints(tmp_path, exact)
+    (told,) = complaints(tmp_path, exact, item({("r1c1", "r1c3"): 0.376}))
+    assert "contradict one another" in told and "r1c1–r1c3" in told
