@@ -277,7 +277,7 @@ def _single_items(at: LinearisedDesign) -> Iterator[BiasPatterns]:
     for one in reversed(at.design.observations):
         if isinstance(one, Lengths):
             continue
-        # What is stated as exact is not tested.
+        # Beside a constraint nothing of what is stated as exact is left in the residuals.
         chosen = np.flatnonzero(~one.is_exact)
         first, every = at.places[one.word].start, np.arange(len(chosen))
         entries = (first + chosen, every, -1.0 / one.uncertainty[chosen])

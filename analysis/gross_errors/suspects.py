@@ -23,7 +23,7 @@ class Suspect:
     `statistic` is that of a normal variable of the same chance, which exceeded `limit` when the
     cause was found. `alternatives` are patterns of causes that the readings cannot tell from it,
     and `of_model` errors of the model that they cannot; `first` and `last` are readings that a slip
-    may have come before, -1 of other causes.
+    may have come before, -1 of other causes. `of_exact`: it is of values that are stated as exact.
     """
 
     patterns: Patterns
@@ -36,6 +36,7 @@ class Suspect:
     of_model: tuple[str, ...] = ()
     first: int = -1
     last: int = -1
+    of_exact: bool = False
 
     @property
     def largest(self) -> int:

@@ -139,8 +139,9 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         return f"{reading_name(design, subject)} read {_sizes(suspect, 'too high')}", leave
     if kind == "distance" and len(_significant(suspect)) > 1:
         common = common_ball(design, given.subject[suspect.columns])
-        told = f"certified distances of ball {design.ball_label(common)}: {_from(common, suspect)}"
-        return told, "check the certificate"
+        exact = ", stated as exact" if suspect.of_exact else ""
+        told = f"certified distances of ball {design.ball_label(common)}{exact}:"
+        return f"{told} {_from(common, suspect)}", "check the certificate"
     if kind == "length":
         return f"{name(given, k)} read {size} too {long}", leave
     if kind == "length value":
@@ -150,6 +151,9 @@ def _what(suspect: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         if other.word == kind:
             words = other.words
             too = words.more if suspect.value > 0 else words.less
+            if suspect.of_exact:
+                told = f"is stated as exact and would have to be {size} too {too}"
+                return f"{name(given, k)} {told}", words.cure
             return f"{name(given, k)} {words.verb} {size} too {too}", words.cure
     if kind == "scale":
         artefact = design.artefacts.names[subject]

@@ -17,6 +17,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.reading_files import far_outside
 
+from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
@@ -391,6 +392,8 @@ class Fit(FitResult):
                 "no single gross error explains that: try a richer error model or larger"
                 " uncertainties, and consider drifts"
             )
+            if has_exact_values(self.design):
+                cure += "; several values that are stated as exact may be wrong, too"
             if self.diagnosis.suspects or self.diagnosis.scatter:
                 cure = "see what is suspected"
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
@@ -424,9 +427,11 @@ class Fit(FitResult):
                 # The file need not expect what is no fault of the plan.
                 return f"{rank_words(self.verdict)}; {not_read(self.unread)}"
             return self.verdict.complaint
+        exact = ", and for wrong values among those that are stated as exact"
         return (
             f"the estimate has {self.solution.status}; no results are reported: see the record of"
             " iterations, and look for wrong units, balls or probes among the readings"
+            f"{exact if has_exact_values(self.design) else ''}"
         )
 
     @property

@@ -113,7 +113,7 @@ def fit(
     :raises ExperimentError: variance components take more memory than there is.
     """
     # Loaded only now, so that what plans and checks need not load answers sooner.
-    from ..gross_errors.cause_search import diagnosis
+    from ..gross_errors.exact_values import diagnosis_of_all
     from ..gross_errors.leftover import too_many_entries
     from ..gross_errors.suspects import Diagnosis
     from .estimates import estimated_functions, parameter_estimates
@@ -157,7 +157,7 @@ def fit(
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        Diagnosis() if untested else diagnosis(at, observed.x, freedom, estimated),
+        Diagnosis() if untested else diagnosis_of_all(at, observed.x, freedom, estimated),
         untested,
         functions,
         found,

@@ -319,7 +319,7 @@ class Observations(ABC):
 
     @property
     def is_exact(self) -> NDArray[np.bool_]:
-        """Which values (m,) are stated without any uncertainty, and cannot be wrong."""
+        """Which values (m,) are stated without any uncertainty."""
         return np.full(len(self), False)
 
     def count(self, design: Design) -> int:

@@ -27,6 +27,7 @@ from .checks import (
     check_true_machine,
     check_use,
 )
+from .exact_values import check_exact_values
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Experiment
@@ -205,6 +206,7 @@ def _build(
                 calibration, ("calibration", i), readers, reader_count, references
             )
     check_radii(calibrations, problems)
+    check_exact_values(calibrations, references)
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, references)
     influences = resolve_influences(sections, named, references)
