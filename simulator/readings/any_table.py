@@ -271,6 +271,19 @@ class _Reader:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
+        def coverage_factor(cells: Sequence[str], mark: Mark) -> float:
+            column = roles["k"]
+            cell = cells[column.place] if column.constant is None else column.constant
+            try:
+                factor = float(cell.replace(sign, "."))
+            except ValueError:
+                factor = math.nan
+            if not 0.0 < factor < math.inf:
+                text = f'the coverage factor is "{shorten(cell)}"; it must be above 0'
+                messages.append(mark.message("", text))
+                return math.nan
+            return factor
+
         u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
@@ -288,6 +301,8 @@ class _Reader:
                 names.append(own)
             x = [number(cells, i, mark) for i in axes]
             x.append(math.nan if u is None else number(cells, u, mark))
+            if "k" in roles and not math.isnan(x[-1]):
+                x[-1] /= coverage_factor(cells, mark)
             x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
             size = math.nan if diameter is None else number(cells, diameter, mark)
             found.append((FileRow(mark, tuple(names), tuple(x)), size))
@@ -326,8 +341,10 @@ class _Reader:
         parts += [
             f'{role} from "{shorten(headings.cells[column.place])}"'
             for role, column in named.items()
-            if headings.cells[column.place].strip().casefold() != role
+            if headings.cells[column.place].strip().casefold() != role or role == "k"
         ]
+        if "k" in headings.roles:
+            parts.append("u is the expanded uncertainty divided by its coverage factor k")
         if len(headings.groups) > 1:
             of = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
             parts.append(f"co-ordinates of {of} side by side")

@@ -12,6 +12,7 @@ from functools import cached_property, lru_cache
 from ..experiment.readings_section import ColumnsSettings
 from ..inputs.quantities import plain_unit
 from ..inputs.settings import hint, listing, shorten
+from .uncertainty_headings import FACTORS, headed_uncertainty
 
 AXES = ("x", "y", "z")
 # Roles of columns of text.
@@ -45,7 +46,6 @@ WORDS: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "pos", "placement", "setup", "set up", "lage", "aufstellung"),
     "ball": ("ball", "sphere", "kugel", "ball name", "sphere name", "kugelname", "bille", "esfera"),
     "probe": ("probe", "stylus", "tip", "taster", "taststift", "probe name", "palpeur", "palpador"),
-    "u": ("u", "uncertainty", "standard uncertainty", "unsicherheit", "standardunsicherheit"),
     "diameter": ("diameter", "diam", "dia", "durchmesser", "sphere diameter", "ball diameter"),
 }
 # Only where no column has one of the words above.
@@ -205,7 +205,75 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             if places:
                 roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
                 taken.add(places[0])
+    if "u" in roles:
+        _refuse_expanded(roles["u"], cells)
+    else:
+        roles |= _uncertainty(cells, taken)
     return Headings(roles, groups, tuple(cells))
+
+
+def _uncertainty(cells: Sequence[str], taken: set[int]) -> dict[str, HeadedColumn]:
+    """The column u of uncertainties by what its heading says, and k of their coverage factors where
+    they are expanded.
+
+    :raises HeadingError: several columns could be it, or one does not say which uncertainty it is.
+    """
+    found = {
+        i: said
+        for i, cell in enumerate(cells)
+        if i not in taken
+        and len(cell) <= LONGEST
+        and (said := headed_uncertainty(cell, heading)) is not None
+    }
+    for kind in ("standard", "expanded", "unclear"):
+        places = [i for i, said in found.items() if said.kind == kind]
+        if len(places) > 1:
+            raise HeadingError(_which("u", [cells[i] for i in places]))
+        if places:
+            break
+    else:
+        return {}
+    (place,) = places
+    named, said = shorten(cells[place]), found[place]
+    unit = said.unit or "um"
+    column = {"u": HeadedColumn(place, said.unit)}
+    if kind == "standard":
+        return column
+    factors = [
+        i
+        for i, cell in enumerate(cells)
+        if i not in taken and i != place and heading(cell)[0] in FACTORS
+    ]
+    if kind == "unclear" and (said.factor is not None or not factors):
+        raise HeadingError(
+            f'"{named}" does not say which uncertainty it is; call it standard_uncertainty_{unit},'
+            f" or expanded_uncertainty_{unit} beside a column k, or something else where it is"
+            f" none; or name it as the standard uncertainty under readings: {{columns: {{u: {named}}}}}"
+        )
+    if len(factors) + (said.factor is not None) > 1:
+        raise HeadingError(
+            f'the coverage factor of "{named}" is stated more than once; remove all but one'
+        )
+    if not factors and said.factor is None:
+        raise HeadingError(
+            f'"{named}" has no coverage factor; add a column k, or write it in the heading, as in'
+            f" expanded_uncertainty (k=2) [{unit}]"
+        )
+    return column | {"k": HeadedColumn(factors[0] if factors else -1, constant=said.factor)}
+
+
+def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
+    """Refuse a column named in the experiment file whose heading says that it is expanded.
+
+    :raises HeadingError: it does.
+    """
+    cell = cells[column.place][:LONGEST] if column.place >= 0 else ""
+    said = headed_uncertainty(cell, heading)
+    if said is not None and (said.kind == "expanded" or (said.factor and said.kind != "standard")):
+        raise HeadingError(
+            f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
+            " uncertainties; leave u out there: the heading says what it is"
+        )
 
 
 def _unit_of(cell: str, name: str) -> str | None:

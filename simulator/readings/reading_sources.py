@@ -22,8 +22,9 @@ from ..inputs.yamltree import GivenText
 from ..machines.protocol import Array
 from .any_table import TableRows, read_any_table, text_of
 from .coordinate_kinds import controller_offsets
-from .headings import Vocabulary
+from .headings import Vocabulary, heading
 from .name_matching import with_known_names
+from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
 Units = Mapping[str, Mapping[str, Fraction]]
@@ -108,8 +109,11 @@ def read_source(
     stated = (settings.columns, settings.separator, settings.decimal, settings.header)
     wrong: list[Message] = []
     rows: tuple[FileRow, ...] = ()
-    looks_plain = encoding in ("", "UTF-8") and header_names(text) & set(axes)
-    if looks_plain and all(one is None for one in stated):
+    heads = header_names(text)
+    looks_plain = encoding in ("", "UTF-8") and heads & set(axes)
+    # Plain tables have standard uncertainties only.
+    others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
+    if looks_plain and not others and all(one is None for one in stated):
         # One probe need not be named.
         defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
         texts = ["position", "ball", "probe"]
