@@ -145,7 +145,8 @@ def read_readings(
         wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
         messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
     if messages or unknown:
-        raise ExperimentError(sorted([*messages, *unknown]))
+        hints = found.hints if unknown else ()
+        raise ExperimentError([*sorted([*messages, *unknown]), *hints])
     given, stated = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:

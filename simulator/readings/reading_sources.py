@@ -39,10 +39,13 @@ ENOUGH = 3
 
 @dataclass(frozen=True)
 class SourceRows:
-    """Rows of all tables; `told` is how they were read and what was matched."""
+    """Rows of all tables; `told` is how they were read and what was matched, `hints` what to say
+    where names are not known.
+    """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...]
+    hints: tuple[Message, ...] = ()
 
 
 def source_rows(
@@ -77,15 +80,16 @@ def source_rows(
     def places(own: Sequence[FileRow]) -> Array:
         return _places(own, design, settings)
 
+    hints = tuple(hint for table in tables for hint in table.hints)
     named, matched, asked = with_known_names(
         rows, design, None if settings.coordinates == "part" else places
     )
     if asked:
-        raise ExperimentError([rows[0].mark.message("", text) for text in asked])
+        raise ExperimentError([*(rows[0].mark.message("", text) for text in asked), *hints])
     told = [text for table in tables for text in table.told]
     if len(diameters) == len(rows):
         told += _about_diameters(named, np.array(diameters))
-    return SourceRows(named, (*told, *matched))
+    return SourceRows(named, (*told, *matched), hints)
 
 
 def read_source(
