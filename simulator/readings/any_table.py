@@ -153,6 +153,10 @@ class _Reader:
         messages = [Message(str(self.source), line, 1, "", text) for line, text in form.wrong]
         if len(messages) > MOST_MESSAGES:
             messages = [*messages[:MOST_MESSAGES], replace(messages[-1], text=MORE_ERRORS)]
+        if not messages and not form.rows and form.empty:
+            text = f"nothing is filled in: {listing(self.words.axes)} are empty in all rows; write"
+            text += " in what was read, and remove the lines of what was not"
+            raise self.error(text, form.empty[0])
         if not messages and not form.rows:
             raise self.error("no rows below the names of the columns; add at least one")
         if "ball" not in headings.roles:

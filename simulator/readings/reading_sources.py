@@ -24,6 +24,7 @@ from .any_table import TableRows, read_any_table, text_of
 from .coordinate_kinds import controller_offsets
 from .headings import Vocabulary, heading
 from .name_matching import with_known_names
+from .other_files import what_it_is
 from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
@@ -135,6 +136,9 @@ def read_source(
     try:
         return read_any_table(text, encoding, words, settings, is_possible)
     except ExperimentError:
+        # Who names columns knows what the file is.
+        if settings.columns is None and (other := what_it_is(text)):
+            raise ExperimentError([Message(str(source), 1, 1, "", other)]) from None
         if not wrong:
             raise
     if not rows:
