@@ -14,7 +14,7 @@ import numpy as np
 from ..design.arrays import Design
 from ..experiment.readings_section import ReadingsSettings
 from ..geometry.motions import AXIS_NAMES
-from ..inputs.messages import ExperimentError, Message
+from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing
 from ..inputs.tables import FileRow, header_names, read_table
@@ -64,6 +64,7 @@ def source_rows(
 
     :raises ExperimentError: a table that cannot be read, or names that could be several.
     """
+    _refuse_named_twice(sources)
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
@@ -91,6 +92,22 @@ def source_rows(
     if len(diameters) == len(rows):
         told += _about_diameters(named, np.array(diameters))
     return SourceRows(named, (*told, *matched), hints)
+
+
+def _refuse_named_twice(sources: Sequence[Source]) -> None:
+    """Refuse a file that is given more than once, by whatever paths.
+
+    :raises ExperimentError: one is.
+    """
+    seen: dict[Path, Path] = {}
+    for source in sources:
+        if not isinstance(source, Path) or not source.is_file():
+            continue
+        place = source.resolve()
+        if place in seen:
+            known = "" if seen[place] == source else f", as {seen[place]} as well"
+            raise refused(source, f"the file is named twice{known}; name it once")
+        seen[place] = source
 
 
 def read_source(

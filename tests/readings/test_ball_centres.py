@@ -86,6 +86,21 @@ def test_ball_centres_that_nobody_states_are_found(readings: pandas.DataFrame) -
     assert "coordinates: ball centres" in message.text and "50 mm" in message.text
 
 
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ("ball centres", "as ball centres, which is stated;"),
+        ("part", "as ball centres, which part co-ordinates are, and part is stated;"),
+    ],
+)
+def test_what_is_stated_is_told_as_it_was_stated(
+    readings: pandas.DataFrame, stated: str, said: str
+) -> None:
+    with pytest.raises(bp.ExperimentError) as refused:
+        bp.fit(DESIGN, readings, coordinates=stated)
+    assert said in str(refused.value)
+
+
 @pytest.mark.parametrize("stated", ["ball centres", "part"])
 def test_scale_readings_that_are_called_ball_centres_are_found(
     readings: pandas.DataFrame, stated: str

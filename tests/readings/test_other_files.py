@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.reading_files import read_readings
 
 DESIGN = "designs/quickstart.yaml"
 SAMPLES = Path("tests/readings/samples")
@@ -77,3 +81,15 @@ def test_an_own_table_with_names_of_columns_is_not_taken_for_a_report(
     """Who says which columns are meant is told what is wrong with these."""
     text = refusal(capsys, SAMPLES / "calypso_fet.txt", "--columns", "ball=Kugel")
     assert 'no column "Kugel"' in text and "ballplate import" not in text
+
+
+def test_a_file_that_is_named_twice(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings, link = tmp_path / "readings.csv", tmp_path / "link.csv"
+    assert main(["simulate", DESIGN, "-o", str(readings)]) == 0
+    link.symlink_to(readings)
+    for other in (readings, tmp_path / ".." / tmp_path.name / "readings.csv", link):
+        text = refusal(capsys, readings, other)
+        assert "the file is named twice" in text and len(text.splitlines()) == 1
+        assert ("as well" in text) == (other != readings)
+    with pytest.raises(ExperimentError, match="named twice"):
+        read_readings([readings, readings], lay_out(load(Path(DESIGN))[0]))
