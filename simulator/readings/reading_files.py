@@ -26,7 +26,7 @@ from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .common_causes import doubts_about_poses
-from .coordinate_kinds import as_scale_readings
+from .coordinate_kinds import as_scale_readings, doubts_about_copies
 from .gross_error_messages import (
     doubts_about_lengths,
     doubts_about_volume,
@@ -49,7 +49,7 @@ class ObservedReadings:
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the
     design did not foresee. `marks` tell where each reading stands; of the mean of several, where
     the first does. `told` is how tables were read, `of_offsets` what is doubtful about offsets of
-    probes in them.
+    probes in them, and about part co-ordinates that two positions have alike.
     """
 
     design: Design
@@ -185,6 +185,8 @@ def read_readings(
         )
     marks = tuple(row.mark for row in rows)
     doubt = () if empty else doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    if settings.coordinates == "part":
+        doubt += doubts_about_copies(design, readings, given)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
     observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks)
