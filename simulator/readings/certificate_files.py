@@ -179,14 +179,14 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
         already, or that is far from the drawing; values that are missing. All of them at once.
     """
     problems: list[Message] = []
-    text = path if isinstance(path, GivenText) else GivenText(str(path), read_text(path))
-    if is_calibration_table(text):
+    table = path if isinstance(path, GivenText) else GivenText(str(path), read_text(path))
+    if is_calibration_table(table):
         told = (
             "this is a table of the certified values of one calibration; name it in the experiment"
             f" file under calibration: values: {Path(path.name).name}, and leave --certificate out"
         )
         raise ExperimentError([Message(str(path), 1, 1, "", told)])
-    rows = read_table(text, COLUMNS, [], problems=problems)
+    rows = read_table(table, COLUMNS, [], problems=problems)
     known = certified_values(experiment)
     if not known:
         text = (
