@@ -26,7 +26,7 @@ from ..inputs.spreadsheets import text_of_cell
 from ..inputs.tables import MOST_ROWS, FileRow
 from ..inputs.yamltree import GivenText, Mark, read_bytes
 from ..machines.protocol import Array
-from .headings import TEXTS, Group, Vocabulary, folded, missing_columns, unit_of
+from .headings import TEXTS, Group, HeadedColumn, Vocabulary, folded, missing_columns, unit_of
 from .table_forms import (
     DECIMALS,
     NOTHING,
@@ -307,19 +307,6 @@ class _Reader:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
-        def coverage_factor(cells: Sequence[str], mark: Mark) -> float:
-            column = roles["k"]
-            cell = cells[column.place] if column.constant is None else column.constant
-            try:
-                factor = float(cell.replace(sign, "."))
-            except ValueError:
-                factor = math.nan
-            if not 0.0 < factor < math.inf:
-                text = f'the coverage factor is "{shorten(cell)}"; it must be above 0'
-                messages.append(mark.message("", text))
-                return math.nan
-            return factor
-
         u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
@@ -338,7 +325,7 @@ class _Reader:
             x = [number(cells, i, mark) for i in axes]
             x.append(math.nan if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
-                x[-1] /= coverage_factor(cells, mark)
+                x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
             x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
             size = math.nan if diameter is None else number(cells, diameter, mark)
             found.append((FileRow(mark, tuple(names), tuple(x)), size))
@@ -391,6 +378,22 @@ class _Reader:
         if form.empty:
             parts.append(f"without co-ordinates, left out: line{_numbers(form.empty)}")
         return f"{self.source}: read as: {', '.join(parts)}"
+
+
+def _coverage_factor(
+    column: HeadedColumn, cells: Sequence[str], sign: str, mark: Mark, messages: list[Message]
+) -> float:
+    """The coverage factor of a row; NaN after saying what is wrong."""
+    cell = cells[column.place] if column.constant is None else column.constant
+    try:
+        factor = float(cell.replace(sign, "."))
+    except ValueError:
+        factor = math.nan
+    if 0.0 < factor < math.inf:
+        return factor
+    text = f'the coverage factor is "{shorten(cell)}"; it must be above 0'
+    messages.append(mark.message("", text))
+    return math.nan
 
 
 def _numbers(lines: Sequence[int]) -> str:
