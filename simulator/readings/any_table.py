@@ -26,7 +26,7 @@ from ..inputs.spreadsheets import text_of_cell
 from ..inputs.tables import MOST_ROWS, FileRow
 from ..inputs.yamltree import GivenText, Mark, read_bytes
 from ..machines.protocol import Array
-from .headings import TEXTS, Group, Vocabulary, missing_columns, unit_of
+from .headings import TEXTS, Group, HeadedColumn, Vocabulary, folded, missing_columns, unit_of
 from .table_forms import (
     DECIMALS,
     NOTHING,
@@ -41,7 +41,7 @@ from .table_forms import (
 
 # Lines above the headings that say what all rows have.
 ABOVE = {
-    "position": r"position|pos|placement|set-?up|lage|aufstellung",
+    "position": r"position|pos|placement|set-?up|lage|aufstellung|stellung|messlage|aufspannung",
     "probe": r"probe|stylus|tip|taster|taststift",
     "unit": r"units?|einheit(?:en)?|all values in|alle (?:werte|angaben) in|lengths? in",
 }
@@ -59,11 +59,14 @@ class TableRows:
     y, z and u, and what further columns hold; NaN for what is not stated.
 
     `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
+    `hints` are what to say where names are not known: that a position is the name of the file
+    though columns are not used.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...] = ()
     diameters: tuple[float, ...] = ()
+    hints: tuple[Message, ...] = ()
 
 
 def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[GivenText, str]:
@@ -144,13 +147,18 @@ class _Reader:
         found.sort(key=lambda one: one[0].mark.line)
         rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
         self._refuse_doubtful(rows, is_possible)
-        return TableRows(tuple(rows), (self._told(units, told),), diameters)
+        hints = self._of_positions(texts.get("position", ""))
+        return TableRows(tuple(rows), (self._told(units, told),), diameters, hints)
 
     def _refuse_wrong(self) -> None:
         form, headings = self.form, self.form.headings
         messages = [Message(str(self.source), line, 1, "", text) for line, text in form.wrong]
         if len(messages) > MOST_MESSAGES:
             messages = [*messages[:MOST_MESSAGES], replace(messages[-1], text=MORE_ERRORS)]
+        if not messages and not form.rows and form.empty:
+            text = f"nothing is filled in: {listing(self.words.axes)} are empty in all rows; write"
+            text += " in what was read, and remove the lines of what was not"
+            raise self.error(text, form.empty[0])
         if not messages and not form.rows:
             raise self.error("no rows below the names of the columns; add at least one")
         if "ball" not in headings.roles:
@@ -206,6 +214,34 @@ class _Reader:
                 texts[role] = name
                 told.append(f'position "{shorten(name)}" by the name of the file')
         return texts, told
+
+    def _of_positions(self, position: str) -> tuple[Message, ...]:
+        """What to say where positions are not known, since one is by the name of the file alone.
+
+        :raises ExperimentError: a column that is not used has nothing but names of positions.
+        """
+        headings = self.form.headings
+        if position != Path(self.source.name).stem or "position" in headings.roles:
+            return ()
+        known = {folded(name) for name in self.words.positions}
+        for i, cell in enumerate(headings.cells):
+            if i in headings.used or not cell or folded(position) in known:
+                continue
+            if {folded(cells[i]) for _, cells in self.form.rows} <= known:
+                name = shorten(cell)
+                raise self.error(
+                    f'the column "{name}" has names of positions; if it is that of positions, give'
+                    f" --columns position={name}, or readings: {{columns: {{position: {name}}}}}"
+                )
+        if not headings.unused:
+            return ()
+        names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
+        text = (
+            f'"{shorten(position)}", the name of the file, was taken for the position; not used:'
+            f" {names}; if one of these is the position, give --columns"
+            f" position={shorten(headings.unused[0])}"
+        )
+        return (Message(str(self.source), max(self.form.header, 1), 1, "", text),)
 
     def _units(self, above: Mapping[str, str]) -> dict[int, str]:
         """Units by place of the columns of lengths.
@@ -290,6 +326,8 @@ class _Reader:
                 names.append(own)
             x = [number(cells, i, mark) for i in axes]
             x.append(math.nan if u is None else number(cells, u, mark))
+            if "k" in roles and not math.isnan(x[-1]):
+                x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
             x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
             size = math.nan if diameter is None else number(cells, diameter, mark)
             found.append((FileRow(mark, tuple(names), tuple(x)), size))
@@ -328,8 +366,10 @@ class _Reader:
         parts += [
             f'{role} from "{shorten(headings.cells[column.place])}"'
             for role, column in named.items()
-            if headings.cells[column.place].strip().casefold() != role
+            if headings.cells[column.place].strip().casefold() != role or role == "k"
         ]
+        if "k" in headings.roles:
+            parts.append("u is the expanded uncertainty divided by its coverage factor k")
         if len(headings.groups) > 1:
             of = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
             parts.append(f"co-ordinates of {of} side by side")
@@ -341,6 +381,22 @@ class _Reader:
         if form.empty:
             parts.append(f"without co-ordinates, left out: line{_numbers(form.empty)}")
         return f"{self.source}: read as: {', '.join(parts)}"
+
+
+def _coverage_factor(
+    column: HeadedColumn, cells: Sequence[str], sign: str, mark: Mark, messages: list[Message]
+) -> float:
+    """The coverage factor of a row; NaN after saying what is wrong."""
+    cell = cells[column.place] if column.constant is None else column.constant
+    try:
+        factor = float(cell.replace(sign, "."))
+    except ValueError:
+        factor = math.nan
+    if 0.0 < factor < math.inf:
+        return factor
+    text = f'the coverage factor is "{shorten(cell)}"; it must be above 0'
+    messages.append(mark.message("", text))
+    return math.nan
 
 
 def _numbers(lines: Sequence[int]) -> str:

@@ -32,8 +32,9 @@ from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_l
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, read_table
-from ..inputs.yamltree import GivenText
+from ..inputs.yamltree import GivenText, read_text
 from ..machines.protocol import Array, ErrorModel
+from .other_files import is_calibration_table
 from .simulated import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
@@ -178,7 +179,14 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
         already, or that is far from the drawing; values that are missing. All of them at once.
     """
     problems: list[Message] = []
-    rows = read_table(path, COLUMNS, [], problems=problems)
+    table = path if isinstance(path, GivenText) else GivenText(str(path), read_text(path))
+    if is_calibration_table(table):
+        told = (
+            "this is a table of the certified values of one calibration; name it in the experiment"
+            f" file under calibration: values: {Path(path.name).name}, and leave --certificate out"
+        )
+        raise ExperimentError([Message(str(path), 1, 1, "", told)])
+    rows = read_table(table, COLUMNS, [], problems=problems)
     known = certified_values(experiment)
     if not known:
         text = (

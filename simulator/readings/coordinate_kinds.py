@@ -4,6 +4,8 @@ co-ordinates or in those of a part, with the machine's own correction or without
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from ..design.arrays import Design, Readings
@@ -52,6 +54,33 @@ def as_scale_readings(
             text = f"the correction of {correction.file} is too large to be taken off"
             raise refused(file, text) from None
     return x
+
+
+def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[str, ...]:
+    """What is doubtful about part co-ordinates (m, d) as the table has them: that two positions
+    have the same ones, which repeated measurements do not give, but a file that was copied does.
+    """
+    of_position = {
+        k: {
+            (int(ball), *place)
+            for ball, place in zip(
+                readings.ball[readings.position == k],
+                x[readings.position == k].tolist(),
+                strict=True,
+            )
+        }
+        for k in np.unique(readings.position).tolist()
+    }
+    doubts = []
+    for one, other in combinations(of_position, 2):
+        own = of_position[one]
+        if len(own) > design.dimension and own == of_position[other]:
+            names = design.positions.names
+            doubts.append(
+                f'positions "{names[one]}" and "{names[other]}" have the same readings to the last'
+                " digit; if one is a copy of the other, give what was read there"
+            )
+    return tuple(doubts)
 
 
 def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> Array:

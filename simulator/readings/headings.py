@@ -12,6 +12,7 @@ from functools import cached_property, lru_cache
 from ..experiment.readings_section import ColumnsSettings
 from ..inputs.quantities import plain_unit
 from ..inputs.settings import hint, listing, shorten
+from .uncertainty_headings import FACTORS, headed_uncertainty
 
 AXES = ("x", "y", "z")
 # Roles of columns of text.
@@ -42,15 +43,26 @@ MEASURED = frozenset(
     )
 )
 WORDS: Mapping[str, tuple[str, ...]] = {
-    "position": ("position", "pos", "placement", "setup", "set up", "lage", "aufstellung"),
+    "position": (
+        *("position", "pos", "placement", "setup", "set up", "lage", "aufstellung"),
+        *("stellung", "messlage", "aufspannung", "plattenlage"),
+    ),
     "ball": ("ball", "sphere", "kugel", "ball name", "sphere name", "kugelname", "bille", "esfera"),
     "probe": ("probe", "stylus", "tip", "taster", "taststift", "probe name", "palpeur", "palpador"),
-    "u": ("u", "uncertainty", "standard uncertainty", "unsicherheit", "standardunsicherheit"),
     "diameter": ("diameter", "diam", "dia", "durchmesser", "sphere diameter", "ball diameter"),
 }
 # Only where no column has one of the words above.
 LESS_CLEAR: Mapping[str, tuple[str, ...]] = {
-    "position": ("position no", "position number", "lage nr", "pos nr", "pos no"),
+    "position": (
+        "position no",
+        "position number",
+        "lage nr",
+        "pos nr",
+        "pos no",
+        "stellung nr",
+        "messlage nr",
+        "aufspannung nr",
+    ),
     "ball": (
         *("ball no", "ball number", "ball id", "sphere no", "kugel nr", "kugelnummer", "feature"),
         *("element", "merkmal", "name", "label", "id", "no", "nr", "number", "nummer", "punkt"),
@@ -174,7 +186,7 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
     """
     parsed = [heading(cell) for cell in cells]
     stated = words.stated
-    groups = _stated_groups(cells, words) or _found_groups(parsed, words)
+    groups = _stated_groups(cells, words) or _found_groups(cells, words)
     if groups is None:
         return None
     taken = {axis.place for group in groups for axis in group.axes}
@@ -206,7 +218,76 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             if places:
                 roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
                 taken.add(places[0])
+    if "u" in roles:
+        _refuse_expanded(roles["u"], cells)
+    else:
+        roles |= _uncertainty(cells, taken)
     return Headings(roles, groups, tuple(cells))
+
+
+def _uncertainty(cells: Sequence[str], taken: set[int]) -> dict[str, HeadedColumn]:
+    """The column u of uncertainties by what its heading says, and k of their coverage factors where
+    they are expanded.
+
+    :raises HeadingError: several columns could be it, or one does not say which uncertainty it is.
+    """
+    found = {
+        i: said
+        for i, cell in enumerate(cells)
+        if i not in taken
+        and len(cell) <= LONGEST
+        and (said := headed_uncertainty(cell, heading)) is not None
+    }
+    for kind in ("standard", "expanded", "unclear"):
+        places = [i for i, said in found.items() if said.kind == kind]
+        if len(places) > 1:
+            raise HeadingError(_which("u", [cells[i] for i in places]))
+        if places:
+            break
+    else:
+        return {}
+    (place,) = places
+    named, said = shorten(cells[place]), found[place]
+    unit = said.unit or "um"
+    column = {"u": HeadedColumn(place, said.unit)}
+    if kind == "standard":
+        return column
+    factors = [
+        i
+        for i, cell in enumerate(cells)
+        if i not in taken and i != place and heading(cell)[0] in FACTORS
+    ]
+    if kind == "unclear" and (said.factor is not None or not factors):
+        raise HeadingError(
+            f'"{named}" does not say which uncertainty it is; call it standard_uncertainty_{unit},'
+            f" or expanded_uncertainty_{unit} beside a column k, or something else where it is"
+            " none; or name it as the standard uncertainty under readings:"
+            f" {{columns: {{u: {named}}}}}"
+        )
+    if len(factors) + (said.factor is not None) > 1:
+        raise HeadingError(
+            f'the coverage factor of "{named}" is stated more than once; remove all but one'
+        )
+    if not factors and said.factor is None:
+        raise HeadingError(
+            f'"{named}" has no coverage factor; add a column k, or write it in the heading, as in'
+            f" expanded_uncertainty (k=2) [{unit}]"
+        )
+    return column | {"k": HeadedColumn(factors[0] if factors else -1, constant=said.factor)}
+
+
+def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
+    """Refuse a column named in the experiment file whose heading says that it is expanded.
+
+    :raises HeadingError: it does.
+    """
+    cell = cells[column.place][:LONGEST] if column.place >= 0 else ""
+    said = headed_uncertainty(cell, heading)
+    if said is not None and said.kind == "expanded":
+        raise HeadingError(
+            f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
+            " uncertainties; leave u out there: the heading says what it is"
+        )
 
 
 def _unit_of(cell: str, name: str) -> str | None:
@@ -246,10 +327,19 @@ def numbered_columns(words: Vocabulary, count: int) -> Headings:
 
 
 def _which(role: str, cells: Sequence[str]) -> str:
+    if len(set(cells)) == 1:
+        return _twice(role, cells[0])
     named = listing(f'"{shorten(cell)}"' for cell in cells)
     return (
         f"the columns {named} could all be {role}; say which: readings: {{columns: {{{role}:"
         f" {shorten(cells[0])}}}}}"
+    )
+
+
+def _twice(role: str, cell: str) -> str:
+    return (
+        f'the heading "{shorten(cell)}" occurs more than once, and could be {role}; correct it, or'
+        f" give the number of the right column: readings: {{columns: {{{role}: …}}}}"
     )
 
 
@@ -303,13 +393,12 @@ def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...]
     return tuple(groups)
 
 
-def _found_groups(
-    parsed: Sequence[tuple[str, str | None]], words: Vocabulary
-) -> tuple[Group, ...] | None:
+def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
     """Groups of co-ordinates by what headings say besides an axis; None where none is complete.
 
     :raises HeadingError: two columns could be the same co-ordinate.
     """
+    parsed = [heading(cell) for cell in cells]
     found: dict[str, dict[str, list[int]]] = {}
     for i, (name, _) in enumerate(parsed):
         parts = name.split()
@@ -322,11 +411,17 @@ def _found_groups(
                 found.setdefault(beside, {}).setdefault(axis, []).append(i)
     groups = {beside: axes for beside, axes in found.items() if set(axes) == set(words.axes)}
     if not groups:
+        # With one axis missing, the heading of another stands where it should be.
+        for axes in found.values():
+            for axis, places in axes.items():
+                named = [cells[i] for i in places]
+                if len(axes) == len(words.axes) - 1 and len(named) > len(set(named)):
+                    raise HeadingError(_twice(axis, named[0]))
         return None
     for axes in groups.values():
         for axis, places in axes.items():
             if len(places) > 1:
-                raise HeadingError(_which(axis, [parsed[i][0] for i in places]))
+                raise HeadingError(_which(axis, [cells[i] for i in places]))
     if "" in groups and len(groups) > 1:
         names = listing(beside for beside in groups if beside)
         raise HeadingError(

@@ -32,7 +32,7 @@ class ObservedReadings:
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the
     design did not foresee. `marks` tell where each reading stands; of the mean of several, where
     the first does. `told` is how tables were read, `of_offsets` what is doubtful about offsets of
-    probes in them.
+    probes in them, and about part co-ordinates that two positions have alike.
     """
 
     design: Design

@@ -165,6 +165,8 @@ def doubt_about_offsets(
         name: format_length(float(f"{scatter:.2g}")) for name, scatter in verdict.scatter.items()
     }
     why = "which is stated" if stated else "the default"
+    if stated == "part":
+        why = "which part co-ordinates are, and part is stated"
     text = (
         f"readings with different probes agree to {shown[verdict.right]} (the median) as"
         f" {verdict.right}, but only to {shown[taken]} as {taken}, {why}; {REMEDIES[verdict.right]}"

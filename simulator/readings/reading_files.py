@@ -22,7 +22,7 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .coordinate_kinds import as_scale_readings
+from .coordinate_kinds import as_scale_readings, doubts_about_copies
 from .gross_error_messages import (
     refuse_gross_errors,
 )
@@ -102,7 +102,8 @@ def read_readings(
             without = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
             messages += [mark.message("", text) for mark in without]
     if messages or unknown:
-        raise ExperimentError(sorted([*messages, *unknown]))
+        hints = found.hints if unknown else ()
+        raise ExperimentError([*sorted([*messages, *unknown]), *hints])
     given, stated = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
@@ -141,6 +142,8 @@ def read_readings(
         )
     marks = tuple(row.mark for row in rows)
     doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    if settings.coordinates == "part":
+        doubt += doubts_about_copies(design, readings, given)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
     observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks, settings)

@@ -14,7 +14,7 @@ import numpy as np
 from ..design.arrays import Design
 from ..experiment.readings_section import ReadingsSettings
 from ..geometry.motions import AXIS_NAMES
-from ..inputs.messages import ExperimentError, Message
+from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing
 from ..inputs.tables import FileRow, header_names, read_table
@@ -22,8 +22,10 @@ from ..inputs.yamltree import GivenText
 from ..machines.protocol import Array
 from .any_table import TableRows, read_any_table, text_of
 from .coordinate_kinds import controller_offsets
-from .headings import Vocabulary
+from .headings import Vocabulary, heading
 from .name_matching import with_known_names
+from .other_files import what_it_is
+from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
 Units = Mapping[str, Mapping[str, Fraction]]
@@ -38,10 +40,13 @@ ENOUGH = 3
 
 @dataclass(frozen=True)
 class SourceRows:
-    """Rows of all tables; `told` is how they were read and what was matched."""
+    """Rows of all tables; `told` is how they were read and what was matched, `hints` what to say
+    where names are not known.
+    """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...]
+    hints: tuple[Message, ...] = ()
 
 
 def source_rows(
@@ -59,6 +64,7 @@ def source_rows(
 
     :raises ExperimentError: a table that cannot be read, or names that could be several.
     """
+    _refuse_named_twice(sources)
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
@@ -76,15 +82,32 @@ def source_rows(
     def places(own: Sequence[FileRow]) -> Array:
         return _places(own, design, settings)
 
+    hints = tuple(hint for table in tables for hint in table.hints)
     named, matched, asked = with_known_names(
         rows, design, None if settings.coordinates == "part" else places
     )
     if asked:
-        raise ExperimentError([rows[0].mark.message("", text) for text in asked])
+        raise ExperimentError([*(rows[0].mark.message("", text) for text in asked), *hints])
     told = [text for table in tables for text in table.told]
     if len(diameters) == len(rows):
         told += _about_diameters(named, np.array(diameters))
-    return SourceRows(named, (*told, *matched))
+    return SourceRows(named, (*told, *matched), hints)
+
+
+def _refuse_named_twice(sources: Sequence[Source]) -> None:
+    """Refuse a file that is given more than once, by whatever paths.
+
+    :raises ExperimentError: one is.
+    """
+    seen: dict[Path, Path] = {}
+    for source in sources:
+        if not isinstance(source, Path) or not source.is_file():
+            continue
+        place = source.resolve()
+        if place in seen:
+            known = "" if seen[place] == source else f", as {seen[place]} as well"
+            raise refused(source, f"the file is named twice{known}; name it once")
+        seen[place] = source
 
 
 def read_source(
@@ -108,8 +131,11 @@ def read_source(
     stated = (settings.columns, settings.separator, settings.decimal, settings.header)
     wrong: list[Message] = []
     rows: tuple[FileRow, ...] = ()
-    looks_plain = encoding in ("", "UTF-8") and header_names(text) & set(axes)
-    if looks_plain and all(one is None for one in stated):
+    heads = header_names(text)
+    looks_plain = encoding in ("", "UTF-8") and heads & set(axes)
+    # Plain tables have standard uncertainties only.
+    others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
+    if looks_plain and not others and all(one is None for one in stated):
         # One probe need not be named.
         defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
         texts = ["position", "ball", "probe"]
@@ -127,6 +153,9 @@ def read_source(
     try:
         return read_any_table(text, encoding, words, settings, is_possible)
     except ExperimentError:
+        # Who names columns knows what the file is.
+        if settings.columns is None and (other := what_it_is(text)):
+            raise ExperimentError([Message(str(source), 1, 1, "", other)]) from None
         if not wrong:
             raise
     if not rows:

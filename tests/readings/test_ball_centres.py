@@ -87,12 +87,54 @@ def test_ball_centres_that_nobody_states_are_found(readings: pandas.DataFrame) -
     assert "coordinates: ball centres" in message.text and "50 mm" in message.text
 
 
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ("ball centres", "as ball centres, which is stated;"),
+        ("part", "as ball centres, which part co-ordinates are, and part is stated;"),
+    ],
+)
+def test_what_is_stated_is_told_as_it_was_stated(
+    readings: pandas.DataFrame, stated: str, said: str
+) -> None:
+    with pytest.raises(bp.ExperimentError) as refused:
+        bp.fit(DESIGN, readings, coordinates=stated)
+    assert said in str(refused.value)
+
+
 @pytest.mark.parametrize("stated", ["ball centres", "part"])
 def test_scale_readings_that_are_called_ball_centres_are_found(
     readings: pandas.DataFrame, stated: str
 ) -> None:
     with pytest.raises(bp.ExperimentError, match="write coordinates: scale readings"):
         bp.fit(DESIGN, readings, coordinates=stated)
+
+
+def test_part_coordinates_of_one_position_given_as_another(
+    readings: pandas.DataFrame, tmp_path: Path
+) -> None:
+    """A copy under another name is told with both names; as many readings with one digit that
+    differs are not, nor positions that were measured.
+    """
+    (experiment,) = load(Path(DESIGN))
+    settings = experiment.with_readings({"coordinates": "part"}).readings
+    parts = in_parts(centres(readings), 7)
+    path, design = tmp_path / "part.csv", lay_out(experiment)
+
+    def doubts(table: pandas.DataFrame) -> str:
+        table.to_csv(path, index=False)
+        return " ".join(read_readings(path, design, settings=settings).doubts)
+
+    assert "to the last digit" not in doubts(parts)
+    one, other = (parts["position"] == name for name in ("z low", "z high"))
+    copied = parts.copy()
+    copied.loc[other, AXES] = parts.loc[one, AXES].to_numpy()
+    assert list(copied.loc[one, "ball"]) == list(copied.loc[other, "ball"])
+    said = doubts(copied)
+    assert 'positions "z low" and "z high" have the same readings to the last digit' in said
+    assert said.count("to the last digit") == 1
+    copied.loc[copied.index[other][0], "x_mm"] += 1e-4
+    assert "to the last digit" not in doubts(copied)
 
 
 def test_offsets_of_the_controller(readings: pandas.DataFrame, plain: pandas.DataFrame) -> None:

@@ -22,6 +22,12 @@ FORMATS: tuple[Format, ...] = (QIF, DMIS, PCDMIS, CALYPSO)
 BEGINNING = 100_000
 
 
+def recognised(text: str) -> Format | None:
+    """The format that a text is in by its beginning; None where it is in none of them."""
+    beginning = "\n".join(text[:BEGINNING].splitlines())
+    return next((one for one in FORMATS if one.recognises(beginning)), None)
+
+
 def read_report(
     path: Path | GivenText, name: str | None = None, unit: Fraction | None = None
 ) -> Report:
@@ -37,10 +43,9 @@ def read_report(
         if name not in chosen:
             raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
         return chosen[name].read(content, file, unit)
-    beginning = "\n".join(decoded(content, file)[0][:BEGINNING].splitlines())
-    for one in FORMATS:
-        if one.recognises(beginning):
-            return one.read(content, file, unit)
+    found = recognised(decoded(content, file)[0])
+    if found is not None:
+        return found.read(content, file, unit)
     titles = listing(one.title for one in FORMATS)
     names = ", ".join(one.name for one in FORMATS)
     text = f"not recognised as {titles}; state its format with --from ({names})"

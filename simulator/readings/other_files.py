@@ -1,0 +1,58 @@
+"""Files that are given as readings, or as certificate values, and hold something else: what they
+are, and where they belong.
+"""
+
+from __future__ import annotations
+
+import re
+
+from ..inputs.yamltree import GivenText
+from .formats.registered import recognised
+
+POINTS = frozenset(("feature", "nominal_x"))
+CERTIFICATE = frozenset(("item", "first", "second", "value"))
+RUN_SHEET = frozenset(("step", "set_up", "balls", "readings"))
+
+
+def what_it_is(source: GivenText) -> str:
+    """What a file without readings is, and what to do with it; empty where that is not known."""
+    names = headings(source.text)
+    if names >= POINTS:
+        return (
+            "this is a table of the nominal centres of balls, as ballplate sheet --points writes"
+            " it, and has no readings; ballplate sheet --readings writes the table to fill in"
+        )
+    if names >= CERTIFICATE:
+        return "these are values of certificates, not readings; give them with --certificate"
+    if names >= RUN_SHEET:
+        return (
+            "this is a run sheet, and has no readings; ballplate sheet --readings writes the table"
+            " to fill in"
+        )
+    form = recognised(source.text)
+    if form is None:
+        return ""
+    if form.name == "dmis" and not re.search(r"^\s*FA\(", source.text, re.MULTILINE):
+        return (
+            "this is a DMIS program, not what was measured with it; run it on the machine, then"
+            " ballplate import on its output"
+        )
+    return (
+        f"this is a report of a measuring program ({form.title}), and no table of readings; run"
+        " ballplate import first, which makes one of it"
+    )
+
+
+def is_calibration_table(source: GivenText) -> bool:
+    """Whether a table has the certified values of one calibration, which name no item."""
+    names = headings(source.text)
+    of_pairs = names >= {"first", "second", "value"}
+    return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
+
+
+def headings(text: str) -> set[str]:
+    """Names of the columns in the first line that is no comment, without their units."""
+    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
+    line = next(lines, "")
+    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
+    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}

@@ -1,0 +1,102 @@
+"""Headings of tables of readings: other words for positions, columns that are not used, and
+headings that occur twice.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pandas
+import pytest
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.reading_files import ObservedReadings, read_readings
+
+DESIGN = Path("designs/quickstart.yaml")
+AXES = ["x_mm", "y_mm", "z_mm"]
+
+
+@pytest.fixture(scope="module")
+def readings() -> pandas.DataFrame:
+    return bp.simulate(DESIGN)
+
+
+def read(table: pandas.DataFrame, heads: list[str], path: Path) -> ObservedReadings:
+    """Readings of a table written under other headings."""
+    path.write_text(",".join(heads) + "\n" + table.to_csv(index=False, header=False))
+    (experiment,) = load(DESIGN)
+    return read_readings(path, lay_out(experiment), settings=experiment.readings)
+
+
+def refusal(table: pandas.DataFrame, heads: list[str], path: Path) -> str:
+    with pytest.raises(ExperimentError) as refused:
+        read(table, heads, path)
+    return str(refused.value)
+
+
+@pytest.mark.parametrize("head", ["Stellung", "Messlage", "AUFSPANNUNG", "Stellung Nr."])
+def test_other_words_for_positions(readings: pandas.DataFrame, tmp_path: Path, head: str) -> None:
+    heads = [head, "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
+    found = read(readings, heads, tmp_path / "t.csv")
+    names = [found.design.positions.names[k] for k in found.design.readings.position]
+    assert names == list(readings["position"])
+    assert np.allclose(found.x, 1e-3 * readings[AXES].to_numpy(), rtol=0, atol=1e-12)
+
+
+def test_an_unknown_heading_with_names_of_positions_is_named(
+    readings: pandas.DataFrame, tmp_path: Path
+) -> None:
+    heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
+    text = refusal(readings, heads, tmp_path / "t.csv")
+    assert 'the column "Ort" has names of positions' in text and "--columns position=Ort" in text
+
+
+def test_columns_that_are_not_used_are_told_where_the_name_of_the_file_is_no_position(
+    readings: pandas.DataFrame, tmp_path: Path
+) -> None:
+    letters = dict(zip(readings["position"].unique(), "ABCDEFGH", strict=False))
+    table = readings.assign(position=["ort " + letters[name] for name in readings["position"]])
+    heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
+    text = refusal(table, heads, tmp_path / "t.csv")
+    assert 't.csv:1:1: "t", the name of the file, was taken for the position' in text
+    assert 'not used: "Ort"' in text and "--columns position=Ort" in text
+
+
+def test_a_file_named_as_a_position_has_that_position(
+    readings: pandas.DataFrame, tmp_path: Path
+) -> None:
+    """Whatever else a column that is not used says."""
+    (experiment,) = load(DESIGN)
+    paths = []
+    for name, own in readings.groupby("position"):
+        paths.append(tmp_path / f"{name}.csv")
+        heads = "Ort,Kugel,Taster,X [mm],Y [mm],Z [mm]\n"
+        other = own.assign(position="z low")
+        paths[-1].write_text(heads + other.to_csv(index=False, header=False))
+    found = read_readings(paths, lay_out(experiment), settings=experiment.readings)
+    assert len(found.x) == len(readings) and not found.missing
+    assert all('not used: "Ort"' in told for told in found.told)
+
+
+@pytest.mark.parametrize("heads", ["X-Istwert,X-Istwert,Z-Istwert", "X,Y,X", "Z,Y,Z", "X,Z,Z"])
+def test_a_heading_that_occurs_twice_is_named_with_its_line(
+    readings: pandas.DataFrame, tmp_path: Path, heads: str
+) -> None:
+    """The fourth to sixth are of co-ordinates; the doubled one is counted here."""
+    columns = heads.split(",")
+    (doubled,) = {head for head in columns if columns.count(head) == 2}
+    text = refusal(
+        readings,
+        ["# Protokoll\nPosition", "Kugel", "Taster", *columns],
+        tmp_path / "t.csv",
+    )
+    assert f't.csv:2:1: the heading "{doubled}" occurs more than once' in text
+    more = refusal(
+        readings.assign(w=1.0),
+        ["Position", "Kugel", "Taster", "X", "Y", "Z", "X"],
+        tmp_path / "t.csv",
+    )
+    assert 't.csv:1:1: the heading "X" occurs more than once, and could be x' in more

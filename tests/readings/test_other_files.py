@@ -1,0 +1,95 @@
+"""Files that hold no readings are named for what they are, each made by what makes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ballplate.cli import main
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.reading_files import read_readings
+
+DESIGN = "designs/quickstart.yaml"
+SAMPLES = Path("tests/readings/samples")
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    capsys.readouterr()
+    assert main(["fit", DESIGN, *map(str, arguments)]) == 3
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "title"),
+    [
+        ("calypso_chr.txt", "Calypso table"),
+        ("calypso_fet.txt", "Calypso table"),
+        ("dmis_mm.dmo", "DMIS output"),
+        ("dmis_inch.dmo", "DMIS output"),
+        ("pcdmis_mm.txt", "PC-DMIS report"),
+        ("qif_2_1_inch.qif", "QIF results"),
+        ("qif_3_0.qif", "QIF results"),
+    ],
+)
+def test_reports_of_measuring_programs_go_to_import(
+    capsys: pytest.CaptureFixture[str], name: str, title: str
+) -> None:
+    text = refusal(capsys, SAMPLES / name)
+    assert f"report of a measuring program ({title})" in text
+    assert "run ballplate import first" in text and len(text.splitlines()) == 1
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_what_sheet_writes_holds_no_readings(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, separator: str
+) -> None:
+    made = {name: tmp_path / name for name in ("empty.csv", "points.csv", "run.csv", "p.dmi")}
+    sheet = ["sheet", DESIGN, "-o", str(made["run.csv"]), "--readings", str(made["empty.csv"])]
+    assert main([*sheet, "--points", str(made["points.csv"])]) == 0
+    program = ["sheet", DESIGN, "--points", str(made["p.dmi"]), "--ball-diameter", "22 mm"]
+    assert main(program) == 0
+    for name in ("empty.csv", "points.csv"):
+        made[name].write_text(made[name].read_text().replace(",", separator))
+    assert "nothing is filled in: x, y, z are empty" in refusal(capsys, made["empty.csv"])
+    assert "table of the nominal centres of balls" in refusal(capsys, made["points.csv"])
+    assert "this is a run sheet" in refusal(capsys, made["run.csv"])
+    assert "this is a DMIS program, not what was measured" in refusal(capsys, made["p.dmi"])
+
+
+def test_certificate_values_belong_elsewhere(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    readings, values = tmp_path / "readings.csv", tmp_path / "values.csv"
+    assert main(["simulate", DESIGN, "-o", str(readings), "--certificate", str(values)]) == 0
+    assert "give them with --certificate" in refusal(capsys, values)
+    assert main(["fit", DESIGN, str(readings), "--certificate", str(values)]) == 0
+    for heads, row in (
+        ("first,second,value_mm,standard_uncertainty_um", "r1c1,r1c5,600.0001,0.3"),
+        ("ball,x_mm,y_mm,z_mm", "r1c1,0,0,0"),
+    ):
+        sides = tmp_path / "sides.csv"
+        sides.write_text(f"{heads}\n{row}\n")
+        text = refusal(capsys, readings, "--certificate", sides)
+        assert "under calibration: values: sides.csv" in text
+
+
+def test_an_own_table_with_names_of_columns_is_not_taken_for_a_report(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Who says which columns are meant is told what is wrong with these."""
+    text = refusal(capsys, SAMPLES / "calypso_fet.txt", "--columns", "ball=Kugel")
+    assert 'no column "Kugel"' in text and "ballplate import" not in text
+
+
+def test_a_file_that_is_named_twice(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings, link = tmp_path / "readings.csv", tmp_path / "link.csv"
+    assert main(["simulate", DESIGN, "-o", str(readings)]) == 0
+    link.symlink_to(readings)
+    for other in (readings, tmp_path / ".." / tmp_path.name / "readings.csv", link):
+        text = refusal(capsys, readings, other)
+        assert "the file is named twice" in text and len(text.splitlines()) == 1
+        assert ("as well" in text) == (other != readings)
+    with pytest.raises(ExperimentError, match="named twice"):
+        read_readings([readings, readings], lay_out(load(Path(DESIGN))[0]))

@@ -1,0 +1,120 @@
+"""Columns of uncertainties in tables of readings: standard, expanded, or refused with the
+question.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.readings.reading_sources import read_source
+
+DESIGN = Path("designs/quickstart.yaml")
+
+
+@pytest.fixture(scope="module")
+def experiment() -> Experiment:
+    (found,) = load(DESIGN)
+    return found
+
+
+def uncertainties(
+    experiment: Experiment, heads: str, cells: str, separator: str = ",", **said: object
+) -> tuple[list[float], str]:
+    """Uncertainties in metres of a table of two readings, and how it was told to be read."""
+    design = lay_out(experiment)
+    names = {
+        "position": design.positions.names,
+        "ball": design.balls.names,
+        "probe": design.probes.names,
+    }
+    lines = [f"position,ball,probe,x_mm,y_mm,z_mm,{heads}"]
+    lines += [f"z low,r1c{k},down,{100 * k}.1,200.25,250.125,{cells}" for k in (1, 2)]
+    text = "\n".join(lines).replace(",", separator) + "\n"
+    settings = experiment.with_readings(said).readings
+    found = read_source(
+        GivenText("t.csv", text), names, settings, [], lambda x: bool(np.isfinite(x).all()), 3, {}
+    )
+    return [row.lengths[3] for row in found.rows], " ".join(found.told)
+
+
+@pytest.mark.parametrize("head", ["u_um", "u [um]", "standard_uncertainty_um", "u (µm)"])
+def test_standard_uncertainties_are_taken_as_they_stand(experiment: Experiment, head: str) -> None:
+    found, _ = uncertainties(experiment, head, "0.4")
+    assert found == pytest.approx([0.4e-6, 0.4e-6])
+
+
+@pytest.mark.parametrize(
+    ("heads", "cells", "expected"),
+    [
+        ("expanded_uncertainty_um,k", "0.9,2", 0.45e-6),
+        ("k,expanded_uncertainty_um", "3,0.9", 0.3e-6),
+        ("U_um,k", "0.9,2", 0.45e-6),
+        ("U (k=2) [um]", "0.9", 0.45e-6),
+        ("U [um] (k = 2.5)", "1.0", 0.4e-6),
+        ("Unsicherheit (k=2) [nm]", "900", 0.45e-6),
+        ("expanded_uncertainty_k2_um", "0.9", 0.45e-6),
+        ("standard uncertainty (k=1) [um]", "0.4", 0.4e-6),
+    ],
+)
+def test_expanded_uncertainties_are_divided_by_their_coverage_factors(
+    experiment: Experiment, heads: str, cells: str, expected: float
+) -> None:
+    for separator in (",", ";", "\t"):
+        found, told = uncertainties(experiment, heads, cells, separator)
+        assert found == pytest.approx([expected, expected], rel=1e-12)
+        assert ("divided by its coverage factor" in told) == ("standard" not in heads)
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["U_um", "U [um]", "uncertainty_um", "Unsicherheit [um]", "U95_um", "u95_um", "U (95 %) [um]"]
+    + ["u (k=2) [um]", "standard uncertainty (k=2) [um]"],
+)
+def test_what_does_not_say_which_uncertainty_it_is_is_refused(
+    experiment: Experiment, head: str
+) -> None:
+    with pytest.raises(ExperimentError, match="does not say which uncertainty it is") as refused:
+        uncertainties(experiment, head, "0.9")
+    assert "standard_uncertainty_um" in str(refused.value)
+    if "k=" in head:
+        return
+    # Who names the column says that it is the standard uncertainty.
+    found, _ = uncertainties(experiment, head, "0.9", columns={"u": head})
+    assert found == pytest.approx([0.9e-6, 0.9e-6])
+
+
+@pytest.mark.parametrize(
+    ("heads", "cells", "text"),
+    [
+        ("expanded_uncertainty_um", "0.9", "has no coverage factor"),
+        ("expanded_uncertainty_um,k", "0.9,0", 'coverage factor is "0"; it must be above 0'),
+        ("expanded_uncertainty_um,k", "0.9,two", 'coverage factor is "two"'),
+        ("expanded_uncertainty_um,k", "0.9,", 'coverage factor is ""'),
+        ("U (k=2) [um],k", "0.9,3", "stated more than once"),
+        ("u_um,standard_uncertainty_um", "0.9,0.8", "could all be u"),
+    ],
+)
+def test_coverage_factors_that_are_missing_or_wrong(
+    experiment: Experiment, heads: str, cells: str, text: str
+) -> None:
+    with pytest.raises(ExperimentError, match="t.csv:[12]:1: ") as refused:
+        uncertainties(experiment, heads, cells)
+    assert text in str(refused.value)
+
+
+def test_a_standard_uncertainty_goes_before_an_expanded_one(experiment: Experiment) -> None:
+    found, told = uncertainties(experiment, "u_um,U (k=2) [um]", "0.4,0.9")
+    assert found == pytest.approx([0.4e-6, 0.4e-6])
+    assert 'not used: "U (k=2) [um]"' in told
+
+
+def test_an_expanded_uncertainty_named_as_a_standard_one(experiment: Experiment) -> None:
+    with pytest.raises(ExperimentError, match="names standard uncertainties"):
+        uncertainties(experiment, "U (k=2) [um]", "0.9", columns={"u": "U (k=2) [um]"})
