@@ -11,7 +11,7 @@ from ballplate.simulator.splines.pieces import pieces
 from ballplate.simulator.splines.space import SplineSpace
 from ballplate.simulator.splines.spline_fit import SplineFit, fit
 from ballplate.simulator.splines.spline_problems import SplineError
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, make_lsq_spline
 
@@ -249,6 +249,8 @@ def test_polynomials_of_the_pieces_are_the_curve(
     problem: tuple[SplineSpace, np.ndarray, np.ndarray, np.ndarray, tuple[Constraint, ...]],
 ) -> None:
     space, x, y, u, _ = problem
+    # Between two knots of full multiplicity there may be fewer points than coefficients.
+    assume(np.linalg.matrix_rank(space.rows(x)) == space.count)
     fitted = fit(space, x, y, u)
     for powers in ("local", "global"):
         found = pieces(fitted, powers)  # type: ignore[arg-type]
