@@ -343,7 +343,14 @@ def test_declared_drifts_are_covered_in_many_campaigns(drawn: Experiment) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["drift declared", "drift unknown", "drift not declared"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "drift declared",
+        pytest.param("drift unknown", marks=pytest.mark.long),
+        pytest.param("drift not declared", marks=pytest.mark.long),
+    ],
+)
 def test_the_page_states_what_is_wrong_otherwise(
     name: str, drawn: Experiment, tmp_path: Path
 ) -> None:

@@ -219,7 +219,14 @@ def test_declared_sag_is_covered_in_many_campaigns(drawn: Experiment) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["sag declared", "sag of another shape", "sag not declared"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "sag declared",
+        pytest.param("sag of another shape", marks=pytest.mark.long),
+        pytest.param("sag not declared", marks=pytest.mark.long),
+    ],
+)
 def test_the_page_states_what_is_wrong_otherwise(
     name: str, drawn: Experiment, tmp_path: Path
 ) -> None:

@@ -323,7 +323,14 @@ def test_declared_temperatures_are_covered_in_many_campaigns(drawn: Experiment) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["declared", "values alone", "not declared"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "declared",
+        pytest.param("values alone", marks=pytest.mark.long),
+        pytest.param("not declared", marks=pytest.mark.long),
+    ],
+)
 def test_the_page_states_what_is_wrong_otherwise(
     name: str, drawn: Experiment, tmp_path: Path
 ) -> None:
