@@ -8,6 +8,7 @@ import hashlib
 import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -162,9 +163,15 @@ def _entries(value: Any) -> Iterator[tuple[str, Any]]:
             )
 
 
+@cache
+def _later_keys(kinds: tuple[Any, ...]) -> frozenset[str]:
+    """Keys of a class and of those that it is made from that files did not have at first."""
+    return frozenset(name for one in kinds for name in LATER_KEYS.get(one.__name__, ()))
+
+
 def _is_as_before(value: Any, name: str, found: Any) -> bool:
     """Whether this is the default of a key that files did not have at first."""
-    if not any(name in LATER_KEYS.get(one.__name__, ()) for one in type(value).__mro__):
+    if name not in _later_keys(tuple(type(value).__mro__)):
         return False
     if isinstance(value, BaseModel):
         of_settings = type(value).model_fields[name]

@@ -104,6 +104,14 @@ class References:
             return self.probes if len(self.probes) == 1 else None
         return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
+    def is_not_negative(self, uncertainty: float | None, steps: Steps) -> bool:
+        """Whether an uncertainty is zero or above, or none is stated; otherwise a message."""
+        return self.require(
+            uncertainty is None or uncertainty >= 0.0,
+            steps,
+            "is below zero; give it without the sign",
+        )
+
     def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
         """Tell whether names listed at a path are of probes, each once, after saying what is
         wrong.

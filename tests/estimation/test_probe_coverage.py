@@ -4,7 +4,8 @@ declared, and what the documentation says of where they are not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,11 @@ import pytest
 import yaml
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.estimation.functions import linear_functions
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import written_in_python
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.uncertainty.quantities import QUANTITIES
-from scipy.stats import chi2
+
+from tests.influences.campaigns import Shares, assert_covered, shares_of
 
 QUICKSTART: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
 NAMES = tuple(QUICKSTART["probes"])
@@ -44,17 +43,6 @@ def small(**changes: Any) -> Experiment:
     return written_in_python(stated, Path())
 
 
-@dataclass(frozen=True)
-class Shares:
-    """Share of distances within 1.96 uncertainties, root mean square of their errors in
-    uncertainties, and share of fits that would warn of S^2: one in a thousand does by chance.
-    """
-
-    within: dict[str, float]
-    size: dict[str, float]
-    noticed: float
-
-
 def with_tips(experiment: Experiment, tips: np.ndarray) -> Design:
     """The design with certified tips: of the star, or without one offsets held as certified."""
     stars = tuple(replace(one, coordinates=tips) for one in experiment.stars)
@@ -69,9 +57,11 @@ def coverage(told: Experiment, of_star: bool, count: int) -> Shares:
     """Campaigns on a machine without errors; what is certified of tips is wrong and the star turned,
     or tips are re-indexed.
     """
-    generator = np.random.default_rng(20261122)
-    ratios: dict[str, list[np.ndarray]] = {"U5": [], "U6": []}
-    noticed, design = 0, lay_out(told)
+    return shares_of(_campaigns(told, of_star, count))
+
+
+def _campaigns(told: Experiment, of_star: bool, count: int) -> Iterator[tuple[Design, np.ndarray]]:
+    generator, design = np.random.default_rng(20261122), lay_out(told)
     for _ in range(count):
         p, one = TIPS, design
         if of_star:
@@ -89,26 +79,7 @@ def coverage(told: Experiment, of_star: bool, count: int) -> Shares:
         x += one.machine.repeatability * generator.standard_normal(x.shape)
         given = one.of(CalibratedDistances)
         wrong = given.value + given.uncertainty * generator.standard_normal(len(given))
-        one = one.observed(given.given(value=wrong))
-        solution = estimate(one, x)
-        assert solution.status == "converged"
-        at = linearised_fit(one, solution)
-        freedom = one.observation_count - one.parameter_count
-        noticed += int(solution.factor.sum_of_squares > chi2.isf(0.001, freedom))
-        for symbol, errors in ratios.items():
-            (functions,) = QUANTITIES[symbol].functions(one, at.layout)
-            places, true = functions.places.at(one, at.state), functions.places.at(one, state)
-            first, second = np.triu_indices(len(places), 1)
-            error = np.linalg.norm(places[first] - places[second], axis=1) - np.linalg.norm(
-                true[first] - true[second], axis=1
-            )
-            errors.append(error / at.uncertainty(linear_functions(at, functions)))
-    both = {symbol: np.array(one) for symbol, one in ratios.items()}
-    return Shares(
-        {symbol: float((np.abs(one) < 1.96).mean()) for symbol, one in both.items()},
-        {symbol: float(np.sqrt((one**2).mean())) for symbol, one in both.items()},
-        noticed / count,
-    )
+        yield one.observed(given.given(value=wrong)), x
 
 
 STAR = {"stars": [{"standard_uncertainty": "0.2 um"}]}
@@ -120,14 +91,6 @@ TOLD: dict[str, tuple[dict[str, Any], bool]] = {
     "re-indexing, declared": (REINDEXED, False),
     "re-indexing, not declared": ({}, False),
 }
-
-
-def assert_covered(found: Shares, count: int) -> None:
-    # Distances of one campaign are one draw at the worst.
-    for symbol in ("U5", "U6"):
-        assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
-        assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
-    assert found.noticed < 0.001 + 6.0 * np.sqrt(0.001 / count)
 
 
 @pytest.mark.parametrize("name", ["star, declared", "re-indexing, declared"])

@@ -4,7 +4,7 @@ and how far what is fitted from them is covered.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -98,14 +98,18 @@ def coverage(design: Design, told: Design, law: Law, spread: Real, count: int) -
     """Campaigns of a design with parameters drawn with these uncertainties, certificates that are
     wrong as stated, and noise, fitted as the design `told` has them.
     """
+    return shares_of(_campaigns(design, told, law, spread, count))
+
+
+def _campaigns(
+    design: Design, told: Design, law: Law, spread: Real, count: int
+) -> Iterator[tuple[Design, Real]]:
     generator = np.random.default_rng(20261122)
     state, readings = nominal_state(design), design.readings
     p = state.probes[readings.probe]
     arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
     true = arms + state.origins[readings.position]
     given = design.of(CalibratedDistances)
-    ratios: dict[str, list[Real]] = {"U5": [], "U6": []}
-    noticed = 0
     for _ in range(count):
         e = spread * generator.standard_normal(len(spread))
         x = true - p
@@ -113,12 +117,22 @@ def coverage(design: Design, told: Design, law: Law, spread: Real, count: int) -
             x = scale_readings(design.model, true + law(design, x, e), state.a, p)
         x += design.machine.repeatability * generator.standard_normal(x.shape)
         wrong = given.value + given.uncertainty * generator.standard_normal(len(given))
-        one = told.observed(given.given(value=wrong))
+        yield told.observed(given.given(value=wrong)), x
+
+
+def shares_of(campaigns: Iterable[tuple[Design, Real]]) -> Shares:
+    """What fits cover of campaigns: designs, with what they know, and their scale readings. Nominal
+    places are the true ones.
+    """
+    ratios: dict[str, list[Real]] = {"U5": [], "U6": []}
+    noticed = count = 0
+    for one, x in campaigns:
         solution = estimate(one, x)
         assert solution.status == "converged"
         at = linearised_fit(one, solution)
         freedom = one.observation_count - one.parameter_count
         noticed += int(solution.factor.sum_of_squares > chi2.isf(0.001, freedom))
+        count += 1
         for symbol, errors in ratios.items():
             (functions,) = QUANTITIES[symbol].functions(one, at.layout)
             places = functions.places.at(one, at.state)

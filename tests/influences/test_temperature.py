@@ -4,7 +4,8 @@ physical model with all its products, in dense computations and in simulated cam
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,9 @@ from ballplate.montecarlo.experiments import trials
 from ballplate.rank.verdict import verdict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.functions import linear_functions
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -33,8 +33,15 @@ from ballplate.simulator.readings.reading_files import read_readings, write_read
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
+from tests.influences.campaigns import (
+    Shares,
+    assert_covered,
+    file_with,
+    plain,
+    shares_of,
+    told_on_page,
+)
 from tests.reference import dense
 
 Real = NDArray[np.float64]
@@ -65,20 +72,6 @@ STATED = {
         "y low": {"scales": "21.1 degC"},
     },
 }
-
-
-def file_with(folder: Path, influences: list[dict[str, Any]] | None, **changed: Any) -> Experiment:
-    """The first example with influence quantities, a smaller plate and fewer coefficients."""
-    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
-    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    told["true_machine"] = {"kind": "zero"}
-    told["evaluation"]["points"] = {"random": 20, "seed": 3}
-    told["sigma"] = "given"
-    told |= {"influences": influences} if influences else {}
-    path = folder / "file.yaml"
-    path.write_text(yaml.safe_dump(told | changed), encoding="utf-8")
-    return load(path)[0]
 
 
 @pytest.fixture(scope="module")
@@ -135,22 +128,6 @@ class Dense:
     def spread(self) -> dense.Spread:
         count = self.of.parameters + 16
         return dense.spread(dense.jacobian(self.rows, count))
-
-
-def plain(design: Design) -> Design:
-    """The design without its influence quantities and what is known of them."""
-    priors = design.of(Priors)
-    none = replace(
-        priors,
-        **{
-            name: value[:0]
-            for name, value in vars(priors).items()
-            if name != "influence" and value is not None
-        },
-        influence=None,
-    )
-    readings = replace(design.readings, beside=None)
-    return replace(design, influences=(), readings=readings).observed(none)
 
 
 def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -> None:
@@ -235,48 +212,16 @@ def campaign(design: Design, generator: np.random.Generator) -> tuple[Design, St
     return design.observed(given.given(value=wrong)), state, x
 
 
-@dataclass(frozen=True)
-class Shares:
-    """Share of distances within 1.96 uncertainties, root mean square of their errors in
-    uncertainties, and share of fits that would warn of S^2: one in a thousand does by chance.
-    """
-
-    within: dict[str, float]
-    size: dict[str, float]
-    noticed: float
-
-
 def coverage(experiment: Experiment, told: Design, count: int) -> Shares:
     """Campaigns of an experiment, fitted as the design `told` has them."""
-    design = lay_out(experiment)
-    generator = np.random.default_rng(20261122)
-    ratios: dict[str, list[Real]] = {"U5": [], "U6": []}
-    noticed = 0
-    for _ in range(count):
-        certified, _, x = campaign(design, generator)
-        one = told.observed(certified.of(CalibratedDistances))
-        solution = estimate(one, x)
-        assert solution.status == "converged"
-        at = linearised_fit(one, solution)
-        noticed += int(
-            solution.factor.sum_of_squares
-            > chi2.isf(0.001, one.observation_count - one.parameter_count)
-        )
-        for symbol, errors in ratios.items():
-            (functions,) = QUANTITIES[symbol].functions(one, at.layout)
-            places = functions.places.at(one, at.state)
-            true = functions.places.at(one, nominal_state(one))
-            first, second = np.triu_indices(len(places), 1)
-            error = np.linalg.norm(places[first] - places[second], axis=1) - np.linalg.norm(
-                true[first] - true[second], axis=1
-            )
-            errors.append(error / at.uncertainty(linear_functions(at, functions)))
-    both = {symbol: np.array(one) for symbol, one in ratios.items()}
-    return Shares(
-        {symbol: float((np.abs(one) < 1.96).mean()) for symbol, one in both.items()},
-        {symbol: float(np.sqrt((one**2).mean())) for symbol, one in both.items()},
-        noticed / count,
-    )
+    design, generator = lay_out(experiment), np.random.default_rng(20261122)
+
+    def campaigns() -> Iterator[tuple[Design, Real]]:
+        for _ in range(count):
+            certified, _, x = campaign(design, generator)
+            yield told.observed(certified.of(CalibratedDistances)), x
+
+    return shares_of(campaigns())
 
 
 def as_told(change: dict[str, Any], folder: Path) -> Experiment:
@@ -305,14 +250,6 @@ def shares(name: str, experiment: Experiment, folder: Path, count: int) -> Share
     return coverage(experiment, told, count)
 
 
-def assert_covered(found: Shares, count: int) -> None:
-    # Distances of one campaign have a scale in common: they are one draw at the worst.
-    for symbol in ("U5", "U6"):
-        assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
-        assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
-    assert found.noticed < 0.001 + 6.0 * np.sqrt(0.001 / count)
-
-
 def test_declared_temperatures_are_covered(drawn: Experiment) -> None:
     assert_covered(coverage(drawn, lay_out(drawn), 100), 100)
 
@@ -334,13 +271,8 @@ def test_declared_temperatures_are_covered_in_many_campaigns(drawn: Experiment) 
 def test_the_page_states_what_is_wrong_otherwise(
     name: str, drawn: Experiment, tmp_path: Path
 ) -> None:
-    page = (TOP / "docs" / "how-to" / "influence-quantities.md").read_text(encoding="utf-8")
-    (line,) = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
-    told = [float(cell.split()[0]) for cell in line.split("|")[2:-1]]
     found = shares(name, drawn, tmp_path, 400)
-    within, size = found.within, found.size
-    expected = [100 * within["U5"], 100 * within["U6"], size["U5"], size["U6"]]
-    assert told == pytest.approx([*expected, 100 * found.noticed], rel=0.01, abs=0.5)
+    assert told_on_page(name) == pytest.approx(found.row, rel=0.01, abs=0.5)
 
 
 def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:

@@ -111,11 +111,7 @@ class DriftSettings(InfluenceSettings):
                 )
             for one in stated if isinstance(stated, tuple) else [stated]:
                 u = getattr(one, "standard_uncertainty", None)
-                references.require(
-                    u is None or u >= 0.0,
-                    (*steps, key, "standard_uncertainty"),
-                    "is below zero; give it without the sign",
-                )
+                references.is_not_negative(u, (*steps, key, "standard_uncertainty"))
 
     def influence(self, design: DesignParts) -> Drift:
         """The drift in a design."""

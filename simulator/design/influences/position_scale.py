@@ -51,12 +51,7 @@ class PositionScaleSettings(InfluenceSettings):
                 (*steps, "positions", i),
                 f'unknown position "{name}"; {hint(name, positions)}',
             )
-        u = self.standard_uncertainty
-        references.require(
-            u is None or u >= 0.0,
-            (*steps, "standard_uncertainty"),
-            "is below zero; give it without the sign",
-        )
+        references.is_not_negative(self.standard_uncertainty, (*steps, "standard_uncertainty"))
 
     def influence(self, design: DesignParts) -> PositionScale:
         """The scales in a design."""

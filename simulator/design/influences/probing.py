@@ -69,10 +69,7 @@ class ProbingSettings(InfluenceSettings):
                     any(direction), place, "has no direction; give one that is not zero"
                 )
         for key in ("standard_uncertainty", "between_probes"):
-            u = getattr(self, key)
-            references.require(
-                u is None or u >= 0.0, (*steps, key), "is below zero; give it without the sign"
-            )
+            references.is_not_negative(getattr(self, key), (*steps, key))
 
     def influence(self, design: DesignParts) -> Probing:
         """The probing errors in a design.

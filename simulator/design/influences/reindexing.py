@@ -8,20 +8,18 @@ probes once, so that there is one shift for each position and probe: x + e(x, a,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from ...geometry.ball_layouts import Name
-from ...geometry.motions import AXIS_NAMES
 from ...inputs.messages import Steps
 from ...inputs.quantities import Length
 from ...inputs.settings import NonEmpty
-from ...machines.protocol import Array, Integers
 from ..lookup import References
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+from .displacements import SharedDisplacements, displacements
+from .protocol import DesignParts, InfluenceSettings
 
 
 class ReindexingSettings(InfluenceSettings):
@@ -43,58 +41,19 @@ class ReindexingSettings(InfluenceSettings):
         """Report unknown probes and an uncertainty below zero."""
         if self.probes is not None:
             references.are_probes(self.probes, (*steps, "probes"))
-        u = self.standard_uncertainty
-        references.require(
-            u is None or u >= 0.0,
-            (*steps, "standard_uncertainty"),
-            "is below zero; give it without the sign",
-        )
+        references.is_not_negative(self.standard_uncertainty, (*steps, "standard_uncertainty"))
 
-    def influence(self, design: DesignParts) -> Reindexing:
+    def influence(self, design: DesignParts) -> SharedDisplacements:
         """The shifts in a design: of every probe in every position that it reads in."""
-        names, d = design.probes.names, design.machine.dimension
-        count = len(names)
+        names = design.probes.names
         chosen = [k for k, name in enumerate(names) if name in (self.probes or names)]
-        turned = np.isin(design.readings.probe, chosen)
-        key = design.readings.position[turned] * count + design.readings.probe[turned]
-        used = np.unique(key)
-        place = np.full(len(design.positions.names) * count, -1)
-        place[used] = np.arange(len(used))
-        u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
-        parameters = tuple(
-            InfluenceParameter(
-                f"re-indexing of {names[k % count]} in {design.positions.names[k // count]}:"
-                f" {letter}",
-                "m",
-                0.0,
-                u,
-                1.0,
-                k // count,
-                "re-indexing",
-            )
-            for k in used.tolist()
-            for letter in AXIS_NAMES[:d]
+        turned = design.readings.select(np.isin(design.readings.probe, chosen))
+        return displacements(
+            design,
+            ("position", "probe"),
+            turned,
+            np.inf if self.standard_uncertainty is None else self.standard_uncertainty,
+            lambda at: f"re-indexing of {at['probe']} in {at['position']}",
+            "re-indexing",
+            of_tips=True,
         )
-        return Reindexing(place.reshape(-1, count), parameters)
-
-
-@dataclass(frozen=True)
-class Reindexing(Influence):
-    """Shifts of tips; `place` (positions, probes) is the number of each, -1 without one."""
-
-    place: Integers
-    listed: tuple[InfluenceParameter, ...]
-
-    @property
-    def parameters(self) -> tuple[InfluenceParameter, ...]:
-        return self.listed
-
-    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        """A tip that is further along an axis is where the ball is with less on the scale."""
-        m, d = at.x.shape
-        derivative = np.zeros((m, d, len(self.parameters)))
-        place = self.place[at.position, at.probe]
-        rows = np.flatnonzero(place >= 0)
-        for axis in range(d):
-            derivative[rows, axis, d * place[rows] + axis] = -1.0
-        return np.zeros((m, d)), derivative

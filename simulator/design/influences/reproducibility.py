@@ -9,21 +9,16 @@ stated, drawn anew along each axis: a ball at R y + o is found at R y + o + v.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 from pydantic import Field
 
-from ...geometry.motions import AXIS_NAMES
 from ...inputs.messages import Steps
 from ...inputs.quantities import Length
 from ...inputs.settings import NonEmpty
-from ...machines.protocol import Array, Integers
 from ..lookup import References
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
-
-Level = Literal["position", "probe", "ball"]
+from .displacements import Level, SharedDisplacements, displacements
+from .protocol import DesignParts, InfluenceSettings
 
 
 class ReproducibilitySettings(InfluenceSettings):
@@ -54,65 +49,20 @@ class ReproducibilitySettings(InfluenceSettings):
             (*steps, "each"),
             "a displacement of a whole position is part of its pose; add probe or ball",
         )
-        references.require(
-            self.standard_uncertainty >= 0.0,
-            (*steps, "standard_uncertainty"),
-            "is below zero; give it without the sign",
+        references.is_not_negative(self.standard_uncertainty, (*steps, "standard_uncertainty"))
+
+    def influence(self, design: DesignParts) -> SharedDisplacements:
+        """The displacements in a design: of every combination that is read."""
+        return displacements(
+            design,
+            tuple(self.each),
+            design.readings,
+            self.standard_uncertainty,
+            _words,
+            f"displacements by {' and '.join(self.each)}",
         )
 
-    def influence(self, design: DesignParts) -> Reproducibility:
-        """The displacements in a design: of every combination that is read."""
-        d, levels = design.machine.dimension, tuple(self.each)
-        names = {
-            "position": design.positions.names,
-            "probe": design.probes.names,
-            "ball": design.balls.names,
-        }
-        sizes = tuple(len(names[level]) for level in levels)
-        index = tuple(getattr(design.readings, level) for level in levels)
-        used = np.unique(np.ravel_multi_index(index, sizes))
-        place = np.full(int(np.prod(sizes)), -1)
-        place[used] = np.arange(len(used))
-        parameters = []
-        for key in used.tolist():
-            at = dict(zip(levels, np.unravel_index(key, sizes), strict=True))
-            words = ", ".join(
-                f"{'ball ' if level == 'ball' else ''}{names[level][k]}" for level, k in at.items()
-            )
-            parameters += [
-                InfluenceParameter(
-                    f"displacement of {words}: {axis}",
-                    "m",
-                    0.0,
-                    self.standard_uncertainty,
-                    1.0,
-                    int(at.get("position", -1)),
-                    f"displacements by {' and '.join(levels)}",
-                )
-                for axis in AXIS_NAMES[:d]
-            ]
-        return Reproducibility(levels, place.reshape(sizes), tuple(parameters))
 
-
-@dataclass(frozen=True)
-class Reproducibility(Influence):
-    """Displacements; `place` has the number of each by the indices of its `levels`, -1 without
-    one.
-    """
-
-    levels: tuple[Level, ...]
-    place: Integers
-    listed: tuple[InfluenceParameter, ...]
-
-    @property
-    def parameters(self) -> tuple[InfluenceParameter, ...]:
-        return self.listed
-
-    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        m, d = at.x.shape
-        derivative = np.zeros((m, d, len(self.listed)))
-        place = self.place[tuple(getattr(at, level) for level in self.levels)]
-        rows = np.flatnonzero(place >= 0)
-        for axis in range(d):
-            derivative[rows, axis, d * place[rows] + axis] = 1.0
-        return np.zeros((m, d)), derivative
+def _words(at: Mapping[Level, str]) -> str:
+    named = (f"ball {name}" if level == "ball" else name for level, name in at.items())
+    return f"displacement of {', '.join(named)}"

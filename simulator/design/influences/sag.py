@@ -72,12 +72,8 @@ class SagSettings(InfluenceSettings):
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
         """Report unknown names, two shapes at once, wrong files, and what does not bend."""
         name = references.artefact(self.artefact, steps)
-        u, d = self.standard_uncertainty, references.dimension
-        references.require(
-            u is None or u >= 0.0,
-            (*steps, "standard_uncertainty"),
-            "is below zero; give it without the sign",
-        )
+        d = references.dimension
+        references.is_not_negative(self.standard_uncertainty, (*steps, "standard_uncertainty"))
         references.require(
             self.shape is None or self.values is None,
             (*steps, "shape"),

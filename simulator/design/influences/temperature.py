@@ -374,10 +374,7 @@ def _part(
 def _check_uncertainties(stated: object, steps: Steps, references: References) -> None:
     for one in stated if isinstance(stated, tuple) else [stated]:
         for key in ("standard_uncertainty", "sensor_uncertainty"):
-            u = getattr(one, key, None)
-            references.require(
-                u is None or u >= 0.0, (*steps, key), "is below zero; give it without the sign"
-            )
+            references.is_not_negative(getattr(one, key, None), (*steps, key))
 
 
 def _one_by_one(stated: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Steps, object]]:

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ...inputs.digital_certificates import (
-    DigitalResult,
-    DigitalValue,
-    matrix_of,
-    read_digital_certificate,
-)
 from ...inputs.messages import ExperimentError, Steps
 from ...inputs.settings import listing, shorten
 from ..lookup import References
 from .stated_values import CertificateEntry, FileValues, value_name
+
+if TYPE_CHECKING:
+    from ...inputs.digital_certificates import DigitalResult, DigitalValue
 
 REFERENCE_TEMPERATURE = 20.0
 # Words about a value that are part of no name.
@@ -45,6 +42,9 @@ def read_digital(
 
     The result is the one that is named, or else the only one that has them all.
     """
+    # Loaded with a parser of XML, which few experiments need.
+    from ...inputs.digital_certificates import matrix_of, read_digital_certificate
+
     problems, path = references.problems, references.folder / settings.values
     place = (*steps, "values")
     try:

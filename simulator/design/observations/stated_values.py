@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from ...inputs.covariances import read_matrix
 from ...inputs.messages import ExperimentError, Message, Steps
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
@@ -196,6 +195,8 @@ def _of_file(
     """Covariance and rounding (m, m) of values from a CSV file, and a third entry where they are
     those of correlations; None after saying what is wrong.
     """
+    from ...inputs.covariances import read_matrix
+
     problems, place = references.problems, (*steps, "covariance")
     try:
         matrix = read_matrix(references.folder / settings.covariance)
