@@ -61,7 +61,7 @@ def test_a_few_campaigns_cover_what_they_state(tmp_path: Path) -> None:
             },
         }
     )
-    shares = shares_covered(experiment, 24, tmp_path, with_repeatability=False)
+    shares = shares_covered(experiment, 16, tmp_path, with_repeatability=False)
     error = shares.std(ddof=1) / np.sqrt(len(shares))
     # Four standard errors of the mean over campaigns, which the lengths of one have in common.
     assert abs(shares.mean() - EXPECTED) < 4.0 * max(error, 0.01)
