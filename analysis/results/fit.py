@@ -55,6 +55,7 @@ from .residuals import Residual, reading_residuals
 from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
     import pandas
     from matplotlib.figure import Figure
 
@@ -87,7 +88,7 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated.
+    estimates had been stated. `experiment` is what was fitted.
     """
 
     label: str
@@ -108,6 +109,7 @@ class Fit(FitResult):
     estimated: EstimatedFunctions | None = None
     variance_components: VarianceComponents | None = None
     is_reweighted: bool = False
+    experiment: Experiment | None = None
 
     @property
     def design(self) -> Design:
