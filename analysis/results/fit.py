@@ -55,8 +55,8 @@ from .residuals import Residual, reading_residuals
 from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment
     import pandas
+    from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
     from .variance_components.components import VarianceComponents

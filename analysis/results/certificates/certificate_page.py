@@ -147,9 +147,8 @@ def _drawing(certificate: CertifiedBalls) -> str:
     u = certificate.coverage_factor * certificate.standard_uncertainties[:, :2]
     lower, size = drawn.min(axis=0), np.ptp(drawn, axis=0)
     scale = (SIZE - 2 * MARGIN) / (float(size.max()) or 1.0)
-    largest = max(float(np.linalg.norm(apart, axis=1).max()), float(u.max()))
-    times = LONGEST * _pitch(drawn) / largest if largest > 0.0 else 1.0
-    times = float(f"{times:.1g}")
+    largest = float((np.linalg.norm(apart, axis=1) + u.max(axis=1)).max())
+    times = _rounded_down(LONGEST * _pitch(drawn) / largest) if largest > 0.0 else 1.0
     height = scale * float(size[1]) + 2 * MARGIN
     places = np.column_stack(
         [
@@ -191,6 +190,16 @@ def _aligned(places: Array, drawn: Array) -> Array:
     """Deviations (n, 2) from the drawing, less what a shift and a turn explain."""
     rotation, shift = fit_motion(places, drawn)
     return np.asarray(places @ rotation.T + shift - drawn)
+
+
+def _rounded_down(value: float) -> float:
+    """The largest number of one digit that is not above a value.
+
+    >>> _rounded_down(199.0), _rounded_down(0.37)
+    (100.0, 0.3)
+    """
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(f"{np.floor(value / power) * power:.1g}")
 
 
 def _pitch(points: Array) -> float:

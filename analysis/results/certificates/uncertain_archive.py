@@ -55,7 +55,7 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
         name: (
             {"CLASS": "ElementaryReal", "x": values[k], "uid": identifiers[k]}
             if k in identifiers
-            else _constant(values[k])
+            else _constant(values[k], names[k], f"({origin}, {len(names) + k})")
         )
         for k, name in enumerate(names)
     }
@@ -66,18 +66,21 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
         "tagged_real": tagged,
         "tagged_complex": {},
         "untagged_real": {},
-        "intermediate_uids": {},
+        "intermediate_uids": {
+            one["uid"]: [one["label"], 0.0, None] for one in tagged.values() if "label" in one
+        },
     }
     return json.dumps(archive, indent=1) + "\n"
 
 
-def _constant(value: float) -> dict[str, Any]:
+def _constant(value: float, name: str, identifier: str) -> dict[str, Any]:
+    """A number that depends on nothing uncertain."""
     empty = {"CLASS": "Vector", "index": [], "value": []}
     return {
         "CLASS": "IntermediateReal",
         "value": value,
-        "label": None,
-        "uid": "None",
+        "label": name,
+        "uid": identifier,
         "u_components": empty,
         "d_components": empty,
         "i_components": empty,
