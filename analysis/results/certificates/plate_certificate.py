@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+from ballplate.simulator.computing.rounding import blank
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.influences.temperature import TemperaturesSettings
-from ballplate.simulator.estimation.covariance import MICROMETRE, blank
+from ballplate.simulator.estimation.covariance import MICROMETRE
 from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
@@ -25,7 +27,7 @@ from ...presentation.files import write_file
 from ...uncertainty.pairs import pairs_of
 from ...uncertainty.scale import OWN_SCALES, scale_of
 from ...uncertainty.tasks import expansion
-from ..fit import Fit
+from ..estimates import EstimatedFunctions
 from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_page import certificate_page
 from .certified_balls import ABOUT, CertifiedBalls, CertifiedDistance
@@ -88,9 +90,34 @@ class PlateCertificate(CertifiedBalls):
             write_file(name, text.encode())
 
 
+class CertifiedFit(Protocol):
+    """What a certificate is made of: a fit of an experiment, see `Fit`."""
+
+    @property
+    def label(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def experiment(self) -> Experiment | None: ...
+    @property
+    def functions(self) -> EstimatedFunctions: ...
+    @property
+    def sigma(self) -> float: ...
+    @property
+    def sigma_is_estimated(self) -> bool: ...
+    @property
+    def degrees_of_freedom(self) -> int: ...
+    @property
+    def without_scatter(self) -> bool: ...
+    @property
+    def warnings(self) -> tuple[str, ...]: ...
+    @property
+    def complaint(self) -> str: ...
+
+
 @single_threaded
 def plate_certificate(
-    fit: Fit,
+    fit: CertifiedFit,
     plate: str | None = None,
     datum: Sequence[str] = (),
     coverage_factor: float | None = None,
@@ -106,8 +133,7 @@ def plate_certificate(
     :raises ValueError: the fit has not converged, balls that define no axes, or an unknown key.
     """
     experiment, at = fit.experiment, fit.functions.at
-    if experiment is None:
-        raise ValueError("the fit does not know its experiment; make it with ballplate.fit")
+    assert experiment is not None
     if fit.without_scatter:
         raise ValueError(
             "the readings agree exactly with the model, so that nothing tells their uncertainty;"
@@ -279,7 +305,7 @@ def _first_farthest(squares: Array) -> int:
     return int(np.flatnonzero(squares >= squares.max() * (1.0 - 1e-9))[0])
 
 
-def _remarks(fit: Fit, experiment: Experiment, plate: str) -> tuple[str, ...]:
+def _remarks(fit: CertifiedFit, experiment: Experiment, plate: str) -> tuple[str, ...]:
     """What a reader has to know of the fit and of the plate."""
     found = [*fit.warnings, *filter(None, [fit.complaint])]
     flatness = experiment.artefacts[plate].flatness
