@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -56,7 +55,8 @@ class CertifiedBalls(Result):
     `left_out` are balls whose co-ordinates in these axes nothing determined. `scale` tells what the
     lengths rest on, `scale_uncertainty` is that of all lengths in common, as a ratio.
     `reference_temperature` in °C is None where it is unknown. `degrees_of_freedom` are those of
-    the scatter that the uncertainties come from, infinite where they are as stated.
+    the scatter that the uncertainties come from, infinite where they are as stated. `fingerprint`
+    is the SHA-256 of what it all comes from: the readings, the experiment and what was chosen.
     """
 
     label: str
@@ -77,6 +77,7 @@ class CertifiedBalls(Result):
     degrees_of_freedom: float
     remarks: tuple[str, ...]
     about: Mapping[str, str]
+    fingerprint: str
 
     @property
     def dimension(self) -> int:
@@ -97,15 +98,8 @@ class CertifiedBalls(Result):
         return float(2.0 * (ndtr(k) if np.isinf(freedom) else stdtr(freedom, k)) - 1.0)
 
     @property
-    def fingerprint(self) -> str:
-        """SHA-256 of names, co-ordinates and covariance: the same for the same results."""
-        text = f"{self.artefact} {self.names}".encode()
-        arrays = self.coordinates.astype("<f8").tobytes() + self.covariance.astype("<f8").tobytes()
-        return hashlib.sha256(text + arrays).hexdigest()
-
-    @property
     def identifier(self) -> str:
-        """What the certificate is called: as stated, or by its content."""
+        """What the certificate is called: as stated, or by what it comes from."""
         return self.about["identifier"] or f"ballplate-{self.fingerprint[:16]}"
 
     @property

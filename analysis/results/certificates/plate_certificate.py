@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -21,13 +23,14 @@ from ballplate.simulator.geometry.datum import Datum, chosen_datum, in_datum, re
 from ballplate.simulator.inputs.covariances import MOST_NAMES
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.yamltree import to_python
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...presentation.files import write_file
 from ...uncertainty.pairs import pairs_of
 from ...uncertainty.scale import OWN_SCALES, scale_of
 from ...uncertainty.tasks import expansion
-from ..estimates import EstimatedFunctions
+from ..map_of_fit import MappedFit, data_of
 from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_page import certificate_page
 from .certified_balls import ABOUT, CertifiedBalls, CertifiedDistance
@@ -90,23 +93,11 @@ class PlateCertificate(CertifiedBalls):
             write_file(name, text.encode())
 
 
-class CertifiedFit(Protocol):
+class CertifiedFit(MappedFit, Protocol):
     """What a certificate is made of: a fit of an experiment, see `Fit`."""
 
     @property
-    def label(self) -> str: ...
-    @property
     def title(self) -> str: ...
-    @property
-    def experiment(self) -> Experiment | None: ...
-    @property
-    def functions(self) -> EstimatedFunctions: ...
-    @property
-    def sigma(self) -> float: ...
-    @property
-    def sigma_is_estimated(self) -> bool: ...
-    @property
-    def degrees_of_freedom(self) -> int: ...
     @property
     def without_scatter(self) -> bool: ...
     @property
@@ -181,7 +172,20 @@ def plate_certificate(
         freedom,
         _remarks(fit, experiment, name),
         ABOUT | dict(about or {}),
+        _fingerprint(fit, experiment, name, chosen.words(layout.names)),
     )
+
+
+def _fingerprint(fit: CertifiedFit, experiment: Experiment, plate: str, datum: str) -> str:
+    """SHA-256 of what a certificate comes from."""
+    said = [
+        data_of(fit.observed).sha256,
+        to_python(experiment.tree),
+        plate,
+        datum,
+        fit.sigma == 1.0,
+    ]
+    return hashlib.sha256(json.dumps(said, default=str, sort_keys=True).encode()).hexdigest()
 
 
 def _plate_name(experiment: Experiment, plate: str | None) -> str:

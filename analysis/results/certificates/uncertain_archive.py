@@ -6,6 +6,7 @@ number with its correlations; one without uncertainty is a constant.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from typing import Any
 
@@ -28,7 +29,8 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
     safe = np.where(u > 0.0, u, 1.0)
     correlation = np.clip(certificate.covariance / np.outer(safe, safe), -1.0, 1.0)
     # Numbers of one certificate are the same in all its archives, and no others'.
-    origin = int(certificate.fingerprint[:32], 16)
+    content = certificate.coordinates.tobytes() + certificate.covariance.tobytes()
+    origin = int(hashlib.sha256(certificate.fingerprint.encode() + content).hexdigest()[:32], 16)
     identifiers = {k: f"({origin}, {i})" for i, k in enumerate(uncertain.tolist(), 1)}
     freedom = certificate.degrees_of_freedom
     ensemble: dict[str, Any] = {}
