@@ -66,7 +66,7 @@ class MachineChange:
         """What was done.
 
         >>> MachineChange(0, -2e-5).words
-        'X made to read 20 µm per m less'
+        'X made to read 20.00 µm per m less'
         >>> MachineChange(1, 1e-5, 0).words
         'Y guideway turned by 2.063 arcsec towards +X'
         """
@@ -317,7 +317,8 @@ class AdjustedMachine(Result):
 
     def headline(self) -> str:
         if self.found is None:
-            return f"{len(self.changes)} changes, predicted"
+            count = len(self.changes)
+            return f"{count} change{'s' * (count != 1)}, predicted"
         if not self.compared:
             return "nothing is determined by both campaigns"
         return (

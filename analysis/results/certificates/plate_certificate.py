@@ -25,6 +25,7 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import to_python
 from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.readings.certificate_files import certified_values
 
 from ...presentation.files import write_file
 from ...uncertainty.pairs import pairs_of
@@ -148,6 +149,7 @@ def plate_certificate(
         raise refused(experiment.source, text, "artefacts", name)
     coordinates, root = coordinates[known], fit.sigma * root[known]
     temperature, told = _temperature(experiment, name)
+    carriers = _carriers(experiment, at, name)
     flat = root.reshape(len(known) * d, -1)
     centred = coordinates - coordinates.mean(axis=0)
     by_scale = np.einsum("nd,ndr->r", centred, root) / (centred**2).sum()
@@ -164,13 +166,13 @@ def plate_certificate(
         flat @ flat.T,
         _distances(at, index[known], names, fit.sigma),
         tuple(layout.names[k] for k in np.flatnonzero(is_open.any(axis=1))),
-        _carriers(experiment, at, name),
+        carriers,
         float(np.linalg.norm(by_scale)),
         temperature,
         told,
         coverage_factor or expansion(experiment.coverage_factor),
         freedom,
-        _remarks(fit, experiment, name),
+        _remarks(fit, experiment, name, carriers),
         ABOUT | dict(about or {}),
         _fingerprint(fit, experiment, name, chosen.words(layout.names)),
     )
@@ -249,7 +251,8 @@ def _carriers(experiment: Experiment, at: Linearisation, plate: str) -> tuple[st
     """
     found = scale_of(experiment, at)
     words = [one.words for one in found.carriers] if found is not None else []
-    if words == [OWN_SCALES]:
+    of_machine = words == [OWN_SCALES]
+    if of_machine and not certified_values(experiment):
         text = (
             "nothing is calibrated: the plate's lengths would be those of the machine's own scales,"
             " which nothing vouches for; add a calibration, or priors of the scales"
@@ -309,9 +312,17 @@ def _first_farthest(squares: Array) -> int:
     return int(np.flatnonzero(squares >= squares.max() * (1.0 - 1e-9))[0])
 
 
-def _remarks(fit: CertifiedFit, experiment: Experiment, plate: str) -> tuple[str, ...]:
+def _remarks(
+    fit: CertifiedFit, experiment: Experiment, plate: str, carriers: tuple[str, ...]
+) -> tuple[str, ...]:
     """What a reader has to know of the fit and of the plate."""
     found = [*fit.warnings, *filter(None, [fit.complaint])]
+    if carriers == (OWN_SCALES,):
+        found.append(
+            "the error model takes the mean of the machine's scales for right: what they are wrong"
+            " by has no part in the uncertainties; a model with a scale of its own for each axis"
+            " would have the lengths from what is calibrated"
+        )
     flatness = experiment.artefacts[plate].flatness
     if flatness is not None:
         found.append(
