@@ -27,7 +27,7 @@ from tests.observations.test_joint_values import BALLS, constrained, distances, 
 from tests.reference import dense
 
 Real = NDArray[np.float64]
-NO_ERRORS = {"kind": "random", "position": "0.001 nm", "rotation": "0.001 nrad", "seed": 1}
+NO_ERRORS = {"kind": "zero"}
 ABOUT = {"date": "2026-11-02/2026-11-03", "country": "DE", "serial number": "17"}
 
 

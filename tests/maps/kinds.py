@@ -50,7 +50,10 @@ IN_PLANE: dict[str, Any] = {
     "calibration": [{"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"}],
 }
 SMALL = {"position_coefficients": 3, "rotation_coefficients": 2}
-FREE = {"down": PROBES["down"], "right": {"offset": PROBES["right"], "standard_uncertainty": "50 um"}}
+FREE = {
+    "down": PROBES["down"],
+    "right": {"offset": PROBES["right"], "standard_uncertainty": "50 um"},
+}
 MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "metric": (IN_PLANE, {"kind": "metric", "scale": "split"}),
     "spatial metric": (IN_SPACE, {"kind": "metric"}),
