@@ -81,12 +81,13 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
     columns = np.concatenate([np.arange(len(layout))[layout.model], offsets])
     root = fit.sigma * at.shared[columns]
     scale = layout.scale[columns]
-    settings = absolute(to_python(experiment.tree.items["error_model"]), experiment.source.parent)  # type: ignore[union-attr]
+    stated = written(experiment.tree, "error_model")
+    settings = {} if stated is None else to_python(stated)
     factor = written(experiment.tree, "coverage_factor")
     return FittedMap(
         title=experiment.title,
         model=design.model,
-        settings=settings,
+        settings=absolute(settings, experiment.source.parent),
         volume=design.machine.volume,
         values=state.a,
         probes=Probes(design.probes.names, state.probes, design.probes.free),

@@ -47,13 +47,13 @@ class FittedMap:
 
     `settings` are those of the error `model` as a file states them, with absolute paths. `values`
     (n,) are a, and `probes` have their offsets, estimated where they are `free`, and stated before
-    as `drawn_offsets` (l, d); `probe` is the one that is meant where none is named. `covariance` (m, m) of b includes `sigma`, and leaves
-    out the `undetermined` directions (m, k), orthonormal where each parameter is measured by its
-    effect: what they change is unknown. Parameters are in metres, radians and ratios;
-    `repeatability` (d,) is the stated one of a reading, in metres. `coverage_factor` is what
-    expanded uncertainties have. `frame` says which motion of the whole the model holds,
-    `temperatures` are in degrees Celsius, and `left_out` are estimates of the fit that the map does
-    not apply. `date` is that of the campaign, as 2026-11-22, where it is known.
+    as `drawn_offsets` (l, d); `probe` is the one that is meant where none is named. `covariance`
+    (m, m) of b includes `sigma`, and leaves out the `undetermined` directions (m, k), orthonormal
+    where each parameter is measured by its effect: what they change is unknown. Parameters are in
+    metres, radians and ratios; `repeatability` (d,) is the stated one of a reading, in metres.
+    `coverage_factor` is what expanded uncertainties have. `frame` says which motion of the whole
+    the model holds, `temperatures` are in degrees Celsius, and `left_out` are estimates of the fit
+    that the map does not apply. `date` is that of the campaign, as 2026-11-22, where it is known.
     """
 
     title: str
