@@ -137,14 +137,14 @@ def run(options: Namespace) -> int:
         texts = {} if options.output is None else found.texts(options.output)
     except ValueError as error:
         raise UsageError(error) from None
-    if options.json or not texts:
-        show(options, found)
     writers: dict[Path, Writer] = {
         path: text_writer(partial(_print, text)) for path, text in texts.items()
     }
     if write(options, writers):
         for path in texts:
             note(options, f"{path} written")
+    if options.json or not texts:
+        show(options, found)
     return 1 if result.complaint else 0
 
 

@@ -425,10 +425,10 @@ def adjusted_machine(
 
     :raises ValueError: the error model cannot follow a change; the second map is of another volume.
     """
-    corners = [np.array(one.volume.corners) for one in (fitted, second or fitted)]
-    if corners[0].shape != corners[1].shape or not np.allclose(*corners):
+    corners, other = (np.array(one.volume.corners) for one in (fitted, second or fitted))
+    if corners.shape != other.shape or not np.allclose(corners, other):
         raise ValueError("the second campaign is about another volume; compare maps of the same")
-    lower, upper = corners[0]
+    lower, upper = corners
     lines = machine_lines(lower, upper)
     after = adjusted_map(fitted, changes, share)
     k = fitted.coverage_factor

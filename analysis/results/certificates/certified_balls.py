@@ -36,7 +36,7 @@ ABOUT = {
 
 
 @dataclass(frozen=True)
-class CertifiedDistance:
+class PlateDistance:
     """A distance between two balls and its standard uncertainty in metres, NaN where it is
     undetermined.
     """
@@ -67,7 +67,7 @@ class CertifiedBalls(Result):
     drawn: Array
     coordinates: Array
     covariance: Array
-    distances: tuple[CertifiedDistance, ...]
+    distances: tuple[PlateDistance, ...]
     left_out: tuple[str, ...]
     scale: tuple[str, ...]
     scale_uncertainty: float

@@ -34,7 +34,7 @@ from ...uncertainty.tasks import expansion
 from ..map_of_fit import MappedFit, data_of
 from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_page import certificate_page
-from .certified_balls import ABOUT, CertifiedBalls, CertifiedDistance
+from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
 from .digital_form import digital_certificate
 from .uncertain_archive import gtc_archive
 
@@ -146,7 +146,7 @@ def plate_certificate(
         raise refused(experiment.source, _undetermined(is_open, layout), "calibration")
     if len(known) * d > MOST_NAMES:
         text = f"{len(known)} balls are too many for a covariance of all; at most {MOST_NAMES // d}"
-        raise refused(experiment.source, text, "artefacts", name)
+        raise refused(experiment.source, text, f"artefacts.{name}")
     coordinates, root = coordinates[known], fit.sigma * root[known]
     temperature, told = _temperature(experiment, name)
     carriers = _carriers(experiment, at, name)
@@ -191,11 +191,17 @@ def _fingerprint(fit: CertifiedFit, experiment: Experiment, plate: str, datum: s
 
 
 def _plate_name(experiment: Experiment, plate: str | None) -> str:
-    plates = [name for name, one in experiment.artefacts.items() if one.role == "plate"]
+    plates = [
+        name
+        for name, one in experiment.artefacts.items()
+        if one.role == "plate" and len(experiment.layouts[name].names) > 1
+    ]
     if plate is None and len(plates) == 1:
         return plates[0]
     if not plates:
-        raise refused(experiment.source, "there is no plate; its artefacts supply lengths only")
+        raise refused(
+            experiment.source, "there is no plate of two balls or more, and so nothing to certify"
+        )
     if plate is None:
         raise ValueError(f"the experiment has several plates; choose one of {listing(plates)}")
     if plate not in plates:
@@ -280,7 +286,7 @@ def _temperature(experiment: Experiment, plate: str) -> tuple[float | None, str]
 
 def _distances(
     at: Linearisation, index: Integers, names: tuple[str, ...], sigma: float
-) -> tuple[CertifiedDistance, ...]:
+) -> tuple[PlateDistance, ...]:
     moved = displacements(at, BallPlaces(index))
     some = list(range(len(names)))
     if len(some) > MOST_BALLS_FOR_ALL_DISTANCES:
@@ -289,7 +295,7 @@ def _distances(
     found = pairs_of(moved, pairs)
     u = np.where(found.is_open, np.nan, sigma * found.uncertainties)
     return tuple(
-        CertifiedDistance((names[i], names[j]), length, own)
+        PlateDistance((names[i], names[j]), length, own)
         for (i, j), length, own in zip(
             pairs.tolist(), found.lengths.tolist(), u.tolist(), strict=True
         )
