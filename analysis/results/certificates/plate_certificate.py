@@ -41,6 +41,8 @@ from .uncertain_archive import gtc_archive
 # Of so many balls all distances are stated, of more those between a few that are far apart.
 MOST_BALLS_FOR_ALL_DISTANCES = 16
 SOME_BALLS = 6
+# What is smaller, in metres, is rounding.
+ROUNDING = 1e-14
 
 
 def _tables(certificate: CertifiedBalls, path: Path) -> dict[Path, str]:
@@ -148,6 +150,8 @@ def plate_certificate(
         text = f"{len(known)} balls are too many for a covariance of all; at most {MOST_NAMES // d}"
         raise refused(experiment.source, text, f"artefacts.{name}")
     coordinates, root = coordinates[known], fit.sigma * root[known]
+    coordinates[np.abs(coordinates) < ROUNDING] = 0.0
+    root[np.linalg.norm(root, axis=2) < ROUNDING] = 0.0
     temperature, told = _temperature(experiment, name)
     carriers = _carriers(experiment, at, name)
     flat = root.reshape(len(known) * d, -1)
