@@ -145,7 +145,9 @@ def plate_certificate(
     coordinates, root, is_open = _in_axes(at, layout, index, chosen)
     known = np.flatnonzero(~is_open.any(axis=1))
     if not len(known) or is_open[_datum_balls(chosen)].any():
-        raise refused(experiment.source, _undetermined(is_open, layout), "calibration")
+        distances = _distances(at, index, layout.names, fit.sigma)
+        text = _undetermined(is_open, layout, distances)
+        raise refused(experiment.source, text, "calibration")
     if len(known) * d > MOST_NAMES:
         text = f"{len(known)} balls are too many for a covariance of all; at most {MOST_NAMES // d}"
         raise refused(experiment.source, text, f"artefacts.{name}")
@@ -240,9 +242,9 @@ def _datum_balls(datum: Datum) -> list[int]:
     return found if datum.plane is None else [*found, datum.plane]
 
 
-def _undetermined(is_open: Array, layout: BallLayout) -> str:
-    # The ball at the origin has no undetermined co-ordinates, whatever the scale.
-    if is_open.any(axis=1).sum() >= len(is_open) - 1:
+def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDistance, ...]) -> str:
+    """Why there is no certificate, in words."""
+    if all(np.isnan(one.standard_uncertainty) for one in distances):
         return (
             "the readings and what is known determine no lengths of the plate, so that there is"
             " nothing to certify; calibrate a length (ballplate check says what is missing)"
