@@ -45,7 +45,7 @@ thead { display: table-header-group; }
 .wide { overflow-x: auto; }
 figure { margin: 0; break-inside: avoid; }
 figcaption, .small { color: #555; font-size: 0.9em; }
-svg { display: block; max-width: 100%; height: auto; }
+svg { display: block; max-width: 100%; max-height: 38em; }
 pre { font-size: 11px; overflow-x: auto; border: 1px solid #ddd; padding: 0.5em; margin: 0.4em 0; }
 @media (max-width: 40em) {
   dl { display: block; }
@@ -57,6 +57,7 @@ pre { font-size: 11px; overflow-x: auto; border: 1px solid #ddd; padding: 0.5em;
   body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
   .wide { overflow: visible; }
   td, th { padding-left: 0.8em; }
+  svg { max-height: 130mm; }
   pre { font-size: 4.2pt; white-space: pre-wrap; overflow: visible; }
 }
 """
