@@ -109,6 +109,7 @@ def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.map_files import write_map
 
+    from ..results.correction import left_out_words
     from ..results.fit import Fit
     from .common import show
 
@@ -132,6 +133,7 @@ def run(options: Namespace) -> int:
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
         write(options, {options.output: lambda path: write_map(fitted, path)})
+        warn([left_out_words(fitted)] if fitted.left_out else [])
     show(options, result)
     warn(result.cautions)
     if result.complaint:
