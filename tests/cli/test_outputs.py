@@ -83,6 +83,19 @@ WALK = {
         {"--plot": "fit.svg"},
         also=("balls.csv",),
     ),
+    "certificate": Walk(
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
+        {"-o": "p.html"},
+        also=("balls.csv",),
+        prints=False,
+    ),
+    "adjust": Walk(
+        EXPERIMENT
+        | {"READINGS": "readings.csv", "--certificate": "certificate.csv", "--after": "again.csv"},
+        {"-o": "after.yaml"},
+        ("--turn", "y-x=1 urad", "--uncertainty", "2%"),
+        also=("balls.csv",),
+    ),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
@@ -169,6 +182,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(certificate),
     ]
     assert main(arguments) == 0
+    shutil.copy(readings, folder / "again.csv")
     return folder
 
 
