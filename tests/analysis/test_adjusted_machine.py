@@ -33,7 +33,8 @@ from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 from scipy.stats import binom, chi2
 
-from tests.maps.kinds import IN_PLANE, IN_SPACE, fit_of, write_files
+from tests.certificates.campaigns import IN_PLANE, IN_SPACE
+from tests.maps.kinds import fit_of, write_files
 
 Real = NDArray[np.float64]
 NAMES = ("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")

@@ -16,8 +16,8 @@ from typing import Any
 import ballplate as bp
 import pytest
 
+from tests.certificates.campaigns import IN_PLANE, IN_SPACE
 from tests.certificates.test_plate_certificate import ABOUT
-from tests.maps.kinds import IN_PLANE, IN_SPACE
 
 # Version, where it was published, and SHA-256.
 PUBLISHED = {
