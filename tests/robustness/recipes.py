@@ -56,12 +56,11 @@ RECIPES = (
     ),
     "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
     "certificate small.yaml small-readings.csv --sigma given -o out.html",
-    "certificate small.yaml small-readings.csv -o out.csv --datum all",
     (
         "certificate small.yaml small-readings.csv -o out.xml --about date=2026-11-02 --about"
         " country=DE --json"
     ),
-    "certificate tables.yaml tables-readings.csv -o out.json --coverage-factor 3",
+    "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
     (
         "adjust bar-bell.yaml bar-bell-readings.csv --variant 'length known' --scale 'x=22 um/m'"
         " --turn 'y+x=0.02 turns of 1 mm at 400 mm' --after bar-bell-readings.csv -o out.yaml"
