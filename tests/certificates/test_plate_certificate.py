@@ -302,6 +302,16 @@ def test_exact_readings_do_not_make_exact_plates() -> None:
         fit.certificate()
 
 
+def test_more_balls_than_a_covariance_may_have_are_refused() -> None:
+    many = {"plate": {"kind": "square", "balls": 200, "size": "380 mm"}}
+    # One position, which is enough to ask.
+    sections = {**IN_SPACE, "artefacts": many, "positions": IN_SPACE["positions"][:1]}
+    experiment = bp.experiment({**sections, "error_model": {"kind": "metric"}})
+    fit = replace(of_simulated(), experiment=experiment)
+    with pytest.raises(ExperimentError, match="796 balls are too many .* at most 666"):
+        fit.certificate()
+
+
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "in line": ({"datum": ("r1c1", "r1c2", "r1c3")}, "in line"),
     "two balls": ({"datum": ("r1c1", "r1c2")}, "name 3 different balls"),

@@ -139,6 +139,10 @@ def plate_certificate(
     name = _plate_name(experiment, plate)
     layout = experiment.layouts[name]
     d = experiment.dimension
+    if len(layout.names) * d > MOST_NAMES:
+        most = MOST_NAMES // d
+        text = f"{len(layout.names)} balls are too many for a covariance of all; at most {most}"
+        raise refused(experiment.source, text, f"artefacts.{name}")
     stated = plate_axes(layout, experiment.artefacts[name].axes) if d == 2 else None
     chosen = chosen_datum(layout, d, datum, stated)
     index = at.design.balls.of(at.design.artefacts.names.index(name))
@@ -148,9 +152,6 @@ def plate_certificate(
         distances = _distances(at, index, layout.names, fit.sigma)
         text = _undetermined(is_open, layout, distances)
         raise refused(experiment.source, text, "calibration")
-    if len(known) * d > MOST_NAMES:
-        text = f"{len(known)} balls are too many for a covariance of all; at most {MOST_NAMES // d}"
-        raise refused(experiment.source, text, f"artefacts.{name}")
     coordinates, root = coordinates[known], fit.sigma * root[known]
     coordinates[np.abs(coordinates) < ROUNDING] = 0.0
     root[np.linalg.norm(root, axis=2) < ROUNDING] = 0.0
