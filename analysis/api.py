@@ -779,7 +779,8 @@ def adjust(
     >>> adjust(machine, scale="x=20 um/m")
     <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
     """
-    from .results.adjusted_machine import adjusted_machine, guideway_turn, scale_change
+    from .results.adjusted_machine import adjusted_machine
+    from .results.machine_changes import guideway_turn, scale_change
     from .simulator.maps.fitted_map import FittedMap
 
     first, second = (

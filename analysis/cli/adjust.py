@@ -74,7 +74,8 @@ def run(options: Namespace) -> int:
     """Print the prediction and the comparison; 1 if something is not as expected."""
     from ballplate.simulator.experiment.map_files import write_map
 
-    from ..results.adjusted_machine import adjusted_machine, guideway_turn, scale_change
+    from ..results.adjusted_machine import adjusted_machine
+    from ..results.machine_changes import guideway_turn, scale_change
 
     if not options.scale and not options.turn:
         raise UsageError("state what was changed, with --scale or --turn")
