@@ -313,8 +313,8 @@ def read_report(
     """
     from .results.imported import ReadReport
     from .simulator.experiment.layout import lay_out
+    from .simulator.experiment.name_rules import check_rule
     from .simulator.inputs.quantities import LENGTH_UNITS
-    from .simulator.readings.feature_names import check_rule
     from .simulator.readings.formats.registered import FORMATS
     from .simulator.readings.imported import ImportSettings, import_readings
 
@@ -348,6 +348,8 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    names: str | None = None,
+    swap_names: bool | None = None,
 ) -> Fit: ...
 
 
@@ -369,6 +371,8 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    names: str | None = None,
+    swap_names: bool | None = None,
 ) -> FitResult: ...
 
 
@@ -389,12 +393,16 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    names: str | None = None,
+    swap_names: bool | None = None,
 ) -> FitResult:
-    """The estimate from readings: a table or several, or those that the experiment's file names.
+    """The estimate from readings: a table or several, or those that the experiment's file names;
+    also reports of measuring programs, as `read_report` reads them.
 
     `columns`, `unit` and `coordinates` say how tables are written, in place of the experiment's
     section `readings`: columns by role, the unit of those that state none, and whether co-ordinates
-    are scale readings, ball centres or those of a part.
+    are scale readings, ball centres or those of a part. `names` is the rule of names in reports;
+    with `swap_names` those of two balls are swapped where readings show that they are.
     `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
@@ -436,6 +444,7 @@ def fit(
     if reason:
         raise ValueError(reason)
     said = {"columns": columns, "unit": unit, "coordinates": coordinates}
+    said |= {"names": names, "swap_names": swap_names}
     chosen = _experiment(experiment).with_readings(said)
     tables = _tables(readings, chosen)
     if certificate is not None:

@@ -9,6 +9,7 @@ from ..inputs.messages import ExperimentError, Steps
 from ..inputs.quantities import LENGTH_UNITS, plain_unit
 from ..inputs.settings import hint
 from .machine_file import load_machine
+from .name_rules import check_rule
 from .readings_section import CompensationSettings, ReadingsSettings
 from .structure import Sections
 
@@ -26,6 +27,11 @@ def check_readings(sections: Sections, references: References) -> None:
     if settings.encoding is not None and not is_text_encoding(settings.encoding):
         text = f'unknown encoding "{settings.encoding}"; write for example utf-8 or cp1252'
         problems.add(("readings", "encoding"), text)
+    if settings.names is not None:
+        try:
+            check_rule(settings.names)
+        except ValueError as error:
+            problems.add(("readings", "names"), str(error))
     if settings.columns is not None:
         if settings.columns.z is not None and references.dimension == 2:
             problems.add(("readings", "columns", "z"), "there are two dimensions; leave z out")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..experiment.readings_section import ReadingsSettings
+from ..experiment.readings_section import Coordinate, ReadingsSettings
 from ..inputs.decoding import LINE_END, decoded, refuse_controls
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import (
@@ -43,7 +43,7 @@ from .table_forms import (
 ABOVE = {
     "position": r"position|pos|placement|set-?up|lage|aufstellung|stellung|messlage|aufspannung",
     "probe": r"probe|stylus|tip|taster|taststift",
-    "unit": r"units?|einheit(?:en)?|all values in|alle (?:werte|angaben) in|lengths? in",
+    "unit": r"units?|einheit(?:en)?|(?:(?:all )?values|lengths?|(?:alle )?(?:werte|angaben)) in\b",
 }
 # Characters of such a line.
 LONGEST_LINE = 300
@@ -60,13 +60,15 @@ class TableRows:
 
     `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
     `hints` are what to say where names are not known: that a position is the name of the file
-    though columns are not used.
+    though columns are not used. `coordinates` is what those of a report of a measuring program
+    are; None of a table, which does not say.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...] = ()
     diameters: tuple[float, ...] = ()
     hints: tuple[Message, ...] = ()
+    coordinates: Coordinate | None = None
 
 
 def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[GivenText, str]:
@@ -176,7 +178,9 @@ class _Reader:
         for text in (text[:LONGEST_LINE] for text in self.form.above):
             for role, pattern in ABOVE.items():
                 match = re.match(
-                    rf'[\s#"]*(?:{pattern})["\s]*[:=;,\t|]\s*"?(.*?)["\s;,|]*$', text, re.IGNORECASE
+                    rf'[\s#"]*(?:{pattern})(?:["\s]*[:=;,\t|]|(?<=\bin)\s)\s*"?(.*?)["\s;,|]*$',
+                    text,
+                    re.IGNORECASE,
                 )
                 if match is None or not match[1]:
                     continue

@@ -16,10 +16,11 @@ import numpy as np
 
 from ..design.arrays import Design
 from ..estimation.spheres import FEWEST_POINTS, SphereFit, closest_sphere
+from ..experiment.readings_section import Coordinate
 from ..inputs.messages import ExperimentError, refused
 from ..inputs.settings import listing, shorten
 from ..inputs.spreadsheets import CsvWriter
-from ..inputs.yamltree import Mark
+from ..inputs.yamltree import GivenText, Mark
 from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file, without_point
 from .formats.registered import read_report
 from .formats.report import CIRCLE, POINT, SPHERE, UNSTATED, Feature, Report
@@ -62,7 +63,7 @@ class ImportedReadings:
     readings: tuple[ImportedReading, ...]
     told: tuple[str, ...]
     remarks: tuple[str, ...]
-    coordinates: str
+    coordinates: Coordinate
     dimension: int = 3
 
     def columns(self, uncertainties: bool = False) -> dict[str, list[str] | list[float]]:
@@ -160,6 +161,20 @@ class _Taken:
 def import_readings(
     paths: Sequence[Path], settings: ImportSettings = ImportSettings()
 ) -> ImportedReadings:
+    """Readings of reports, and how they differ from those that the experiment plans.
+
+    :raises ExperimentError: as `report_readings`.
+    """
+    found = report_readings(paths, settings)
+    if settings.design is None:
+        return found
+    differ = _against_plan(found.readings, settings.design)
+    return replace(found, remarks=(*found.remarks, *differ))
+
+
+def report_readings(
+    paths: Sequence[Path | GivenText], settings: ImportSettings
+) -> ImportedReadings:
     """Readings of reports whose features have names by a rule (see `feature_names`).
 
     :raises ExperimentError: a file cannot be read, is of no known format or wrong, or has no
@@ -197,9 +212,7 @@ def import_readings(
         remarks.append(
             "warning: centres in the machine's and in a part's system; import each apart"
         )
-    if settings.design is not None:
-        remarks += _against_plan(readings, settings.design)
-    coordinates = "part" if systems == {"part"} else "ball centres"
+    coordinates: Coordinate = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
     return ImportedReadings(
         tuple(readings), tuple(told), tuple(dict.fromkeys(remarks)), coordinates, dimension
@@ -248,7 +261,7 @@ def _summed_up(
     return listing(words)
 
 
-def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
+def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> _Taken:
     """The features of a report that are readings."""
     found, kinds = _Taken(report), settings.kinds
     found.left.update(one.kind for one in report.features if one.kind not in kinds)
@@ -272,7 +285,9 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
     features = [one for one, _ in complete]
     names, whose = _named(features, rule or None, settings.design, report.file)
     is_of_file = "{position}" not in names.rule
-    position = position_of_file(path.stem, settings.design, str(path)) if is_of_file else ""
+    position = (
+        position_of_file(Path(str(path)).stem, settings.design, str(path)) if is_of_file else ""
+    )
     others = [one for one, own in zip(features, names.parts, strict=True) if own is None]
     found.leave(others, f"the name is not of {names.rule}")
     known: set[tuple[object, ...]] = set()
@@ -356,7 +371,7 @@ def _grouped(candidates: list[Feature], apart: re.Pattern[str], found: _Taken) -
 
 
 def _readings(
-    one: _Taken, path: Path, variance: float, design: Design | None
+    one: _Taken, path: Path | GivenText, variance: float, design: Design | None
 ) -> list[ImportedReading]:
     """The readings of a report, with the probe that its names, its sensors or the plan tell."""
     readings = []

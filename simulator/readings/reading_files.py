@@ -23,9 +23,7 @@ from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .coordinate_kinds import as_scale_readings, doubts_about_copies
-from .gross_error_messages import (
-    refuse_gross_errors,
-)
+from .gross_error_messages import refuse_gross_errors, with_names_swapped
 from .observed_readings import ObservedReadings, combine_standards, reading_keys
 from .offsets_applied import doubt_about_offsets, said_of
 from .reading_sources import Source, source_rows
@@ -87,7 +85,7 @@ def read_readings(
         return settings.coordinates == "part" or not far_outside(x, design).any()
 
     found = source_rows(sources, design, settings, messages, is_possible, units, empty)
-    rows = found.rows
+    rows, settings = found.rows, found.settings
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
@@ -125,7 +123,11 @@ def read_readings(
     )
     readings = replace(readings, uncertainty=uncertainty, beside=beside)
     readings = in_sequence(readings, design.influences)
-    missing, unplanned = _compare(design, readings, [row.mark for row in rows])
+    marks = tuple(row.mark for row in rows)
+    swapped: tuple[str, ...] = ()
+    if settings.swap_names:
+        readings, swapped = with_names_swapped(design, readings, x, marks)
+    missing, unplanned = _compare(design, readings, marks)
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
@@ -140,12 +142,11 @@ def read_readings(
                 )
             ]
         )
-    marks = tuple(row.mark for row in rows)
     doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     if settings.coordinates == "part":
         doubt += doubts_about_copies(design, readings, given)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
+    observed = replace(observed, told=(*found.told, *swapped, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)
     return observed
@@ -282,7 +283,7 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
 
 
 def _compare(
-    design: Design, readings: Readings, marks: list[Mark]
+    design: Design, readings: Readings, marks: Sequence[Mark]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, found = reading_keys(design.readings.expanded()), reading_keys(readings)
 

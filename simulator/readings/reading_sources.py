@@ -25,6 +25,7 @@ from .coordinate_kinds import controller_offsets
 from .headings import Vocabulary, heading
 from .name_matching import with_known_names
 from .other_files import what_it_is
+from .report_sources import report_rows, with_coordinates
 from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
@@ -41,11 +42,12 @@ ENOUGH = 3
 @dataclass(frozen=True)
 class SourceRows:
     """Rows of all tables; `told` is how they were read and what was matched, `hints` what to say
-    where names are not known.
+    where names are not known, and `settings` those given, with what reports say of co-ordinates.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...]
+    settings: ReadingsSettings
     hints: tuple[Message, ...] = ()
 
 
@@ -58,7 +60,8 @@ def source_rows(
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
-    """Rows of tables of readings, with the names of the design as far as they can be matched.
+    """Rows of tables of readings, or of reports of measuring programs, with the names of the design
+    as far as they can be matched.
 
     Messages about rows of plain tables are added to `messages`, so that more can be said at once.
 
@@ -70,13 +73,19 @@ def source_rows(
         "ball": design.balls.names,
         "probe": design.probes.names,
     }
+
+    def of_report(source: Source, text: GivenText) -> TableRows | None:
+        return report_rows(source, text, design, settings, units)
+
+    d = design.dimension
     tables = [
-        read_source(source, names, settings, messages, is_possible, design.dimension, units, empty)
+        read_source(source, names, settings, messages, is_possible, d, units, empty, of_report)
         for source in sources
     ]
     rows = [row for table in tables for row in table.rows]
     if messages:
-        return SourceRows(tuple(rows), ())
+        return SourceRows(tuple(rows), (), settings)
+    settings, said = with_coordinates(settings, sources, tables)
     diameters = [d for table in tables for d in table.diameters]
 
     def places(own: Sequence[FileRow]) -> Array:
@@ -88,10 +97,10 @@ def source_rows(
     )
     if asked:
         raise ExperimentError([*(rows[0].mark.message("", text) for text in asked), *hints])
-    told = [text for table in tables for text in table.told]
+    told = [*(text for table in tables for text in table.told), *said]
     if len(diameters) == len(rows):
         told += _about_diameters(named, np.array(diameters))
-    return SourceRows(named, (*told, *matched), hints)
+    return SourceRows(named, (*told, *matched), settings, hints)
 
 
 def _refuse_named_twice(sources: Sequence[Source]) -> None:
@@ -119,9 +128,10 @@ def read_source(
     dimension: int,
     units: Units,
     empty: Collection[str] = (),
+    of_report: Callable[[Source, GivenText], TableRows | None] = lambda source, text: None,
 ) -> TableRows:
     """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns,
-    and cells of the columns `empty` may be so in plain files.
+    and cells of the columns `empty` may be so in plain files. What is no table may be a report.
 
     :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
         `messages`.
@@ -153,6 +163,8 @@ def read_source(
     try:
         return read_any_table(text, encoding, words, settings, is_possible)
     except ExperimentError:
+        if (report := of_report(source, text)) is not None:
+            return report
         # Who names columns knows what the file is.
         if settings.columns is None and (other := what_it_is(text)):
             raise ExperimentError([Message(str(source), 1, 1, "", other)]) from None
