@@ -343,14 +343,15 @@ def test_what_is_stated_too_small_is_found_larger(small: bp.Experiment) -> None:
         ("reproducibility of positions and probes", "displacements by position and probe"),
         ("scale of each position", "scales of positions"),
         ("reproducibility of positions and balls", "displacements by position and ball"),
-        ("probing, 0.3 µm", "probing errors of probes"),
+        ("probing, 1 µm between probes", "probing errors of probes"),
     ],
 )
 def test_intervals_of_stated_components_hold_them(
     name: str, group: str, small: bp.Experiment
 ) -> None:
     count = 400
-    experiment = small.with_(influences=[EVERY[name].settings])
+    settings = EVERY[name].settings if name in EVERY else PROBING | {"between_probes": "1 um"}
+    experiment = small.with_(influences=[settings])
     inside, ratios = 0, []
     for seed in range(count):
         found = bp.fit(experiment, bp.simulate(experiment, seed)).components("calibration")
@@ -359,6 +360,15 @@ def test_intervals_of_stated_components_hold_them(
         ratios.append(one.ratio)
     assert abs(inside / count - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
     assert abs(np.mean(ratios) - 1.0) < 4.0 * np.std(ratios) / np.sqrt(count)
+
+
+def test_components_that_hardly_show_are_not_estimated(small: bp.Experiment) -> None:
+    """Of a tenth of a micrometre, less than one degree of freedom is seen of the five."""
+    experiment = small.with_(influences=[PROBING])
+    found = bp.fit(experiment, bp.simulate(experiment)).components("calibration")
+    (one,) = [each for each in found.groups if each.name == "probing errors of probes"]
+    assert one.redundancy < 1.0 and not one.is_estimated
+    assert one.verdict == "cannot be estimated: too little redundancy"
 
 
 def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
