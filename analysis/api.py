@@ -316,7 +316,8 @@ def read_report(
     from .simulator.experiment.name_rules import check_rule
     from .simulator.inputs.quantities import LENGTH_UNITS
     from .simulator.readings.formats.registered import FORMATS
-    from .simulator.readings.imported import ImportSettings, import_readings
+    from .simulator.readings.imported import ImportSettings
+    from .simulator.readings.planned_and_imported import import_readings
 
     paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
     for path in paths:

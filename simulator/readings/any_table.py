@@ -26,7 +26,10 @@ from ..inputs.spreadsheets import text_of_cell
 from ..inputs.tables import MOST_ROWS, FileRow
 from ..inputs.yamltree import GivenText, Mark, read_bytes
 from ..machines.protocol import Array
-from .headings import TEXTS, Group, HeadedColumn, Vocabulary, folded, missing_columns, unit_of
+from .above_headings import said_above
+from .clock_times import ClockError, ReadTime, clock_time
+from .heading_words import folded, unit_of
+from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary, missing_columns
 from .table_forms import (
     DECIMALS,
     NOTHING,
@@ -39,14 +42,6 @@ from .table_forms import (
     forms_of,
 )
 
-# Lines above the headings that say what all rows have.
-ABOVE = {
-    "position": r"position|pos|placement|set-?up|lage|aufstellung|stellung|messlage|aufspannung",
-    "probe": r"probe|stylus|tip|taster|taststift",
-    "unit": r"units?|einheit(?:en)?|(?:(?:all )?values|lengths?|(?:alle )?(?:werte|angaben)) in\b",
-}
-# Characters of such a line.
-LONGEST_LINE = 300
 TEMPERATURES = (
     "temperature_artefact_degC and temperature_scales_degC are used where the experiment has"
     " influences of kind: temperature for them"
@@ -61,7 +56,7 @@ class TableRows:
     `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
     `hints` are what to say where names are not known: that a position is the name of the file
     though columns are not used. `coordinates` is what those of a report of a measuring program
-    are; None of a table, which does not say.
+    are; None of a table, which does not say. `times` are those of rows that have clock times.
     """
 
     rows: tuple[FileRow, ...]
@@ -69,6 +64,7 @@ class TableRows:
     diameters: tuple[float, ...] = ()
     hints: tuple[Message, ...] = ()
     coordinates: Coordinate | None = None
+    times: tuple[ReadTime, ...] = ()
 
 
 def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[GivenText, str]:
@@ -141,7 +137,10 @@ class _Reader:
     def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
         form = self.form
         self._refuse_wrong()
-        above = self._above()
+        try:
+            above = said_above(self.form.above)
+        except HeadingError as error:
+            raise self.error(str(error)) from None
         texts, told = self._texts(above)
         units = self._units(above)
         found = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
@@ -150,7 +149,8 @@ class _Reader:
         rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
         self._refuse_doubtful(rows, is_possible)
         hints = self._of_positions(texts.get("position", ""))
-        return TableRows(tuple(rows), (self._told(units, told),), diameters, hints)
+        told = (self._told(units, told),)
+        return TableRows(tuple(rows), told, diameters, hints, times=self._times())
 
     def _refuse_wrong(self) -> None:
         form, headings = self.form, self.form.headings
@@ -168,28 +168,6 @@ class _Reader:
             messages.insert(0, Message(str(self.source), max(form.header, 1), 1, "", text))
         if messages:
             raise ExperimentError(messages)
-
-    def _above(self) -> dict[str, str]:
-        """What lines above the headings say of all rows: position, probe and unit.
-
-        :raises ExperimentError: they say two things.
-        """
-        found: dict[str, str] = {}
-        for text in (text[:LONGEST_LINE] for text in self.form.above):
-            for role, pattern in ABOVE.items():
-                match = re.match(
-                    rf'[\s#"]*(?:{pattern})(?:["\s]*[:=;,\t|]|(?<=\bin)\s)\s*"?(.*?)["\s;,|]*$',
-                    text,
-                    re.IGNORECASE,
-                )
-                if match is None or not match[1]:
-                    continue
-                if found.setdefault(role, match[1]) != match[1]:
-                    raise self.error(
-                        f'two lines above the headings state a {role}, "{shorten(found[role])}" and'
-                        f' "{shorten(match[1])}"; write which under readings'
-                    )
-        return found
 
     def _texts(self, above: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
         """What all rows have where no column says it, and in words where that comes from.
@@ -292,15 +270,14 @@ class _Reader:
         factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
         further = [roles.get(name) for name in self.words.further]
         for name, known in self.words.further.items():
-            if name in roles:
-                factor = known[roles[name].unit or ""]
-                factors[roles[name].place] = factor, power_of_ten(factor)
+            if name in roles and (unit := roles[name].unit) is not None:
+                factors[roles[name].place] = known[unit], power_of_ten(known[unit])
         places = {role: roles[role].place for role in TEXTS if role in roles}
         found: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
-            factor, power = factors[i]
+            factor, power = factors.get(i, (None, ""))
             cell = cells[i].replace(sign, ".")
             value = plain_number(cell, power)
             if value is not None:
@@ -308,8 +285,10 @@ class _Reader:
             if cell.casefold() in NOTHING:
                 return math.nan
             try:
+                if factor is None:
+                    return clock_time(cells[i]).seconds
                 return metres_or_radians(cell, factor)
-            except QuantityError as error:
+            except (QuantityError, ClockError) as error:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
@@ -338,6 +317,21 @@ class _Reader:
         if messages:
             raise ExperimentError(messages)
         return found
+
+    def _times(self) -> tuple[ReadTime, ...]:
+        """Clock times of rows, which have been read."""
+        clocks = [
+            column.place
+            for name, column in self.form.headings.roles.items()
+            if name in self.words.further and column.unit is None
+        ]
+        file = str(self.source)
+        return tuple(
+            (Mark(file, line, 1), cells[i], clock_time(cells[i]))
+            for line, cells in self.form.rows
+            for i in clocks
+            if cells[i].casefold() not in NOTHING
+        )
 
     def _refuse_doubtful(
         self, rows: Sequence[FileRow], is_possible: Callable[[Array], bool]

@@ -19,7 +19,7 @@ from ..inputs.quantities import format_length
 from ..inputs.settings import listing, shorten
 from ..inputs.tables import FileRow
 from ..machines.protocol import Array, Integers
-from .headings import folded
+from .heading_words import folded
 
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.

@@ -17,12 +17,14 @@ from ..geometry.motions import AXIS_NAMES
 from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing
-from ..inputs.tables import FileRow, header_names, read_table
+from ..inputs.tables import FileRow, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText
 from ..machines.protocol import Array
 from .any_table import TableRows, read_any_table, text_of
+from .clock_times import wrong_times
 from .coordinate_kinds import controller_offsets
-from .headings import Vocabulary, heading
+from .heading_words import heading, is_clock
+from .headings import Vocabulary
 from .name_matching import with_known_names
 from .other_files import what_it_is
 from .report_sources import report_rows, with_coordinates
@@ -85,6 +87,7 @@ def source_rows(
     rows = [row for table in tables for row in table.rows]
     if messages:
         return SourceRows(tuple(rows), (), settings)
+    _refuse_wrong_times(sources, tables)
     settings, said = with_coordinates(settings, sources, tables)
     diameters = [d for table in tables for d in table.diameters]
 
@@ -119,6 +122,20 @@ def _refuse_named_twice(sources: Sequence[Source]) -> None:
         seen[place] = source
 
 
+def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:
+    """Refuse clock times that may be of several days, or beside other times.
+
+    :raises ExperimentError: there are such.
+    """
+    times = [time for table in tables for time in table.times]
+    for source, table in zip(sources, tables, strict=True):
+        if times and not table.times:
+            text = f"no clock times, which {times[0][0].file} has; write all times of one kind"
+            raise refused(source, text)
+    if messages := wrong_times(times):
+        raise ExperimentError(messages)
+
+
 def read_source(
     source: Source,
     names: Mapping[str, Sequence[str]],
@@ -142,9 +159,11 @@ def read_source(
     wrong: list[Message] = []
     rows: tuple[FileRow, ...] = ()
     heads = header_names(text)
+    clocks = {name for name, one in units.items() if is_clock("", one)}
     looks_plain = encoding in ("", "UTF-8") and heads & set(axes)
-    # Plain tables have standard uncertainties only.
+    # Plain tables have standard uncertainties only, and times in seconds or the like.
     others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
+    others |= not clocks.isdisjoint(header_texts(text))
     if looks_plain and not others and all(one is None for one in stated):
         # One probe need not be named.
         defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
