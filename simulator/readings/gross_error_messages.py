@@ -16,7 +16,7 @@ from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
-from .common_causes import common_cause
+from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 
 
@@ -33,6 +33,11 @@ def refuse_gross_errors(
     :raises ExperimentError: some readings are wrong; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
+    if positions:
+        seen = x + design.probes.offsets[design.readings.probe]
+        mistaken = mistaken_positions(design, design.readings, seen)
+        if {wrong.position for wrong in positions} <= set(mistaken):
+            raise ExperimentError([marks[0].message("", words_of_mistaken(design, mistaken))])
     if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
         cause = common_cause(design, x, settings)
         if cause:

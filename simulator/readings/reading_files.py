@@ -23,6 +23,7 @@ from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .coordinate_kinds import as_scale_readings, doubts_about_copies
+from .digits import doubts_about_digits
 from .gross_error_messages import refuse_gross_errors, with_names_swapped
 from .observed_readings import ObservedReadings, combine_standards, reading_keys
 from .offsets_applied import doubt_about_offsets, said_of
@@ -142,7 +143,8 @@ def read_readings(
                 )
             ]
         )
-    doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    doubt = found.doubts + doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    doubt += doubts_about_digits(design, given, uncertainty)
     if settings.coordinates == "part":
         doubt += doubts_about_copies(design, readings, given)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)

@@ -45,12 +45,14 @@ ENOUGH = 3
 class SourceRows:
     """Rows of all tables; `told` is how they were read and what was matched, `hints` what to say
     where names are not known, and `settings` those given, with what reports say of co-ordinates.
+    `doubts` are about names that were matched.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...]
     settings: ReadingsSettings
     hints: tuple[Message, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 def source_rows(
@@ -95,15 +97,17 @@ def source_rows(
         return _places(own, design, settings)
 
     hints = tuple(hint for table in tables for hint in table.hints)
-    named, matched, asked = with_known_names(
+    named, names_found = with_known_names(
         rows, design, None if settings.coordinates == "part" else places
     )
-    if asked:
-        raise ExperimentError([*(rows[0].mark.message("", text) for text in asked), *hints])
+    if names_found.asked:
+        asked = [rows[0].mark.message("", text) for text in names_found.asked]
+        raise ExperimentError([*asked, *hints])
     told = [*(text for table in tables for text in table.told), *said]
     if len(diameters) == len(rows):
         told += _about_diameters(named, np.array(diameters))
-    return SourceRows(named, (*told, *matched), settings, hints)
+    doubts = tuple(names_found.doubted)
+    return SourceRows(named, (*told, *names_found.told), settings, hints, doubts)
 
 
 def _refuse_named_twice(sources: Sequence[Source]) -> None:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
-from pathlib import Path
 
 import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.quantities import DURATION_UNITS
+from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.clock_times import ClockError, clock_time
-from ballplate.simulator.readings.reading_files import read_readings
+from ballplate.simulator.readings.reading_sources import source_rows
 
 DRIFT = {"kind": "drift", "axes": {"standard_uncertainty": "2 um/h"}}
 START = datetime(2026, 3, 4, 8, 5, 17)
@@ -31,14 +32,16 @@ def table(experiment: bp.Experiment) -> pd.DataFrame:
     return found.assign(time_s=np.cumsum(steps))
 
 
-def times(experiment: bp.Experiment, *tables: pd.DataFrame | Path) -> np.ndarray:
-    """Hours of readings, from their mean on, in the order of the rows."""
-    from ballplate.api import _tables
-
-    observed = read_readings(
-        _tables(list(tables), experiment), lay_out(experiment), settings=experiment.readings
-    )
-    seconds = observed.design.readings.beside["time"]  # type: ignore[index]
+def times(experiment: bp.Experiment, *tables: pd.DataFrame) -> np.ndarray:
+    """Seconds of rows, from their mean on."""
+    design = lay_out(experiment)
+    sources = [GivenText(f"{k}.csv", one.to_csv(index=False)) for k, one in enumerate(tables)]
+    settings = experiment.readings
+    units = {"time": DURATION_UNITS}
+    wrong: list[Message] = []
+    rows = source_rows(sources, design, settings, wrong, lambda x: True, units).rows
+    assert not wrong
+    seconds = np.array([row.lengths[-1] for row in rows])
     return np.asarray(seconds - seconds.mean())
 
 
@@ -102,7 +105,7 @@ def test_what_does_not_tell_the_day_is_refused(
     first, second = bare.assign(time=clock)[:after], bare.assign(time=clock)[after:]
     with pytest.raises(ExperimentError, match="another day; write dates"):
         times(experiment, first, second)
-    with pytest.raises(ExperimentError, match=r"no clock times, which readings\[0\] has"):
+    with pytest.raises(ExperimentError, match=r"no clock times, which 0.csv has"):
         times(experiment, first, table[after:])
     dated = [(late + timedelta(seconds=int(s))).isoformat() for s in table["time_s"]]
     with pytest.raises(
@@ -110,7 +113,7 @@ def test_what_does_not_tell_the_day_is_refused(
     ):
         times(experiment, first, bare.assign(time=dated)[after:])
     with pytest.raises(ExperimentError, match="no time, and other rows have one"):
-        times(experiment, bare.assign(time=[*clock[: after - 1], "-"] + [""] * (len(bare) - after)))
+        bp.fit(experiment, bare.assign(time=[*clock[:after], *[""] * (len(bare) - after)]))
     with pytest.raises(ExperimentError, match='"12.5" is no time of a clock; write 10:05:30 or'):
         times(experiment, bare.assign(time=12.5))
 
