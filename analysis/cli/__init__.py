@@ -114,6 +114,8 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
 def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
     from ballplate.simulator.computing.internal_error import InternalError
+    from ballplate.simulator.computing.own_code import own_frame
+    from ballplate.simulator.computing.own_code import told as told_in_words
     from ballplate.simulator.computing.unusable import UnusableError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
 
@@ -142,6 +144,11 @@ def _run(options: argparse.Namespace) -> int:
         shortage = no_memory(error, options)
         if shortage is not None:
             print(shortage, file=sys.stderr)
+            return BAD_FILE
+        frame = own_frame(error)
+        if frame is not None:
+            text = f"{frame.filename}:{frame.lineno}: in {frame.name}, code of your own:"
+            print(in_one_line(f"{text} {told_in_words(error, None)}"), file=sys.stderr)
             return BAD_FILE
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)

@@ -141,9 +141,7 @@ def test_exchanged_names_of_positions_are_told_as_such(
     with pytest.raises(ExperimentError) as refused:
         bp.fit(experiment, exchanged(readings, first, second))
     text = str(refused.value)
-    assert (
-        f"other positions were planned, {first} where {second}, {second} where {first}" in text
-    )
+    assert f"other positions were planned, {first} where {second}, {second} where {first}" in text
     assert "exchange the names of the positions" in text and "turned" not in text
 
 

@@ -91,7 +91,9 @@ def test_readings_of_the_base_stay_where_they_are(folder: Path) -> None:
     (folder / "e.yaml").write_text(EXPERIMENT.replace("variants:", f"{stated}variants:"))
     assert names(folder) == ["balls.csv", "e.yaml", "other.csv", "s.yaml", "third.csv"]
     assert main(["sweep", str(folder / "s.yaml"), "--workers", "1"]) == 0
-    axis = SWEEP.replace("  words:", "  lab: {path: readings.files, values: [../lab.csv]}\n  words:")
+    axis = SWEEP.replace(
+        "  words:", "  lab: {path: readings.files, values: [../lab.csv]}\n  words:"
+    )
     (folder / "s.yaml").write_text(axis)
     assert names(folder) == ["balls.csv", "e.yaml", "other.csv", "s.yaml", "third.csv"]
     curves = "true_machine: {kind: curves, files: [../lab.csv]}\n"
