@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
@@ -447,10 +448,11 @@ def fit(
     said = {"columns": columns, "unit": unit, "coordinates": coordinates}
     said |= {"names": names, "swap_names": swap_names}
     chosen = _experiment(experiment).with_readings(said)
-    tables = _tables(readings, chosen)
+    tables, stated = _tables(readings, chosen), len(chosen.doubts)
     if certificate is not None:
         chosen = read_certificate(_table("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
+    observed = replace(observed, of_certificate=chosen.doubts[stated:])
     return fit_readings(
         chosen,
         observed,

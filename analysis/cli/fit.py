@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 
 from ..estimators.estimator_choice import (
@@ -130,12 +131,13 @@ def run(options: Namespace) -> int:
     from .table_options import named_sources, with_options
 
     _refuse_misused(options)
-    experiment = single(options)
+    experiment = with_options(options, single(options))
+    stated = len(experiment.doubts)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
-    experiment = with_options(options, experiment)
     sources = options.readings or named_sources(experiment)
     observed = read_readings(sources, lay_out(experiment), settings=experiment.readings)
+    observed = replace(observed, of_certificate=experiment.doubts[stated:])
     for remark in observed.told:
         note(options, remark)
     for remark in observed.remarks[len(observed.told) :]:
