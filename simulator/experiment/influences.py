@@ -18,6 +18,7 @@ from ..design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
 from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
+from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from .checks import MOST_SHARED
 from .model import Experiment, Position
@@ -49,8 +50,10 @@ def resolve_influences(
     return tuple(found)
 
 
-def with_influences(design: Design, experiment: Experiment) -> Design:
+def with_influences(design: Design, experiment: Experiment, is_pool: bool = False) -> Design:
     """The design with the influence quantities of its experiment, and what is known of them.
+
+    Of a pool only parameters that positions share count against the limit.
 
     :raises ExperimentError: they have more parameters than there is memory for, or one twice; a
         class does not keep to what `Influence` says.
@@ -91,6 +94,9 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
         text = f"{twice[0]} is stated by two of them; remove it from one"
         raise ExperimentError([experiment.message(("influences",), text)])
     shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
+    if is_pool:
+        poses = pose_size(disturbed.dimension) * len(disturbed.plate_positions)
+        shared -= poses + sum(one.position >= 0 for one in parameters)
     if shared > MOST_SHARED:
         text = (
             f"their {len(parameters)} parameters make {shared} besides the balls; at most"
