@@ -18,7 +18,6 @@ from ..design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
 from ..design.influences.protocol import DesignParts, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
-from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from .checks import MOST_SHARED
 from .model import Experiment, Position
@@ -95,8 +94,8 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
         raise ExperimentError([experiment.message(("influences",), text)])
     shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
     if is_pool:
-        poses = pose_size(disturbed.dimension) * len(disturbed.plate_positions)
-        shared -= poses + sum(one.position >= 0 for one in parameters)
+        poses = ~disturbed.positions.held[disturbed.posed_positions]
+        shared -= int(poses.sum()) + sum(one.position >= 0 for one in parameters)
     if shared > MOST_SHARED:
         text = (
             f"their {len(parameters)} parameters make {shared} besides the balls; at most"

@@ -15,6 +15,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.montecarlo.experiments import trials
+from ballplate.planning.rows import draw
 from ballplate.results.variance_components.components import AS_STATED, LARGER, variance_components
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -396,26 +397,21 @@ def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) 
 
 
 def test_poses_of_a_pool_do_not_count(
-    small: bp.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    small: bp.Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plan solves for those of a choice only: a limit that six positions exceed is none of it."""
-    told = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
-    told["artefacts"]["plate"]["balls"] = [3, 3]
-    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    told["evaluation"]["points"] = {"random": 20, "seed": 3}
-    first, *others = told["positions"]
-    pool = {"positions": [first], "pool": {"candidates": others}, "influences": [SCALE]}
-    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(told | pool), encoding="utf-8")
-    expected = bp.plan(tmp_path / "pool.yaml", "U6", positions=4).to_dict()
+    """A plan solves for those of a choice only: a limit that all positions exceed is none of it."""
     every = small.with_(influences=[SCALE])
-    of_balls = 3 * 9
-    monkeypatch.setattr(
-        "ballplate.simulator.experiment.influences.MOST_SHARED",
-        lay_out(every).parameter_count - of_balls - 1,
-    )
+    design, of_balls = lay_out(every), 3 * 9
+    limit = "ballplate.simulator.experiment.influences.MOST_SHARED"
+    monkeypatch.setattr(limit, design.parameter_count - of_balls - 1)
     with pytest.raises(ExperimentError, match="leave positions or candidates out"):
         lay_out(every)
-    assert bp.plan(tmp_path / "pool.yaml", "U6", positions=4).to_dict() == expected
+    pool = draw(every, every.positions)
+    assert pool.design.parameter_count == design.parameter_count
+    # What all share are the errors of the machine.
+    monkeypatch.setattr(limit, pool.shared - 1)
+    with pytest.raises(ExperimentError, match="leave positions or candidates out"):
+        draw(every, every.positions)
 
 
 def test_unknown_values_are_free_parameters(small: bp.Experiment) -> None:
