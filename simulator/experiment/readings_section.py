@@ -50,7 +50,9 @@ class ColumnsSettings(Settings):
     x: Columns | None = Field(None, description=_COORDINATE)
     y: Columns | None = Field(None, description=_COORDINATE)
     z: Columns | None = Field(None, description=_COORDINATE)
-    u: Name | None = Field(None, description="standard uncertainties of each co-ordinate")
+    u: Name | None = Field(
+        None, description="standard uncertainties of each co-ordinate; or =0.2 um, of all rows"
+    )
     diameter: Name | None = Field(None, description="diameters of the balls as measured")
 
 

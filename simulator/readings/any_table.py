@@ -17,6 +17,7 @@ from ..inputs.quantities import (
     LENGTH_UNITS,
     QuantityError,
     metres_or_radians,
+    parse_positive_length,
     plain_number,
     plain_unit,
     power_of_ten,
@@ -241,7 +242,8 @@ class _Reader:
         without: list[int] = []
         roles = self.form.headings.roles
         axes = [axis for group in self.form.headings.groups for axis in group.axes]
-        lengths = [*axes, *(roles[role] for role in ("u", "diameter") if role in roles)]
+        others = [roles[role] for role in ("u", "diameter") if role in roles]
+        lengths = [*axes, *(column for column in others if column.constant is None)]
         for column in lengths:
             unit = column.unit or self.form.units.get(column.place) or stated or once
             if unit is None and column not in axes and found:
@@ -293,6 +295,9 @@ class _Reader:
                 return math.nan
 
         u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
+        of_all = math.nan
+        if u is not None and (constant := roles["u"].constant) is not None:
+            u, of_all = None, parse_positive_length(constant)
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
                 break
@@ -308,7 +313,7 @@ class _Reader:
                         messages.append(mark.message("", f"no {role}; write its name"))
                 names.append(own)
             x = [number(cells, i, mark) for i in axes]
-            x.append(math.nan if u is None else number(cells, u, mark))
+            x.append(of_all if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
                 x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
             x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
@@ -368,6 +373,8 @@ class _Reader:
         ]
         if "k" in headings.roles:
             parts.append("u is the expanded uncertainty divided by its coverage factor k")
+        if "u" in headings.roles and (u := headings.roles["u"].constant) is not None:
+            parts.append(f"u is {u} in all rows")
         if len(headings.groups) > 1:
             of = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
             parts.append(f"co-ordinates of {of} side by side")
