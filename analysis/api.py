@@ -445,7 +445,7 @@ def fit(
     reason = misused(components, reweight, sigma)
     if reason:
         raise ValueError(reason)
-    said = {"columns": columns, "unit": unit, "coordinates": coordinates}
+    said: dict[str, object] = {"columns": columns, "unit": unit, "coordinates": coordinates}
     said |= {"names": names, "swap_names": swap_names}
     chosen = _experiment(experiment).with_readings(said)
     tables, stated = _tables(readings, chosen), len(chosen.doubts)

@@ -114,10 +114,10 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
 def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
     from ballplate.simulator.computing.internal_error import InternalError
-    from ballplate.simulator.computing.own_code import own_frame
-    from ballplate.simulator.computing.own_code import told as told_in_words
     from ballplate.simulator.computing.unusable import UnusableError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
+    from ballplate.simulator.inputs.own_code import own_frame
+    from ballplate.simulator.inputs.own_code import told as told_in_words
 
     try:
         check_outputs(options)

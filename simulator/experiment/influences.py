@@ -92,17 +92,7 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
     if twice:
         text = f"{twice[0]} is stated by two of them; remove it from one"
         raise ExperimentError([experiment.message(("influences",), text)])
-    shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
-    if is_pool:
-        poses = ~disturbed.positions.held[disturbed.posed_positions]
-        shared -= int(poses.sum()) + sum(one.position >= 0 for one in parameters)
-    if shared > MOST_SHARED:
-        text = (
-            f"their {len(parameters)} parameters make {shared} besides the balls; at most"
-            f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
-            " of single positions as exact"
-        )
-        raise ExperimentError([experiment.message(("influences",), text)])
+    _refuse_too_many(disturbed, experiment, is_pool)
     known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
     priors, none = design.of(Priors), np.full(len(known), -1)
     stated = [parameters[k] for k in known]
@@ -118,6 +108,25 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
             np.append(np.full(len(priors), -1), known),
         )
     )
+
+
+def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -> None:
+    """Refuse more parameters than there is memory for.
+
+    :raises ExperimentError: there are.
+    """
+    parameters = disturbed.influence_parameters
+    shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
+    if is_pool:
+        poses = ~disturbed.positions.held[disturbed.posed_positions]
+        shared -= int(poses.sum()) + sum(one.position >= 0 for one in parameters)
+    if shared > MOST_SHARED:
+        text = (
+            f"their {len(parameters)} parameters make {shared} besides the balls; at most"
+            f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
+            " of single positions as exact"
+        )
+        raise ExperimentError([experiment.message(("influences",), text)])
 
 
 def _of_class(experiment: Experiment, i: int, text: str) -> ExperimentError:

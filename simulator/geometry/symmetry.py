@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machines.protocol import Array
-from .motions import fit_motion
+from .motions import Array, fit_motion
 
 # Pairs of points that a turn may lead to, which are tried at most.
 MOST_PAIRS = 4000

@@ -245,7 +245,7 @@ def _values(
     units = _units(block)
     stated = _uncertainty(block)
     for k, value in enumerate(values[: MOST_NAMES + 1]):
-        own = (labels[k],) if len(labels) == len(values) else ()
+        own: tuple[str, ...] = (labels[k],) if len(labels) == len(values) else ()
         if not labels:
             texts = [each[k] for each in beside if len(each) == len(values)]
             own = tuple(dict.fromkeys((" ".join(texts), *texts))) if texts else ()

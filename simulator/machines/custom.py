@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..computing.own_code import own_frame, told
+from ..inputs.own_code import own_frame, told
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
 from .protocol import Array, ErrorModel, Parameter

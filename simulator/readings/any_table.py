@@ -150,8 +150,8 @@ class _Reader:
         rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
         self._refuse_doubtful(rows, is_possible)
         hints = self._of_positions(texts.get("position", ""))
-        told = (self._told(units, told),)
-        return TableRows(tuple(rows), told, diameters, hints, times=self._times())
+        said = (self._told(units, told),)
+        return TableRows(tuple(rows), said, diameters, hints, times=self._times())
 
     def _refuse_wrong(self) -> None:
         form, headings = self.form, self.form.headings

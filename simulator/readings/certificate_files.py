@@ -233,16 +233,21 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
     if problems:
         raise ExperimentError(sorted(problems)[:MOST_MESSAGES])
     found = with_values(experiment, values)
+    wrong = [Message(str(path), 1, 1, "", text) for text in _wrong_together(found)]
+    if wrong:
+        raise ExperimentError(wrong)
+    return replace(found, doubts=(*experiment.doubts, *_doubts_of_stars(path, found, experiment)))
+
+
+def _wrong_together(found: Experiment) -> Iterator[str]:
+    """What is wrong with certified values of which each is possible."""
     for one in found.calibration:
         if text := one.doubt(found.layouts[one.artefact]):
-            problems.append(Message(str(path), 1, 1, "", text))
+            yield text
     plates = [name for name, one in found.artefacts.items() if one.role != "length_standard"]
     calibrations = dict(enumerate(found.calibration))
     for _, text in exact_contradictions(calibrations, plates, found.layouts):
-        problems.append(Message(str(path), 1, 1, "", text))
-    if problems:
-        raise ExperimentError(problems)
-    return replace(found, doubts=(*experiment.doubts, *_doubts_of_stars(path, found, experiment)))
+        yield text
 
 
 def _doubts_of_stars(

@@ -76,16 +76,16 @@ def read_readings(
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
     """
-    d, settings = design.dimension, settings or no_settings()
+    d, asked = design.dimension, settings or no_settings()
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
     units = {name: one for kind in design.influences for name, one in kind.columns.items()}
     empty = AXES[:d] if design.positions.across is not None else ()
 
     def is_possible(x: Array) -> bool:
-        return settings.coordinates == "part" or not far_outside(x, design).any()
+        return asked.coordinates == "part" or not far_outside(x, design).any()
 
-    found = source_rows(sources, design, settings, messages, is_possible, units, empty)
+    found = source_rows(sources, design, asked, messages, is_possible, units, empty)
     rows, settings = found.rows, found.settings
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])

@@ -7,7 +7,7 @@ import sysconfig
 import traceback
 from pathlib import Path
 
-from ..inputs.settings import shorten
+from .settings import shorten
 
 # Packages that the program uses, by their folders.
 LIBRARIES = frozenset(
