@@ -10,8 +10,10 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.geometry.symmetry import turns_onto_itself
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.digits import doubts_about_digits
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -142,7 +144,7 @@ def test_exchanged_names_of_positions_are_told_as_such(
         bp.fit(experiment, exchanged(readings, first, second))
     text = str(refused.value)
     assert f"other positions were planned, {first} where {second}, {second} where {first}" in text
-    assert "exchange the names of the positions" in text and "turned" not in text
+    assert "exchange the names of positions" in text and "turned" not in text
 
 
 def test_exchanged_names_of_positions_that_are_not_turned(
@@ -170,12 +172,8 @@ def test_a_plate_that_was_turned_is_told_as_that(
 def test_digits_that_are_coarser_than_the_repeatability_are_warned_of(
     digits: int, unit: float, experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
-    columns = {
-        axis.replace("mm", "in") if unit != 1.0 else axis: (readings[axis] / unit).round(digits)
-        for axis in AXES
-    }
-    table = readings.drop(columns=AXES).assign(**columns)
-    doubts = [one for one in bp.fit(experiment, table).warnings if "no digit below" in one]
+    x = (readings[AXES] / unit).round(digits).to_numpy() * unit / 1e3
+    doubts = doubts_about_digits(lay_out(experiment), x, None)
     # Half of the repeatability, 0.2 um, against the standard deviation of rounding.
     assert bool(doubts) == (1e-3 * unit * 10.0**-digits / np.sqrt(12.0) > 0.1e-6)
     if doubts:
@@ -187,5 +185,7 @@ def test_digits_that_are_coarser_than_the_repeatability_are_warned_of(
 def test_a_stated_uncertainty_is_what_digits_are_compared_with(
     experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
-    table = readings.assign(**{axis: readings[axis].round(3) for axis in AXES}, u_um=1.0)
-    assert not any("no digit below" in one for one in bp.fit(experiment, table).warnings)
+    table = readings.assign(**{axis: readings[axis].round(3) for axis in AXES})
+    assert any("no digit below 1 µm" in one for one in bp.fit(experiment, table).warnings)
+    fitted = bp.fit(experiment, table.assign(u_um=1.0))
+    assert not any("no digit below" in one for one in fitted.warnings)
