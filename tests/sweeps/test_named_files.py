@@ -96,7 +96,8 @@ def test_readings_of_the_base_stay_where_they_are(folder: Path) -> None:
     )
     (folder / "s.yaml").write_text(axis)
     assert names(folder) == ["balls.csv", "e.yaml", "other.csv", "s.yaml", "third.csv"]
-    curves = "true_machine: {kind: curves, files: [../lab.csv]}\n"
+    (folder.parent / "curve.csv").write_text("position_mm,EXX_um\n0,0\n500,1\n1000,2\n")
+    curves = "true_machine: {kind: curves, files: [../curve.csv]}\n"
     (folder / "e.yaml").write_text(EXPERIMENT.replace("variants:", f"{stated}{curves}variants:"))
     with pytest.raises(ExperimentError, match="outside the folders of the sweep"):
         load_sweep(folder / "s.yaml")
