@@ -127,8 +127,6 @@ def _run(options: argparse.Namespace) -> int:
     from ballplate.simulator.computing.internal_error import InternalError
     from ballplate.simulator.computing.unusable import UnusableError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
-    from ballplate.simulator.inputs.own_code import own_frame
-    from ballplate.simulator.inputs.own_code import told as told_in_words
 
     try:
         check_outputs(options)
@@ -151,15 +149,15 @@ def _run(options: argparse.Namespace) -> int:
         return internal_error(error)
     except Exception as error:
         from .memory import no_memory
+        from .own_code import told_of_own_code
 
         shortage = no_memory(error, options)
         if shortage is not None:
             print(shortage, file=sys.stderr)
             return BAD_FILE
-        frame = own_frame(error)
-        if frame is not None:
-            text = f"{frame.filename}:{frame.lineno}: in {frame.name}, code of your own:"
-            print(in_one_line(f"{text} {told_in_words(error, None)}"), file=sys.stderr)
+        own = told_of_own_code(error, options)
+        if own:
+            print(in_one_line(own), file=sys.stderr)
             return BAD_FILE
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)
