@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,12 +33,12 @@ SAME = ("arrangement", "lower", "upper", "origin", "full_rotations", "spatial", 
 @dataclass(frozen=True)
 class ComparisonSettings:
     """How maps are compared: with which `coverage_factor`, on a grid of so many points along each
-    axis, or at `points` (n, d) in metres, and with which probe.
+    axis, or at `points` (n, d) in metres or those of a file, and with which probe.
     """
 
     coverage_factor: float = 2.0
     grid: int = 4
-    points: Array | None = None
+    points: Array | Path | None = None
     probe: str | None = None
 
 
@@ -91,9 +92,7 @@ class NotComparableError(ValueError):
 
 
 @single_threaded
-def compared(
-    first: ComparedMap, second: ComparedMap, settings: ComparisonSettings
-) -> Comparison:
+def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettings) -> Comparison:
     """Compare two maps.
 
     :raises NotComparableError: machines of other dimensions or volumes, no common probe, or points
@@ -101,7 +100,9 @@ def compared(
     """
     if first.dimension != second.dimension:
         found = f"{first.dimension} and {second.dimension}"
-        raise NotComparableError(f"the machines have {found} axes; compare maps of the same machine")
+        raise NotComparableError(
+            f"the machines have {found} axes; compare maps of the same machine"
+        )
     volume = _common_volume(first, second)
     probe, offsets = _offsets(first, second, settings.probe)
     freedom = first.degrees_of_freedom, second.degrees_of_freedom
@@ -111,7 +112,9 @@ def compared(
         both = (one.displacements(points, offset) for one in (first, second))
         return Difference(*both, freedom)
 
-    points = _grid(volume, settings.grid) if settings.points is None else settings.points
+    points = settings.points
+    if not isinstance(points, np.ndarray):
+        points = _grid(volume, settings.grid)
     _refuse_outside(points, volume)
     found, offset = at(points, offsets[probe]), offsets[probe]
     middle = points.mean(axis=0)
@@ -194,7 +197,9 @@ def _refuse_outside(points: Array, volume: Volume) -> None:
     outside = (points < volume.lower - slightly) | (points > volume.upper + slightly)
     if outside.any():
         where = _place(points[int(outside.any(axis=1).argmax())])
-        raise NotComparableError(f"the point {where} is outside the volume of both maps; leave it out")
+        raise NotComparableError(
+            f"the point {where} is outside the volume of both maps; leave it out"
+        )
     if not 2 <= len(points) <= MOST_POINTS:
         raise NotComparableError(f"{len(points)} points; give 2 to {MOST_POINTS}")
 
@@ -271,7 +276,9 @@ def _functions(
         if one is None or other is None or whole is None or others is None:
             continue
         words = (name,) if constant else tuple(f"{name} at {100 * place:.0f} %" for place in t)
-        figures = Difference(one, other, freedom).group(name, parameter.unit, words, coverage_factor)
+        figures = Difference(one, other, freedom).group(
+            name, parameter.unit, words, coverage_factor
+        )
         test = Difference(whole, others, freedom).joint_test(name)
         found.append(FunctionDifference(name, parameter.meaning, figures, test))
     return tuple(found), "" if found else "the models have no error functions of one variable"
@@ -317,8 +324,3 @@ def _whole(at: Any, volume: Volume, offsets: dict[str, Array], count: int) -> Jo
     ]
     found = Difference(joined[0], joined[1], parts[0].freedom)
     return found.without(basis).joint_test("errors through the volume")
-
-
-def corners_of(volume: Volume) -> Array:
-    """The corners (2^d, d) of a volume."""
-    return np.array(list(product(*zip(volume.lower, volume.upper, strict=True))))

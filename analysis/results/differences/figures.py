@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.estimation.covariance import blank
+from ballplate.simulator.computing.rounding import blank, comparable
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
@@ -77,7 +77,7 @@ class FigureGroup:
         """Place of the largest |E_n|; None where nothing is compared."""
         if not self.count:
             return None
-        return int(np.nanargmax(np.abs(self.normalised)))
+        return int(comparable(np.nan_to_num(np.abs(self.normalised))).argmax())
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,9 @@ class Difference:
         found = self.by(basis.T)
         null = np.concatenate([one.null for one in (found.first, found.second)], axis=1)
         if null.shape[1]:
-            size = max(float(np.abs(one.size).max(initial=0.0)) for one in (found.first, found.second))
+            size = max(
+                float(np.abs(one.size).max(initial=0.0)) for one in (found.first, found.second)
+            )
             open_ = orthonormal(null, 1e-7 * size)
             left = np.linalg.svd(np.eye(len(null)) - open_ @ open_.T)[0]
             found = found.by(left[:, : len(null) - open_.shape[1]].T)

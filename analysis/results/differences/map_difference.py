@@ -9,8 +9,12 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from ballplate.simulator.computing.rounding import comparable
+
 from ...presentation.formatting import aligned, finite, number
 from ...presentation.result import Result
+from ..adjustments import FEW
 from .compared_maps import MOTIONS, ComparedMap
 from .comparison import Comparison
 from .figures import FigureGroup, JointTest
@@ -88,8 +92,8 @@ class MapDifference(Result):
         lines = [
             f"{self.label}: {self.title}",
             (
-                f"differences are what {self.second.label} says less what {self.first.label} says of"
-                f" the same scale readings{probe}; U = {k:g} u, E_n = difference / U"
+                f"differences are what {self.second.label} says less what {self.first.label} says"
+                f" of the same scale readings{probe}; U = {k:g} u, E_n = difference / U"
             ),
             self._assumption(),
             "",
@@ -113,8 +117,11 @@ class MapDifference(Result):
             f"warning: sigma of {one.label} comes from {one.degrees_of_freedom:g} degrees of"
             f" freedom; with so few, more than {_share(0.0455)} exceed |E_n| = 1 by chance"
             for one in (self.first, self.second)
-            if one.degrees_of_freedom < 10
+            if one.degrees_of_freedom < FEW
         ]
+        for one in (self.first, self.second):
+            cautions = () if one.fit is None else one.fit.cautions
+            found += [f"warning: {one.label}: {caution}" for caution in cautions]
         return tuple(found)
 
     def _assumption(self) -> str:
@@ -127,8 +134,8 @@ class MapDifference(Result):
         if self.shared is None:
             return INDEPENDENT
         return (
-            f"{self.shared} certified values are the same in both campaigns: their errors cancel, as"
-            " far as both estimates follow them; everything else is taken to be independent"
+            f"{self.shared} certified values are the same in both campaigns: their errors cancel,"
+            " as far as both estimates follow them; everything else is taken to be independent"
         )
 
     def _motion_table(self) -> list[str]:
@@ -176,7 +183,7 @@ class MapDifference(Result):
             )
         lines.append(
             "a single |E_n| > 1 among many figures shows nothing, since about as many as stated by"
-            f" chance exceed 1; the joint test counts, and errs once in {round(1 / LEVEL)}"
+            f" chance exceed 1; joint tests count, and each errs once in {round(1 / LEVEL)}"
         )
         return lines
 
@@ -218,8 +225,8 @@ class MapDifference(Result):
             )
         count = sum(one.test is not None for one in self.comparison.functions)
         told = (
-            f"({count} tests: the smallest p of as many is below {LEVEL / max(count, 1):.2g} once in"
-            f" {round(1 / LEVEL)} where nothing has changed)"
+            f"({count} tests: the smallest p of as many is below {LEVEL / max(count, 1):.2g} once"
+            f" in {round(1 / LEVEL)} where nothing has changed)"
         )
         return [*aligned(rows, [False, True, False, True, True, True]), told]
 
@@ -321,20 +328,17 @@ def _told(group: FigureGroup) -> list[int]:
     """Figures of a group that are told one by one."""
     if len(group.names) <= TOLD:
         return list(range(len(group.names)))
-    ranked = sorted(range(len(group.names)), key=lambda k: -abs(_or_zero(group.normalised[k])))
-    return ranked[:LARGEST]
-
-
-def _or_zero(value: float) -> float:
-    return 0.0 if math.isnan(value) else float(value)
+    sizes = comparable(np.nan_to_num(np.abs(group.normalised)))
+    found: list[int] = np.argsort(-sizes, kind="stable")[:LARGEST].tolist()
+    return found
 
 
 def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
     """Groups of several units as one, of differences in their own standard uncertainties."""
-    import numpy as np
-
     compared = [one.is_compared | np.isnan(one.standard_uncertainties) for one in groups]
-    open_ = [np.isnan(one.standard_uncertainties[w]) for one, w in zip(groups, compared, strict=True)]
+    open_ = [
+        np.isnan(one.standard_uncertainties[w]) for one, w in zip(groups, compared, strict=True)
+    ]
     u = np.where(np.concatenate(open_), np.nan, 1.0)
     normalised = [one.normalised[which] for one, which in zip(groups, compared, strict=True)]
     names = (

@@ -24,6 +24,10 @@ from .compared_maps import ComparedMap
 SINGLE = (CalibratedDistances, CalibratedCoordinates)
 
 
+class NothingSharedError(ValueError):
+    """Two campaigns of which it is not known that they share anything."""
+
+
 @dataclass(frozen=True, eq=False)
 class CertifiedErrors:
     """Errors of certified values that have a common cause: what one standard deviation of each
@@ -46,11 +50,11 @@ def with_shared_certificates(
     Values are the same if they are of the same balls, or lengths, and certified alike with the same
     uncertainty.
 
-    :raises ValueError: a map without its fit, or campaigns that have no certified value in common.
+    :raises NothingSharedError: a map without its fit, or campaigns that have no certified value in common.
     """
     if first.fit is None or second.fit is None:
         one = first if first.fit is None else second
-        raise ValueError(
+        raise NothingSharedError(
             f"{one.label} does not hold what certificates do to it; compare fits, or experiment"
             " files that name their readings"
         )
@@ -58,7 +62,7 @@ def with_shared_certificates(
     common = [key for key in both[0] if key in both[1]]
     count = sum(len(both[0][key].errors) for key in common)
     if not count:
-        raise ValueError(
+        raise NothingSharedError(
             "the campaigns have no certified value in common, of the same balls with the same"
             " value and uncertainty; leave out the shared certificate"
         )
