@@ -175,10 +175,11 @@ class MapDifference(Result):
     def _test_lines(self) -> list[str]:
         lines = []
         for one in self.tests:
-            over = "" if math.isinf(one.degrees_of_freedom) else ", F"
+            freedom = one.degrees_of_freedom
+            scatter = "" if math.isinf(freedom) else f" (sigma of {freedom:.0f} degrees of freedom)"
             lines.append(
                 f"{one.what}, one joint test: chi-squared {number(one.statistic)} of"
-                f" {one.dimensions} independent differences{over}, p = {_chance(one.p)}:"
+                f" {one.dimensions} independent differences{scatter}, p = {_chance(one.p)}:"
                 f" {_verdict(one)}"
             )
         lines.append(

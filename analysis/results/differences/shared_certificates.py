@@ -50,7 +50,8 @@ def with_shared_certificates(
     Values are the same if they are of the same balls, or lengths, and certified alike with the same
     uncertainty.
 
-    :raises NothingSharedError: a map without its fit, or campaigns that have no certified value in common.
+    :raises NothingSharedError: a map without its fit, or campaigns that have no certified value in
+        common.
     """
     if first.fit is None or second.fit is None:
         one = first if first.fit is None else second
