@@ -102,7 +102,9 @@ def next_step(
     for name, readings, more in counted(additions, "positions to come", len(additions), report):
         planned = _planned(more, goal, sigma)
         offered.append(Offered(name, readings, judge(goal, planned), planned))
-    return replace(found, offered=tuple(sorted(offered, key=lambda one: one.order)))
+    # What nothing can be estimated without comes first.
+    offered.sort(key=lambda one: (fit is None and one.name not in found.missing, one.order))
+    return replace(found, offered=tuple(offered))
 
 
 def sigmas(fit: Fit) -> tuple[float, float]:

@@ -32,8 +32,8 @@ class ObservedReadings:
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the
     design did not foresee. `marks` tell where each reading stands; of the mean of several, where
     the first does. `told` is how tables were read, `redone` what was left out of them because it
-    was read again, and `of_offsets` what is doubtful about offsets of probes in them, and about part
-    co-ordinates that two positions have alike.
+    was read again, and `of_offsets` what is doubtful about offsets of probes in them, and about
+    part co-ordinates that two positions have alike.
     """
 
     design: Design

@@ -41,10 +41,9 @@ def without_redone(
                 del found[:surplus]
         earlier = kept.get(position, [])
         count = Counter(rows[i].texts for i in earlier)
-        if any(count[texts] + len(found) > planned[texts] for texts, found in own.items()):
-            if any(count[texts] for texts in own):
-                left_out[position] = left_out.get(position, 0) + len(earlier)
-                earlier = []
+        if any(0 < count[texts] > planned[texts] - len(found) for texts, found in own.items()):
+            left_out[position] = left_out.get(position, 0) + len(earlier)
+            earlier = []
         kept[position] = [*earlier, *(i for found in own.values() for i in found)]
     told = [
         f"{position} was read again: {_readings(count)} earlier are left out"
