@@ -5,7 +5,7 @@ next.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +33,13 @@ from .requirements.goals import Goal, check_goal, judge
 
 # One-sided level of the bound of sigma where it comes from few degrees of freedom.
 CONFIDENCE = 0.95
+
+# Of more positions than this the best are found by lengths between so many points first, and so
+# many of them are looked at closely.
+MOST_OFFERED, RANKED_BY, KEPT = 60, 40, 12
+
+# A position to be read next, the number of its readings, and the experiment with it.
+Addition = tuple[str, int, Experiment]
 
 
 @dataclass(frozen=True)
@@ -98,13 +105,27 @@ def next_step(
     if found.is_met:
         return found
     additions = list(_additions(experiment, possible, read))
+    if len(additions) > MOST_OFFERED:
+        points = experiment.evaluation.points[:RANKED_BY]
+        fewer = replace(experiment, evaluation=replace(experiment.evaluation, points=points))
+        ranked = _judged(_additions(fewer, possible, read), len(additions), goal, sigma, report)
+        best = {one.name for one in ranked[:KEPT]} | set(found.missing)
+        additions = [one for one in additions if one[0] in best]
+    offered = _judged(additions, len(additions), goal, sigma, report)
+    # What nothing can be estimated without comes first.
+    offered.sort(key=lambda one: fit is None and one.name not in found.missing)
+    return replace(found, offered=tuple(offered))
+
+
+def _judged(
+    additions: Iterable[Addition], count: int, goal: Goal, sigma: float, report: Report
+) -> list[Offered]:
+    """What positions to be read next achieve, the best first."""
     offered = []
-    for name, readings, more in counted(additions, "positions to come", len(additions), report):
+    for name, readings, more in counted(additions, "positions to come", count, report):
         planned = _planned(more, goal, sigma)
         offered.append(Offered(name, readings, judge(goal, planned), planned))
-    # What nothing can be estimated without comes first.
-    offered.sort(key=lambda one: (fit is None and one.name not in found.missing, one.order))
-    return replace(found, offered=tuple(offered))
+    return sorted(offered, key=lambda one: one.order)
 
 
 def sigmas(fit: Fit) -> tuple[float, float]:
@@ -203,7 +224,7 @@ def _planned(experiment: Experiment, goal: Goal, sigma: float) -> PlannedUncerta
 
 def _additions(
     experiment: Experiment, possible: Mapping[str, Position], read: Sequence[Read]
-) -> Iterator[tuple[str, int, Experiment]]:
+) -> Iterator[Addition]:
     """Positions that can be read next, by name with the number of their readings, and the
     experiment with what has been read and each.
 
