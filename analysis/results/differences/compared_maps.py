@@ -73,7 +73,9 @@ class ComparedMap:
     `shared` (n, q) is what one standard deviation of each value that both maps rest on changes.
     `degrees_of_freedom` are those of the scatter that the uncertainties come from, infinite where
     they are as stated. `offsets` are those of probes by name, `probe` the one that is meant where
-    none is named. `fit` has the balls of plates. `is_expected`: nothing was measured, and the map
+    none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
+    maps of the same model have them in common, as otherwise their spaces of errors would differ by
+    what is of second order. `fit` has the balls of plates. `is_expected`: nothing was measured, and the map
     is exact but for what is stated, of which `stated` is the standard uncertainty of lengths.
     """
 
@@ -93,6 +95,7 @@ class ComparedMap:
     is_expected: bool = False
     stated: LengthFunction | None = None
     shared_balls: Array | None = None
+    about: Array | None = None
 
     @property
     def dimension(self) -> int:
@@ -119,7 +122,8 @@ class ComparedMap:
     def rows(self, points: Array, offset: Array) -> Array:
         """Derivatives (n d, parameters) of the errors at `points` (n, d) by the parameters."""
         offsets = np.broadcast_to(offset, points.shape)
-        return self.model.jacobian(points, self.values, offsets).reshape(points.size, -1)
+        about = self.values if self.about is None else self.about
+        return self.model.jacobian(points, about, offsets).reshape(points.size, -1)
 
     def line(self, function: str, t: Array) -> Estimated | None:
         """An error function at fractions `t` (m,) of its axis; None where it has several lines."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -103,6 +103,7 @@ def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettin
         raise NotComparableError(
             f"the machines have {found} axes; compare maps of the same machine"
         )
+    first, second = _linearised_alike(first, second)
     volume = _common_volume(first, second)
     probe, offsets = _offsets(first, second, settings.probe)
     freedom = first.degrees_of_freedom, second.degrees_of_freedom
@@ -112,15 +113,21 @@ def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettin
         both = (one.displacements(points, offset) for one in (first, second))
         return Difference(*both, freedom)
 
-    points = settings.points
-    if not isinstance(points, np.ndarray):
-        points = _grid(volume, settings.grid)
+    reference = _grid(volume, settings.grid)
+    points = settings.points if isinstance(settings.points, np.ndarray) else reference
     _refuse_outside(points, volume)
     found, offset = at(points, offsets[probe]), offsets[probe]
-    middle = points.mean(axis=0)
-    moving = motions(points - middle).reshape(points.size, -1)
-    motion = found.by(np.linalg.pinv(moving))
-    left = found.without(orthonormal(moving))
+    # The motion is that of the volume, wherever points were asked for.
+    middle = reference.mean(axis=0)
+    moving = motions(reference - middle).reshape(reference.size, -1)
+    to_motion = np.linalg.pinv(moving)
+    motion = at(reference, offset).by(to_motion)
+    if points is reference:
+        left = found.without(orthonormal(moving))
+    else:
+        there = motions(points - middle).reshape(points.size, -1)
+        less = np.concatenate([np.eye(points.size), -there @ to_motion], axis=1)
+        left = at(np.concatenate([points, reference]), offset).by(less)
     names = tuple(
         f"{axis} at {place}" for place in map(_place, points) for axis in AXIS_NAMES[: len(middle)]
     )
@@ -148,6 +155,15 @@ def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettin
         plate_differences(first, second, k),
         _whole(at, volume, offsets, count),
     )
+
+
+def _linearised_alike(first: ComparedMap, second: ComparedMap) -> tuple[ComparedMap, ComparedMap]:
+    """Both maps with derivatives at the same parameters, where they have the same."""
+    both = [[(p.name, p.effect) for p in one.model.parameters] for one in (first, second)]
+    if type(first.model) is not type(second.model) or both[0] != both[1]:
+        return first, second
+    about = 0.5 * (first.values + second.values)
+    return replace(first, about=about), replace(second, about=about)
 
 
 def _common_volume(first: ComparedMap, second: ComparedMap) -> Volume:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.rounding import blank, comparable
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
@@ -15,7 +15,7 @@ from .compared_maps import Estimated
 # Standard uncertainties below this part of the largest of a group are rounding: the frame, or the
 # plate's axes, hold the figure.
 HELD = 1e-9
-# Parts of the largest singular value below which a direction is none.
+# Parts of the largest column below which what is left of another is rounding.
 NO_DIRECTION = 1e-9
 
 
@@ -171,8 +171,8 @@ class Difference:
                 float(np.abs(one.size).max(initial=0.0)) for one in (found.first, found.second)
             )
             open_ = orthonormal(null, 1e-7 * size)
-            left = np.linalg.svd(np.eye(len(null)) - open_ @ open_.T)[0]
-            found = found.by(left[:, : len(null) - open_.shape[1]].T)
+            left = orthonormal(np.eye(len(null)) - open_ @ open_.T, 1e-6)
+            found = found.by(left.T)
         spread, directions = np.linalg.eigh(found.covariance())
         is_uncertain = spread > HELD**2 * max(float(spread.max(initial=0.0)), 0.0)
         whitened = found.by((directions[:, is_uncertain] / np.sqrt(spread[is_uncertain])).T)
@@ -186,12 +186,16 @@ class Difference:
 
 
 def orthonormal(columns: Array, least: float | None = None) -> Array:
-    """An orthonormal basis (m, r) of the space of columns (m, n); singular values up to `least`, by
-    default a small part of the largest, are rounding.
+    """An orthonormal basis (m, r) of the space of columns (m, n); what is left of a column, up to
+    `least`, by default a small part of the largest, is rounding.
     """
-    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    limit = NO_DIRECTION * float(sizes.max(initial=0.0)) if least is None else least
-    return np.asarray(left[:, sizes > limit])
+    if not columns.size:
+        return np.zeros((len(columns), 0))
+    # With pivots: singular values would say the same, but are not always found.
+    basis, triangle, _ = scipy_linalg().qr(columns, mode="economic", pivoting=True)
+    sizes = np.abs(np.diagonal(triangle))
+    limit = NO_DIRECTION * float(sizes.max()) if least is None else least
+    return np.asarray(basis[:, sizes > limit])
 
 
 def _pooled(variances: list[Array], freedom: tuple[float, float]) -> Array:
