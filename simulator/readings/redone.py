@@ -46,11 +46,12 @@ def without_redone(
             earlier = []
         kept[position] = [*earlier, *(i for found in own.values() for i in found)]
     told = [
-        f"{position} was read again: {_readings(count)} earlier are left out"
+        f"{position} was read again: {_readings(count)} taken before are left out"
         for position, count in left_out.items()
     ]
     told += [
-        f"{position}: {_readings(count)} repeated at once are left out, the last count"
+        f"{position}: of {_readings(count)} {'that are' if count > 1 else 'that is'} repeated the"
+        " last counts"
         for position, count in repeated.items()
     ]
     chosen = sorted(i for members in kept.values() for i in members)

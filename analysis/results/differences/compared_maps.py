@@ -75,8 +75,9 @@ class ComparedMap:
     they are as stated. `offsets` are those of probes by name, `probe` the one that is meant where
     none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
     maps of the same model have them in common, as otherwise their spaces of errors would differ by
-    what is of second order. `fit` has the balls of plates. `is_expected`: nothing was measured, and the map
-    is exact but for what is stated, of which `stated` is the standard uncertainty of lengths.
+    what is of second order. `fit` has the balls of plates. `is_expected`: nothing was measured, and
+    the map is exact but for what is stated, of which `stated` is the standard uncertainty of
+    lengths.
     """
 
     label: str
