@@ -72,10 +72,10 @@ def next_step(
     :raises ExperimentError: a file is wrong, or names a position that is none.
     :raises GoalError: a goal about what the experiment does not have.
     """
-    possible = _positions(experiment)
-    first = _observed(_with_positions(experiment, list(possible.values())), sources)
+    possible = possible_positions(experiment)
+    first = _observed(with_positions(experiment, list(possible.values())), sources)
     names = _names_in_order(first, sources)
-    chosen = _with_positions(experiment, [possible[name] for name in names])
+    chosen = with_positions(experiment, [possible[name] for name in names])
     observed = _observed(chosen, sources)
     read = list(_read(chosen, observed))
     fit, why = _fitted(chosen, observed)
@@ -146,7 +146,7 @@ def sigmas(fit: Fit) -> tuple[float, float]:
     return sigma, max(sigma, math.sqrt(squares / float(chdtri(freedom, CONFIDENCE))))
 
 
-def _positions(experiment: Experiment) -> dict[str, Position]:
+def possible_positions(experiment: Experiment) -> dict[str, Position]:
     """All positions that may be read, by name: the file's own, then those of its pool."""
     pool = () if experiment.pool is None else experiment.pool.candidates
     candidates = (one.item for one in pool if isinstance(one.item, Position))
@@ -156,7 +156,7 @@ def _positions(experiment: Experiment) -> dict[str, Position]:
     return found
 
 
-def _with_positions(experiment: Experiment, positions: Sequence[Position]) -> Experiment:
+def with_positions(experiment: Experiment, positions: Sequence[Position]) -> Experiment:
     """The experiment with these positions alone, and what belongs to them."""
     found = placed_only(replace(experiment, positions=tuple(positions)))
     # What the rest leaves open is nothing that the file has to expect.
@@ -243,7 +243,7 @@ def _additions(
         else:
             positions.append(position)
         if count > 0:
-            yield name, count, _with_positions(experiment, positions)
+            yield name, count, with_positions(experiment, positions)
 
 
 def _closed(pool: Pool, taken: set[str]) -> set[str]:

@@ -136,7 +136,8 @@ class NextStep(Result):
     @property
     def notes(self) -> tuple[str, ...]:
         cautions = () if self.fit is None else (self.fit.untested,)
-        return tuple(f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
+        doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
+        return (*self.observed.told, *doubts)
 
     def to_dict(self) -> dict[str, Any]:
         fit = self.fit
@@ -165,7 +166,7 @@ class NextStep(Result):
                 {name: finite(one) if isinstance(one, float) else one for name, one in row.items()}
                 for row in self.rows()
             ],
-            "warnings": [one.removeprefix("warning: ") for one in self.notes],
+            "remarks": list(self.notes),
         }
 
     def rows(self) -> list[dict[str, Any]]:

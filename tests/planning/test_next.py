@@ -13,10 +13,10 @@ import pandas
 import pytest
 from ballplate.cli import main
 from ballplate.cli.watching import settled
-from ballplate.planning.next_position import next_step
+from ballplate.planning.next_position import next_step, possible_positions, with_positions
 from ballplate.planning.next_result import NextStep
 from ballplate.planning.requirements.goals import GoalError, parse_goal
-from ballplate.simulator.experiment.load import with_pool
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.yamltree import GivenText
 from scipy.stats import chi2
@@ -111,7 +111,7 @@ def small(positions: int) -> Experiment:
             "title": "few readings",
             "machine": {"volume": ["600 mm", "600 mm"], "repeatability": "0.5 um"},
             "error_model": {"kind": "metric"},
-            "artefacts": {"plate": {"kind": "square", "balls": 4, "size": "300 mm"}},
+            "artefacts": {"plate": {"kind": "square", "balls": 2, "size": "300 mm"}},
             "positions": [
                 {"name": f"P{k}", "corner": {"x": x, "y": "100 mm"}, "quarter_turns": turns}
                 for k, (x, turns) in enumerate(corners)
@@ -197,10 +197,10 @@ def test_an_interrupted_position_is_completed_first(readings: pandas.DataFrame) 
     line = found.lines()[0]
     assert found.fit is None and "nothing can be estimated yet (balls not read yet: " in line
     assert "next: rest of z low (12 readings)" in line and not found.is_met
-    later = judged(pandas.concat([readings.iloc[:125], readings.iloc[125:140]]))
+    later = judged(pandas.concat([readings.iloc[:100], readings.iloc[100:115]]))
     assert later.missing == {"x high": 35} and later.fit is not None
     rest = next(one for one in later.offered if one.name == "x high")
-    whole = judged(readings.iloc[:125])
+    whole = judged(readings.iloc[:100])
     same = next(one for one in whole.offered if one.name == "x high")
     assert (rest.readings, same.readings) == (35, 50)
     assert rest.average == pytest.approx(same.average, rel=1e-6, nan_ok=True)
@@ -210,19 +210,17 @@ def test_positions_come_from_the_pool(tmp_path: Path) -> None:
     path = tmp_path / "pool.yaml"
     sides = "  - {kind: distances, artefact: plate, pairs: all, standard_uncertainty: 0.5 um}\n"
     path.write_text(TEXT.replace("target_uncertainty", f"{sides}target_uncertainty", 1), "utf-8")
-    experiment = with_pool(bp.load(path))
+    (experiment,) = load(path, planning=True)
     assert experiment.pool is not None
-    from ballplate.planning.next_position import _positions, _with_positions
-
-    possible = _positions(experiment)
+    possible = possible_positions(experiment)
     names = list(possible)[:1]
-    read = _with_positions(experiment, [possible[name] for name in names])
+    read = with_positions(experiment, [possible[name] for name in names])
     found = judged(bp.simulate(read, 1), "U6 average 1 um", experiment)
     assert found.read == tuple(names) and found.next is not None
     assert {one.name for one in found.offered} == set(possible) - set(names)
     values = {
         name: bp.run(
-            _with_positions(experiment, [possible[one] for one in (*names, name)])
+            with_positions(experiment, [possible[one] for one in (*names, name)])
         ).quantities["U6"]
         for name in list(possible)[1:]
     }
@@ -231,8 +229,12 @@ def test_positions_come_from_the_pool(tmp_path: Path) -> None:
 
 
 def test_unknown_positions_and_targets_are_refused(readings: pandas.DataFrame) -> None:
-    with pytest.raises(bp.ExperimentError, match="z lwo"):
-        judged(readings.replace("z low", "z lwo").iloc[:25])
+    # Told by their places, names are found; nothing stands in these.
+    named = readings.replace("z low", "quite elsewhere").iloc[:25]
+    assert judged(named).read == ("z low",)
+    named["x_mm"] = np.random.default_rng(1).uniform(0.0, 1000.0, 25)
+    with pytest.raises(bp.ExperimentError, match="quite elsewhere"):
+        judged(named)
     with pytest.raises(GoalError, match="target_uncertainty"):
         judged(readings, "lengths", bp.quickstart().with_({"target_uncertainty": None}))
 

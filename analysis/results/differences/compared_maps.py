@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.motions import cross_matrices, pose_size
 from ballplate.simulator.inputs.quantities import LengthFunction
@@ -16,8 +18,9 @@ from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
 from ...error_maps.volumetric_errors import Volumetric
 from ..fit import Fit
 
-# Points at random in a volume at which a model is asked whether it can do a motion of its frame.
-POINTS = 200
+# Points at random in a volume, besides one for each parameter, at which a model is asked whether it
+# can do a motion of its frame.
+POINTS = 20
 # Largest part of a motion that may be left over where a model contains it.
 CONTAINED = 1e-6
 
@@ -142,14 +145,19 @@ class ComparedMap:
             basis @ self.shared[own],
         )
 
-    @property
+    @cached_property
     def held(self) -> tuple[str, ...]:
         """Motions of the frame, and turns of the probe, that conditions of the model's frame take
         out: none of its parameters can make them.
         """
+        return self._held()
+
+    @single_threaded
+    def _held(self) -> tuple[str, ...]:
         d, volume = self.dimension, self.volume
         generator = np.random.default_rng(np.random.SeedSequence(0))
-        x = generator.uniform(volume.lower, volume.upper, (POINTS, d))
+        count = POINTS + len(self.values)
+        x = generator.uniform(volume.lower, volume.upper, (count, d))
         offsets = 0.1 * volume.size.max() * generator.uniform(-1.0, 1.0, x.shape)
         wanted = np.concatenate([motions(x), motions(offsets)[:, :, d:]], axis=2)
         wanted = wanted.reshape(x.size, -1)

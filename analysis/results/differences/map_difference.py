@@ -279,11 +279,11 @@ class MapDifference(Result):
         """One row for each figure that is compared, or undetermined."""
         found = []
         for group in self.comparison.groups:
-            normalised = group.normalised
+            normalised, is_compared = group.normalised, group.is_compared
             for k, name in enumerate(group.names):
                 u = float(group.standard_uncertainties[k])
                 is_open = math.isnan(u)
-                if not is_open and not group.is_compared[k]:
+                if not is_open and not is_compared[k]:
                     continue
                 difference = math.nan if is_open else float(group.differences[k])
                 row = {
