@@ -104,7 +104,7 @@ def map_path(text: str) -> Path:
 
 
 def coverage_factor(text: str) -> float:
-    """Read a coverage factor from the command line."""
+    """Argument type: a coverage factor."""
     value = number(text)
     if not 0.0 < value <= 100.0:
         raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')

@@ -205,7 +205,8 @@ def _triangle(settings: MapSettings, size: int, problems: Problems) -> Array:
         return found
     for k, row in enumerate(rows):
         found[k, : k + 1] = _numbers(row, k + 1, ("covariance", k), problems)
-    return found + np.tril(found, -1).T
+        found[:k, k] = found[k, :k]
+    return found
 
 
 def _directions(settings: MapSettings, size: int, problems: Problems) -> Array:
@@ -256,7 +257,7 @@ def _check_covariance(
         return
     variances = np.diagonal(covariance)
     for k in np.flatnonzero(variances < 0.0).tolist():
-        problems.add(("covariance", k), f"ends in the variance {variances[k]!r}, below zero")
+        problems.add(("covariance", k), f"ends in the variance {float(variances[k])!r}, below zero")
     if (variances < 0.0).any():
         return
     spread = np.where(variances > 0.0, np.sqrt(variances), 1.0)

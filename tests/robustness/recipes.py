@@ -58,6 +58,10 @@ RECIPES = (
         " --no-offsets"
     ),
     "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
+    "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
+    "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
+    "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
+    "correct map.yaml small-readings.csv --probe right --with-repeatability",
     "diff map.yaml map.npz --grid 2 --csv out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
     "diff map.yaml map.npz --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
