@@ -501,14 +501,12 @@ def diff(
     ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
     days = tuple(None if one is None else stated_day(one) for one in dates)
     known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
-    if isinstance(points, str | os.PathLike):
-        points = Path(points)
-    elif points is not None:
-        points = np.asarray(points, float)
+    is_file = isinstance(points, str | os.PathLike)
+    places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
     sides = [_side(name, one) for name, one in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
-        ComparisonSettings(coverage_factor, grid, points, probe),
+        ComparisonSettings(coverage_factor, grid, places, probe),
         shared is not None,
         None if known is None else known.standard,
         (days[0], days[1]),

@@ -22,6 +22,7 @@ DESCRIPTION = (
 LEAST, MOST = 2, 5
 
 
+# In one piece: one option after the other, with its help.
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "files",

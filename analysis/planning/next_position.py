@@ -43,7 +43,7 @@ Addition = tuple[str, int, Experiment]
 
 
 @dataclass(frozen=True)
-class Read:
+class ReadPosition:
     """Positions of which something has been read, in the order in which they were first; `whole`
     are all their planned readings, `position` those that were taken.
     """
@@ -184,13 +184,13 @@ def _names_in_order(observed: ObservedReadings, sources: Sequence[Source]) -> li
     return sorted(begun, key=lambda name: begun[name])
 
 
-def _read(experiment: Experiment, observed: ObservedReadings) -> Iterator[Read]:
+def _read(experiment: Experiment, observed: ObservedReadings) -> Iterator[ReadPosition]:
     design = observed.design
     for k, position in enumerate(experiment.positions):
         own = design.readings.select(np.flatnonzero(design.readings.position == k))
         first = int(design.balls.of(design.artefacts.names.index(position.artefact))[0])
         taken = tuple(reading_groups(own, first, design.probes.names, experiment, position))
-        yield Read(replace(position, readings=taken), position)
+        yield ReadPosition(replace(position, readings=taken), position)
 
 
 def _fitted(experiment: Experiment, observed: ObservedReadings) -> tuple[Fit | None, str]:
@@ -223,7 +223,7 @@ def _planned(experiment: Experiment, goal: Goal, sigma: float) -> PlannedUncerta
 
 
 def _additions(
-    experiment: Experiment, possible: Mapping[str, Position], read: Sequence[Read]
+    experiment: Experiment, possible: Mapping[str, Position], read: Sequence[ReadPosition]
 ) -> Iterator[Addition]:
     """Positions that can be read next, by name with the number of their readings, and the
     experiment with what has been read and each.

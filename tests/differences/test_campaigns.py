@@ -8,7 +8,7 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.differences.comparison import Comparison, ComparisonSettings, compared
+from ballplate.results.differences.comparison import ComparisonSettings, MapComparison, compared
 from ballplate.results.differences.figures import FigureGroup
 from ballplate.results.differences.shared_certificates import (
     NothingSharedError,
@@ -23,7 +23,7 @@ from tests.differences.campaigns import simulated_fit, simulated_map
 SETTINGS = ComparisonSettings()
 
 
-def pairs_of_campaigns(count: int, is_shared: bool = False) -> list[Comparison]:
+def pairs_of_campaigns(count: int, is_shared: bool = False) -> list[MapComparison]:
     """Comparisons of a machine with itself, each of two campaigns with one plate."""
     experiment, found = bp.quickstart(), []
     for k in range(count):
@@ -35,7 +35,7 @@ def pairs_of_campaigns(count: int, is_shared: bool = False) -> list[Comparison]:
     return found
 
 
-def shares(comparisons: Sequence[Comparison]) -> tuple[float, float]:
+def shares(comparisons: Sequence[MapComparison]) -> tuple[float, float]:
     """Mean share of |E_n| > 1 over all figures of a pair, and the standard deviation of the mean:
     figures of a pair are correlated, pairs are not.
     """
@@ -46,7 +46,7 @@ def shares(comparisons: Sequence[Comparison]) -> tuple[float, float]:
     return float(np.mean(each)), float(np.std(each, ddof=1) / np.sqrt(len(each)))
 
 
-def assert_joint_tests_are_right(comparisons: Sequence[Comparison]) -> None:
+def assert_joint_tests_are_right(comparisons: Sequence[MapComparison]) -> None:
     """Sums of independent chi-squared are chi-squared, whatever the number of pairs."""
     for tests in (
         [one.test for one in comparisons],
@@ -75,7 +75,7 @@ def test_one_figure_in_twenty_exceeds_by_chance(is_shared: bool) -> None:
     assert abs(np.mean(p < 0.05) - 0.05) < 3.0 * np.sqrt(0.05 * 0.95 / len(p))
 
 
-def along_x(found: Comparison) -> tuple[FigureGroup, int]:
+def along_x(found: MapComparison) -> tuple[FigureGroup, int]:
     """The length of the machine's x axis."""
     edges = next(one for one in found.lengths if one.kind == "edges")
     return edges, edges.names.index("(0, 0, 0) mm to (1000, 0, 0) mm")

@@ -34,7 +34,7 @@ MOTIONS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Estimated:
+class MappedValues:
     """Functions (m,) with their `values`, a square `root` (m, r) of their covariance, and how much
     undetermined directions change them, `null` (m, k), of what any could, `size` (m,).
 
@@ -47,9 +47,9 @@ class Estimated:
     size: Array
     shared: Array
 
-    def by(self, matrix: Array) -> Estimated:
+    def by(self, matrix: Array) -> MappedValues:
         """Linear functions of these, by a matrix (k, m)."""
-        return Estimated(
+        return MappedValues(
             matrix @ self.values,
             matrix @ self.root,
             matrix @ self.null,
@@ -57,15 +57,17 @@ class Estimated:
             matrix @ self.shared,
         )
 
-    def without(self, basis: Array) -> Estimated:
+    def without(self, basis: Array) -> MappedValues:
         """These less their parts in a space of changes of orthonormal columns (m, k)."""
 
         def rest(some: Array) -> Array:
             return np.asarray(some - basis @ (basis.T @ some))
 
         # Twice, because the second pass takes out what rounding left of a large part in the first.
-        parts = (rest(rest(one)) for one in (self.values, self.root, self.null))
-        return Estimated(*parts, self.size, rest(rest(self.shared)))
+        values, root, null, shared = (
+            rest(rest(one)) for one in (self.values, self.root, self.null, self.shared)
+        )
+        return MappedValues(values, root, null, self.size, shared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,7 @@ class ComparedMap:
         """2 or 3, the number of machine axes."""
         return self.model.dimension
 
-    def displacements(self, points: Array, offset: Array) -> Estimated:
+    def displacements(self, points: Array, offset: Array) -> MappedValues:
         """Errors (n d,) at scale readings `points` (n, d) of a tip with an `offset` (d,), in
         metres: where the tip is less where the scales say.
         """
@@ -115,7 +117,7 @@ class ComparedMap:
         drawn = self.model.jacobian(points, np.zeros(len(self.values)), offsets)
         drawn = drawn.reshape(rows.shape)
         effects = [one.effect for one in self.model.parameters]
-        return Estimated(
+        return MappedValues(
             (self.model.error(points, self.values, offsets) - offsets).ravel(),
             rows @ self.root,
             drawn @ self.undetermined,
@@ -129,7 +131,7 @@ class ComparedMap:
         about = self.values if self.about is None else self.about
         return self.model.jacobian(points, about, offsets).reshape(points.size, -1)
 
-    def line(self, function: str, t: Array) -> Estimated | None:
+    def line(self, function: str, t: Array) -> MappedValues | None:
         """An error function at fractions `t` (m,) of its axis; None where it has several lines."""
         lines = self.model.lines(function, t) if isinstance(self.model, HasLines) else ()
         if len(lines) != 1:
@@ -137,7 +139,7 @@ class ComparedMap:
         own = [k for k, one in enumerate(self.model.parameters) if one.function == function]
         basis = lines[0].basis
         effects = np.array([self.model.parameters[k].effect for k in own])
-        return Estimated(
+        return MappedValues(
             basis @ self.values[own],
             basis @ self.root[own],
             basis @ self.undetermined[own],

@@ -15,7 +15,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines, Integers
 
 from .compared_maps import MOTIONS, ComparedMap, motions
-from .figures import Difference, FigureGroup, JointTest, orthonormal
+from .normalised_errors import FigureGroup, JointTest, ValueDifference, orthonormal
 from .plates import PlateDifference, plate_differences
 
 # Places along an axis at which error functions are compared, by fractions of it.
@@ -53,7 +53,7 @@ class FunctionDifference:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class FrameMotion:
     """The free motion between the frames of two maps, with `names` and units: what has to be added
     to the errors of the first so that they come nearest to those of the second.
     """
@@ -64,7 +64,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class MapComparison:
     """All that is compared: `lengths` in groups, errors at `points` (n, d) after the `motion` was
     taken out, error functions, plates, and the test of the map as a whole.
     """
@@ -72,7 +72,7 @@ class Comparison:
     volume: Volume
     probe: str
     points: Array
-    motion: Motion
+    motion: FrameMotion
     lengths: tuple[FigureGroup, ...]
     places: FigureGroup
     functions: tuple[FunctionDifference, ...]
@@ -92,26 +92,26 @@ class NotComparableError(ValueError):
 
 
 @single_threaded
-def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettings) -> Comparison:
+def compared(
+    first: ComparedMap, second: ComparedMap, settings: ComparisonSettings
+) -> MapComparison:
     """Compare two maps.
 
     :raises NotComparableError: machines of other dimensions or volumes, no common probe, or points
         outside.
     """
     if first.dimension != second.dimension:
-        found = f"{first.dimension} and {second.dimension}"
-        raise NotComparableError(
-            f"the machines have {found} axes; compare maps of the same machine"
-        )
+        axes = f"{first.dimension} and {second.dimension}"
+        raise NotComparableError(f"the machines have {axes} axes; compare maps of the same machine")
     first, second = _linearised_alike(first, second)
     volume = _common_volume(first, second)
     probe, offsets = _offsets(first, second, settings.probe)
     freedom = first.degrees_of_freedom, second.degrees_of_freedom
     k = settings.coverage_factor
 
-    def at(points: Array, offset: Array) -> Difference:
-        both = (one.displacements(points, offset) for one in (first, second))
-        return Difference(*both, freedom)
+    def at(points: Array, offset: Array) -> ValueDifference:
+        one, other = (each.displacements(points, offset) for each in (first, second))
+        return ValueDifference(one, other, freedom)
 
     reference = _grid(volume, settings.grid)
     points = settings.points if isinstance(settings.points, np.ndarray) else reference
@@ -120,7 +120,7 @@ def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettin
     # The motion is that of the volume, wherever points were asked for.
     middle = reference.mean(axis=0)
     moving = motions(reference - middle).reshape(reference.size, -1)
-    to_motion = np.linalg.pinv(moving)
+    to_motion = np.asarray(np.linalg.pinv(moving))
     motion = at(reference, offset).by(to_motion)
     if points is reference:
         left = found.without(orthonormal(moving))
@@ -143,11 +143,11 @@ def compared(first: ComparedMap, second: ComparedMap, settings: ComparisonSettin
     lengths.append(_lengths(found, points, what, pairs, (first, second), k))
     functions, why = _functions(first, second, k)
     count = max(LEAST_POINTS, *(len(one.values) for one in (first, second)))
-    return Comparison(
+    return MapComparison(
         volume,
         probe,
         points,
-        Motion(MOTIONS[len(middle)], motion.values, motion.standard_uncertainties()),
+        FrameMotion(MOTIONS[len(middle)], motion.values, motion.standard_uncertainties()),
         tuple(lengths),
         left.group("errors at points of the volume", "m", names, k),
         functions,
@@ -237,7 +237,7 @@ def _of_corners(corners: Array) -> Iterator[tuple[str, Integers]]:
 
 
 def _lengths(
-    found: Difference,
+    found: ValueDifference,
     points: Array,
     kind: str,
     pairs: Integers,
@@ -292,10 +292,10 @@ def _functions(
         if one is None or other is None or whole is None or others is None:
             continue
         words = (name,) if constant else tuple(f"{name} at {100 * place:.0f} %" for place in t)
-        figures = Difference(one, other, freedom).group(
+        figures = ValueDifference(one, other, freedom).group(
             name, parameter.unit, words, coverage_factor
         )
-        test = Difference(whole, others, freedom).joint_test(name)
+        test = ValueDifference(whole, others, freedom).joint_test(name)
         found.append(FunctionDifference(name, parameter.meaning, figures, test))
     return tuple(found), "" if found else "the models have no error functions of one variable"
 
@@ -308,8 +308,10 @@ def _have_same_functions(one: ErrorModel, other: ErrorModel) -> bool:
         return False
     for name in SAME:
         ours, theirs = getattr(one, name, None), getattr(other, name, None)
-        is_model = isinstance(ours, HasLines)
-        if not (_have_same_functions(ours, theirs) if is_model else ours == theirs):
+        is_same = ours == theirs
+        if isinstance(ours, ErrorModel) and isinstance(theirs, ErrorModel):
+            is_same = _have_same_functions(ours, theirs)
+        if not is_same:
             return False
     return True
 
@@ -338,5 +340,5 @@ def _whole(at: Any, volume: Volume, offsets: dict[str, Array], count: int) -> Jo
         )
         for side, one in (("first", parts[0].first), ("second", parts[0].second))
     ]
-    found = Difference(joined[0], joined[1], parts[0].freedom)
+    found = ValueDifference(joined[0], joined[1], parts[0].freedom)
     return found.without(basis).joint_test("errors through the volume")

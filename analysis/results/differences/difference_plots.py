@@ -22,8 +22,8 @@ from ...presentation.svg import (
     scale_bar,
     sticks,
 )
-from .comparison import Comparison
-from .figures import FigureGroup
+from .comparison import MapComparison
+from .normalised_errors import FigureGroup
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ LONGEST = 0.15
 LEAST_END, MOST_MARKS = 2.0, 400
 
 
-def draw_difference(found: Comparison, words: str, path: str | Path | None = None) -> Figure:
+def draw_difference(found: MapComparison, words: str, path: str | Path | None = None) -> Figure:
     """The difference at points of the volume, those of |E_n| > 1 in a colour, and |E_n| of all
     figures in rows; it is written to the path, if there is one.
 
@@ -57,7 +57,7 @@ def draw_difference(found: Comparison, words: str, path: str | Path | None = Non
         return save(figure, path, words)
 
 
-def _vectors(axes: Axes, found: Comparison) -> None:
+def _vectors(axes: Axes, found: MapComparison) -> None:
     points, d = found.points, len(found.volume.lower)
     view, _ = projection(d)
     volume = box(found.volume.lower, found.volume.upper)

@@ -16,8 +16,8 @@ from ...presentation.formatting import aligned, finite, number
 from ...presentation.result import Result
 from ..adjustments import FEW
 from .compared_maps import MOTIONS, ComparedMap
-from .comparison import Comparison
-from .figures import FigureGroup, JointTest
+from .comparison import MapComparison
+from .normalised_errors import FigureGroup, JointTest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ class MapDifference(Result):
 
     first: ComparedMap
     second: ComparedMap
-    comparison: Comparison
+    comparison: MapComparison
     coverage_factor: float
     shared: int | None = None
 

@@ -10,8 +10,8 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES, fit_motion
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..fit import Fit
-from .compared_maps import ComparedMap, Estimated, motions
-from .figures import Difference, FigureGroup, JointTest, orthonormal
+from .compared_maps import ComparedMap, MappedValues, motions
+from .normalised_errors import FigureGroup, JointTest, ValueDifference, orthonormal
 
 # Balls of a plate beyond which it is not compared: their joint covariance takes too much memory.
 MOST_BALLS = 500
@@ -50,11 +50,11 @@ def plate_differences(
         )
         places = one.values.reshape(-1, d)
         rotation, origin = fit_motion(other.values.reshape(-1, d), places)
-        turned = other.by(np.kron(np.eye(len(common)), rotation))
+        turned = other.by(np.asarray(np.kron(np.eye(len(common)), rotation)))
         shifted = turned.values + np.tile(origin, len(common))
-        other = Estimated(shifted, turned.root, turned.null, turned.size, turned.shared)
+        other = MappedValues(shifted, turned.root, turned.null, turned.size, turned.shared)
         moving = motions(places - places.mean(axis=0)).reshape(places.size, -1)
-        left = Difference(one, other, freedom).without(orthonormal(moving))
+        left = ValueDifference(one, other, freedom).without(orthonormal(moving))
         names = tuple(f"{ball} {axis}" for ball in common for axis in AXIS_NAMES[:d])
         kind = f"balls of {name}"
         group = left.group(kind, "m", names, coverage_factor)
@@ -76,7 +76,7 @@ def _balls(fit: Fit, artefact: str) -> dict[str, int]:
     return {design.balls.names[ball]: int(ball) for ball in own}
 
 
-def _estimated(one: ComparedMap, index: Integers) -> Estimated:
+def _estimated(one: ComparedMap, index: Integers) -> MappedValues:
     """Co-ordinates (n d,) of the balls of indices (n,) in the frame of their artefact."""
     assert one.fit is not None
     moved = displacements(one.fit.functions.at, BallPlaces(index))
@@ -89,4 +89,4 @@ def _estimated(one: ComparedMap, index: Integers) -> Estimated:
     if one.shared_balls is not None:
         shared = one.shared_balls[index].reshape(n * d, -1)
     null = moved.null.reshape(n * d, -1)
-    return Estimated(moved.places.ravel(), root, null, moved.size.ravel(), shared)
+    return MappedValues(moved.places.ravel(), root, null, moved.size.ravel(), shared)

@@ -12,7 +12,6 @@ from ballplate.simulator.design.observations.coordinates import CalibratedCoordi
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.lengths import Lengths, length_name
-from ballplate.simulator.design.observations.python_values import PythonValues
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.machines.protocol import Array
@@ -79,16 +78,16 @@ def _certified(design: Design) -> Iterator[CertifiedErrors]:
     for one in design.observations:
         if isinstance(one, SINGLE):
             for k in range(len(one)):
-                own = np.zeros((1, len(one)))
-                own[0, k] = one.uncertainty[k]
-                yield _errors(one, (one.name(design, k),), [k], own)
+                single = np.zeros((1, len(one)))
+                single[0, k] = one.uncertainty[k]
+                yield _errors(one, (one.name(design, k),), [k], single)
         elif isinstance(one, Lengths):
             for number in np.unique(one.certificate).tolist():
                 own = np.flatnonzero(one.certificate == number).tolist()
                 errors = np.zeros((1, len(one)))
                 errors[0, own] = one.uncertainty[own]
                 yield _errors(one, (length_name(design, own[0], False),), own[:1], errors)
-        elif isinstance(one, JointValues | PythonValues):
+        elif isinstance(one, JointValues):
             names = tuple(one.name(design, k) for k in range(len(one)))
             start = 0
             for root in one.roots:

@@ -10,7 +10,7 @@ from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from .compared_maps import Estimated
+from .compared_maps import MappedValues
 
 # Standard uncertainties below this part of the largest of a group are rounding: the frame, or the
 # plate's axes, hold the figure.
@@ -98,11 +98,11 @@ class JointTest:
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
+class ValueDifference:
     """The same functions (m,) by two maps."""
 
-    first: Estimated
-    second: Estimated
+    first: MappedValues
+    second: MappedValues
     freedom: tuple[float, float]
 
     @property
@@ -110,13 +110,13 @@ class Difference:
         """What the second says less what the first does."""
         return self.second.values - self.first.values
 
-    def by(self, matrix: Array) -> Difference:
+    def by(self, matrix: Array) -> ValueDifference:
         """Linear functions of these, by a matrix (k, m)."""
-        return Difference(self.first.by(matrix), self.second.by(matrix), self.freedom)
+        return ValueDifference(self.first.by(matrix), self.second.by(matrix), self.freedom)
 
-    def without(self, basis: Array) -> Difference:
+    def without(self, basis: Array) -> ValueDifference:
         """These less their parts in a space of changes of orthonormal columns (m, k)."""
-        return Difference(self.first.without(basis), self.second.without(basis), self.freedom)
+        return ValueDifference(self.first.without(basis), self.second.without(basis), self.freedom)
 
     @property
     def is_open(self) -> NDArray[np.bool_]:
