@@ -62,10 +62,10 @@ def test_a_change_fails_where_that_is_asked(
 ) -> None:
     other = bp.quickstart().with_({"true_machine.seed": 8})
     bp.write_map(bp.fit(bp.quickstart(), bp.simulate(other, 3)).to_map(), tmp_path / "c.npz")  # type: ignore[attr-defined]
-    assert main(["diff", *maps, "--fail"]) == 0
-    assert main(["diff", maps[0], str(tmp_path / "c.npz"), "--fail"]) == 1
-    assert "a change is shown" in capsys.readouterr().out
-    found = printed(capsys, "diff", maps[0], str(tmp_path / "c.npz"))
+    assert main(["diff", *maps, "--fail", "--grid", "2"]) == 0
+    capsys.readouterr()
+    assert main(["diff", maps[0], str(tmp_path / "c.npz"), "--fail", "--grid", "2", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
     assert found["changed"] is True and found["years"] is None
     assert found["tests"][0]["p"] < 1e-6 and len(found["tests"]) == 19
 
@@ -78,7 +78,7 @@ def test_an_expected_map_is_compared_with(
     path = tmp_path / "measured.yaml"
     bp.write_map(fit.to_map(), path)  # type: ignore[attr-defined]
     machine = PARK / "machines" / "npl-like.yaml"
-    found = printed(capsys, "diff", str(machine), str(path))
+    found = printed(capsys, "diff", str(machine), str(path), "--grid", "2")
     assert found["changed"] is False and found["first"]["expected"] is True
     named = {row["figure"]: row for row in found["figures"]}
     edge = named["(0, 0, 0) mm to (900, 0, 0) mm"]
@@ -94,7 +94,9 @@ def test_an_expected_map_is_compared_with(
     lengths = [float(np.linalg.norm(one)) for one in expected]
     assert edge["difference"] == pytest.approx(lengths[0] - lengths[1], abs=2e-9)
     # What is stated of its lengths is added.
-    wider = printed(capsys, "diff", str(machine), str(path), "--stated", "4 um + L/100000")
+    wider = printed(
+        capsys, "diff", str(machine), str(path), "--stated", "4 um + L/100000", "--grid", "2"
+    )
     same = next(one for one in wider["figures"] if one["figure"] == edge["figure"])
     u = np.hypot(edge["standard uncertainty"], 0.5 * (4e-6 + 0.9e-5))
     assert same["standard uncertainty"] == pytest.approx(u, rel=1e-9)
@@ -155,6 +157,7 @@ def test_files_that_are_no_maps_are_refused(
         bp.diff(maps[0], 3)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_experiments_with_readings_share_a_certificate(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
