@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from .reproduction.score_result import CertifiedScores
     from .results.adjusted_machine import AdjustedMachine
     from .results.correction import Correction
+    from .results.differences.map_difference import MapDifference
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
@@ -468,6 +469,60 @@ def fit(
         offsets,
         components,
         reweight,
+    )
+
+
+def diff(
+    first: Fit | FittedMap | PathLike,
+    second: Fit | FittedMap | PathLike,
+    *,
+    points: PathLike | Sequence[Sequence[float]] | None = None,
+    grid: int = 4,
+    probe: str | None = None,
+    coverage_factor: float = 2.0,
+    shared: Literal["certificate"] | None = None,
+    stated: str | None = None,
+    dates: tuple[str | None, str | None] = (None, None),
+) -> MapDifference:
+    """What the second of two maps says less what the first does: lengths, errors at points after
+    the free motion of the frame is taken out, error functions, and balls of plates of two fits.
+
+    Each is a fit, what `to_map()` of one gives, or the path of a map file, of a machine file (an
+    expected map, with the expanded uncertainty `stated` of lengths, such as "0.5 um + L/1000000"),
+    or of an experiment file that names its readings. `points` (n, d) are in metres, or a CSV file
+    with x_mm, y_mm and z_mm; without any a `grid` of so many along each axis is taken. With
+    `shared` both fits rest on the same certificate, whose errors cancel. `dates` are days of the
+    campaigns, such as "2026-11-22".
+
+    :raises ValueError: the maps do not go together, or share no certificate.
+
+    >>> campaigns = [fit(quickstart(), simulate(quickstart(), seed)) for seed in (1, 2)]
+    >>> diff(*campaigns)
+    <MapDifference of second less first: no change is shown (p = 0.53)>
+    """
+    import numpy as np
+    from ballplate.simulator.inputs.days import stated_day
+    from ballplate.simulator.inputs.quantities import Target, parse_length_function
+
+    from .results.differences.comparison import ComparisonSettings
+    from .results.differences.sources import map_difference
+
+    ensure_whole(2, 5, grid=grid)
+    ensure_positive("a number above 0, such as 2", 100.0, coverage_factor=coverage_factor)
+    ensure_one_of(("certificate",), shared=shared)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
+    days = tuple(None if one is None else stated_day(one) for one in dates)
+    known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
+    is_file = isinstance(points, str | os.PathLike)
+    places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
+    sides = [_side(name, one) for name, one in (("first", first), ("second", second))]
+    return map_difference(
+        (sides[0], sides[1]),
+        ComparisonSettings(coverage_factor, grid, places, probe),
+        shared is not None,
+        None if known is None else known.standard,
+        (days[0], days[1]),
     )
 
 
@@ -936,6 +991,18 @@ def reproduce(
         return reproduce_npl(chosen, trials, folder, report)
     answers = None if results is None else Path(results)
     return score_certified(chosen, answers, folder, report)
+
+
+def _side(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
+    """A map to be compared: the path of a file as such."""
+    from .results.fit import Fit
+    from .simulator.maps.fitted_map import FittedMap
+
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    if not isinstance(given, Fit | FittedMap):
+        raise TypeError(f"{name}={given!r}; give a fit, what its to_map() gives, or a path")
+    return given
 
 
 def _several(name: str, given: Any) -> tuple[int, ...]:

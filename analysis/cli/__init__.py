@@ -22,8 +22,9 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *("check", "run", "plan", "sheet", "reach", "lengths", "reliability", "simulate", "import"),
-    *("fit", "certificate", "correct", "adjust", "compare", "sweep", "export", "report", "map"),
+    *("check", "run", "plan", "sheet", "next", "reach", "lengths", "reliability", "simulate"),
+    *("import", "fit", "certificate", "correct", "diff", "adjust", "compare"),
+    *("sweep", "export", "report", "map"),
     *("spline", "reproduce", "schema", "init"),
 )
 

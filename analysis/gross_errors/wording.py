@@ -28,7 +28,7 @@ CLEAR = 3.0
 
 def diagnosis_lines(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
     """A line for each thing suspected, mistakes first; `marks` tell where the readings stand."""
-    lines = [f"suspected: {words}" for words in _all_words(diagnosis, marks)]
+    lines = [f"suspected: {words}" for words in diagnosis_words(diagnosis, marks)]
     if len(diagnosis.suspects) == MOST:
         what = (
             "look for what these have in common, or state larger uncertainties, or a richer error"
@@ -38,7 +38,8 @@ def diagnosis_lines(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[st
     return lines
 
 
-def _all_words(diagnosis: Diagnosis, marks: Sequence[Mark]) -> list[str]:
+def diagnosis_words(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
+    """What is suspected, mistakes first."""
     words = [suspect_words(one, marks) for one in diagnosis.suspects]
     words += [scatter_words(diagnosis.scatter)] if diagnosis.scatter else []
     return words + ([unexplained_words(diagnosis.unexplained)] if diagnosis.unexplained else [])

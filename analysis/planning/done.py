@@ -103,7 +103,7 @@ def done_candidates(
         item = _position(candidate)
         own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
         first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
-        taken = tuple(_groups(own_readings, first, design.probes.names, experiment, item))
+        taken = tuple(reading_groups(own_readings, first, design.probes.names, experiment, item))
         result.append(_set_up(experiment, candidate, base, taken, as_read.name == name))
     return tuple(result)
 
@@ -158,7 +158,7 @@ def _position(candidate: Candidate) -> Position:
     return candidate.item
 
 
-def _groups(
+def reading_groups(
     own: Readings, first: int, probes: Sequence[str], experiment: Experiment, item: Position
 ) -> Iterator[ReadingGroup]:
     """Readings as groups, of those of equal uncertainty and repeats; balls are counted from `first`

@@ -31,9 +31,10 @@ class ObservedReadings:
 
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the
     design did not foresee. `marks` tell where each reading stands; of the mean of several, where
-    the first does. `told` is how tables were read, `of_offsets` what is doubtful about offsets of
-    probes in them, and about part co-ordinates that two positions have alike; `of_certificate` what
-    is doubtful about values of a certificate that came with them.
+    the first does. `told` is how tables were read, `redone` what was left out of them because it
+    was read again, and `of_offsets` what is doubtful about offsets of probes in them, and about
+    part co-ordinates that two positions have alike; `of_certificate` what is doubtful about values
+    of a certificate that came with them.
     """
 
     design: Design
@@ -44,6 +45,7 @@ class ObservedReadings:
     told: tuple[str, ...] = ()
     of_offsets: tuple[str, ...] = ()
     of_certificate: tuple[str, ...] = ()
+    redone: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:

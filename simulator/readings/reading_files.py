@@ -27,6 +27,7 @@ from .gross_error_messages import refuse_gross_errors, with_names_swapped
 from .observed_readings import ObservedReadings, combine_standards, reading_keys
 from .offsets_applied import doubt_about_offsets, said_of
 from .reading_sources import Source, source_rows
+from .redone import without_redone
 
 AXES = ("x", "y", "z")
 
@@ -60,6 +61,7 @@ def read_readings(
     design: Design,
     every_ball: bool = True,
     settings: ReadingsSettings | None = None,
+    last_count: bool = False,
 ) -> ObservedReadings:
     """Readings of a file, or of several, as observations of a design.
 
@@ -70,7 +72,8 @@ def read_readings(
     reading has the uncertainty that the design plans for it, and one that is not planned the
     machine's repeatability. Influence quantities have further columns. A reading stands in the file
     no more often than the design plans it; one that is not planned, once. Unless `every_ball` has
-    to be read, some may be missing.
+    to be read, some may be missing. With `last_count` those of positions that were read again
+    replace the earlier ones, which is `redone` in words.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
@@ -85,7 +88,8 @@ def read_readings(
         return asked.coordinates == "part" or not design.machine.volume.far_outside(x).any()
 
     found = source_rows(sources, design, asked, messages, is_possible, units, empty)
-    rows, settings = found.rows, found.settings
+    settings = found.settings
+    rows, redone = without_redone(found.rows, design) if last_count else (found.rows, ())
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
@@ -147,7 +151,8 @@ def read_readings(
     if settings.coordinates == "part":
         doubt += doubts_about_copies(design, readings, given)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, told=(*found.told, *swapped, *said_of(settings)), of_offsets=doubt)
+    told = (*found.told, *swapped, *said_of(settings))
+    observed = replace(observed, told=told, of_offsets=doubt, redone=redone)
     refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)
     return observed

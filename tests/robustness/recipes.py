@@ -26,6 +26,9 @@ RECIPES = (
         "plan pool.yaml --done planned-readings.csv --moved --readings 12 --workers 1 --sheet"
         " sheet.md -o out.yaml"
     ),
+    "next small.yaml small-readings.csv",
+    "next planned.yaml planned-readings.csv --goal 'U6 average 1 um' --json",
+    "next tables.yaml tables-readings.csv --target '5 um' --share 95%",
     "reach small.yaml --by repeatability --goal 'U6 average 1 um' --fail",
     "reach small.yaml --by certificate --target '5 um' --json",
     "reach bar-bell.yaml --variant 'length known' --by certificate --calibration 0 --artefact bar",
@@ -71,6 +74,9 @@ RECIPES = (
     "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
+    "diff map.yaml map.npz --grid 2 --csv out.csv",
+    "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
+    "diff map.yaml map.npz --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"

@@ -1,0 +1,167 @@
+"""`ballplate next`: after each position, whether the target is met, and what to read next."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .common import add_file, add_json, number, percentage, show, single
+from .outputs import UsageError
+from .table_options import add_tables
+
+if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
+
+    from ..planning.next_result import NextStep
+    from ..planning.requirements.goals import Goal
+
+HELP = "tell after each position whether the target is met, and what to read next"
+DESCRIPTION = (
+    "Judge the readings taken so far: the scatter that the residuals show, suspected gross errors,"
+    " the uncertainty U6 reached, and either that the target is met or the position that is best"
+    " read next, of the file or its pool, with what it will achieve. A position that was read again"
+    " counts as it was read last. The exit status is 0 if the target is met, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_file(parser)
+    readings = parser.add_argument(
+        "readings",
+        metavar="READINGS",
+        nargs="+",
+        type=Path,
+        default=[],
+        help=(
+            "readings so far: one table or several in the order in which they were taken; default:"
+            " those that the experiment file names"
+        ),
+    )
+    # With nargs="*" none would be looked for behind the first option.
+    readings.required = False
+    parser.add_argument(
+        "--watch",
+        metavar="FOLDER",
+        type=Path,
+        help=(
+            "wait for tables of readings in a folder, and print a line whenever one has been"
+            " written; ends when the target is met, or with Ctrl-C"
+        ),
+    )
+    parser.add_argument(
+        "--interval",
+        metavar="SECONDS",
+        type=_seconds,
+        help="with --watch: time between two looks at the folder; default 2",
+    )
+    parser.add_argument(
+        "--goal",
+        default="lengths",
+        help=(
+            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
+            ' tasks, or a quantity such as "U6 average 0.3 um"'
+        ),
+    )
+    parser.add_argument(
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="share of the lengths that must be within the target; default: all",
+    )
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
+    )
+    add_tables(parser)
+    add_json(parser)
+
+
+def _seconds(text: str) -> float:
+    value = number(text, "s")
+    if not 0.0 < value < 1e5:
+        raise ArgumentTypeError(f'expected seconds above zero, such as 2, not "{text}"')
+    return value
+
+
+def run(options: Namespace) -> int:
+    """Print the line, or one each time in a folder; 0 once the target is met, otherwise 1."""
+    from dataclasses import replace
+
+    from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
+
+    from ..planning.requirements.goals import GoalError, parse_goal
+    from .table_options import named_sources, with_options
+
+    if options.interval is not None and options.watch is None:
+        raise UsageError("--interval goes with --watch; leave it out")
+    if options.watch is not None and not options.watch.is_dir():
+        raise UsageError(f"--watch {options.watch}: no such folder")
+    try:
+        goal = parse_goal(options.goal, options.share)
+        experiment = with_options(options, single(options, planning=True))
+        if options.target is not None:
+            stated = parse_length_function(options.target)
+            target = Target(stated, experiment.coverage_factor)
+            experiment = replace(experiment, target_uncertainty=target)
+        if options.watch is not None:
+            return _watch(options, experiment, goal)
+        sources = options.readings or named_sources(experiment)
+        found = _judged(options, experiment, goal, sources)
+    except (GoalError, QuantityError) as error:
+        raise UsageError(error) from None
+    show(options, found)
+    return 0 if found.is_met else 1
+
+
+def _judged(
+    options: Namespace, experiment: Experiment, goal: Goal, sources: Sequence[Path]
+) -> NextStep:
+    from ..planning.next_position import next_step
+    from .progress import progress
+    from .telling import complain
+
+    with progress(options) as shown:
+        found = next_step(experiment, sources, goal, shown.show)
+    for note in found.notes:
+        complain(note)
+    return found
+
+
+def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
+    """Judge whenever files in the folder have changed, until the target is met or somebody ends
+    it.
+    """
+    import time
+
+    from ballplate.simulator.inputs.messages import ExperimentError
+
+    from .common import print_lines
+    from .excerpts import print_errors
+    from .telling import note
+    from .watching import settled
+
+    def wait() -> None:
+        time.sleep(options.interval or 2.0)
+
+    note(options, f"waiting for readings in {options.watch}; Ctrl-C ends this")
+    try:
+        for files in settled(options.watch, wait):
+            try:
+                found = _judged(options, experiment, goal, [*options.readings, *files])
+            except ExperimentError as error:
+                # It may be mended, or not yet be whole.
+                print_errors(error.messages, options)
+                continue
+            if options.json:
+                print(json.dumps(found.to_dict(), allow_nan=False, ensure_ascii=False), flush=True)
+            else:
+                print_lines(found.lines())
+            if found.is_met:
+                return 0
+    except KeyboardInterrupt:
+        note(options, "stopped before the target was met")
+    return 1

@@ -1,0 +1,48 @@
+"""Files that appear in a folder, once they are whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+# What tables of readings end in; other files in the folder are none of its business.
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".asc")
+
+
+def settled(folder: Path, wait: Callable[[], object]) -> Iterator[list[Path]]:
+    """The tables in a folder in the order in which they were last written, each time that has
+    changed.
+
+    A file counts as whole when it is not empty and the same, by time and size, before and after a
+    `wait`; others are left out until they are.
+
+    :raises OSError: the folder cannot be read.
+    """
+    before: dict[Path, tuple[int, int]] = {}
+    told: dict[Path, tuple[int, int]] = {}
+    while True:
+        now = _tables(folder)
+        whole = {path: one for path, one in now.items() if before.get(path) == one}
+        if whole and whole != told:
+            told = whole
+            yield sorted(whole, key=lambda path: (whole[path][0], path.name))
+        before = now
+        wait()
+
+
+def _tables(folder: Path) -> dict[Path, tuple[int, int]]:
+    found = {}
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            path = Path(entry.path)
+            if path.suffix.lower() not in TABLES or path.name.startswith((".", "~")):
+                continue
+            try:
+                known = entry.stat()
+            except FileNotFoundError:
+                # Gone, or renamed, since the folder was listed.
+                continue
+            if known.st_size and entry.is_file():
+                found[path] = known.st_mtime_ns, known.st_size
+    return found

@@ -1,0 +1,183 @@
+"""How far a campaign has come, and what to read next, in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+
+from ..presentation.formatting import finite, number
+from ..presentation.result import Result
+from ..results.adjustments import freedom_words
+from ..results.fit import Fit
+from ..results.study import PlannedUncertainty
+from .requirements.goals import Goal, Judgement
+
+
+@dataclass(frozen=True)
+class Offered:
+    """A position that can be read next, with its number of `readings`, and what is known then."""
+
+    name: str
+    readings: int
+    then: Judgement
+    planned: PlannedUncertainty
+
+    @property
+    def average(self) -> float:
+        """Average U6 in metres; NaN where no length is determined."""
+        return (
+            self.planned.quantities["U6"].average if "U6" in self.planned.quantities else math.nan
+        )
+
+    @property
+    def order(self) -> tuple[int, int, float]:
+        """The better, the smaller: what stays undetermined, then the goal, or U6 on average."""
+        aim = self.average if math.isfinite(self.average) else self.then.distance
+        aim = aim if math.isfinite(aim) else 1e300
+        return self.then.undetermined, self.planned.deficiency, float(comparable(aim))
+
+
+@dataclass(frozen=True, repr=False)
+class NextStep(Result):
+    """What the positions `read`, in their order, achieve, and what others would.
+
+    `missing` counts planned readings that positions lack. `fit` is None where nothing can be
+    estimated yet, for the reason `why`. Uncertainties are those stated times `sigma`, which keeps
+    to `bound`; `now` judges the goal, and `is_sure` whether it is met at the bound too. `suspected`
+    is what residuals show, in words. `offered` are positions that can be read next, the best first;
+    none where the target is met.
+    """
+
+    label: str
+    title: str
+    goal: Goal
+    read: tuple[str, ...]
+    missing: Mapping[str, int]
+    observed: ObservedReadings
+    fit: Fit | None
+    why: str = ""
+    sigma: float = 1.0
+    bound: float = math.inf
+    now: Judgement | None = None
+    is_sure: bool = False
+    suspected: tuple[str, ...] = ()
+    offered: tuple[Offered, ...] = field(default=())
+
+    @property
+    def is_met(self) -> bool:
+        """Whether nothing more need be read: the goal is met by what has been read, its scatter is
+        known well enough for that, and the residuals show nothing that is wrong.
+        """
+        return self.now is not None and self.now.is_met and self.is_sure and not self.suspected
+
+    @property
+    def next(self) -> Offered | None:
+        """The best position to be read next; None where the target is met, or none is left."""
+        return self.offered[0] if self.offered else None
+
+    def headline(self) -> str:
+        return self._verdict()
+
+    def lines(self) -> list[str]:
+        count = len(self.read)
+        last = self.read[-1]
+        missing = self.missing.get(last, 0)
+        part = f" ({missing} of its readings missing)" if missing else ""
+        begin = f"{count} position{'s' * (count != 1)} read, last {last}{part}"
+        told = [begin, *self.observed.redone, *self._known(), self._verdict()]
+        return ["; ".join(told)]
+
+    def _known(self) -> list[str]:
+        if self.fit is None or self.now is None:
+            return [f"nothing can be estimated yet ({self.why})"]
+        freedom = self.fit.degrees_of_freedom
+        if freedom <= 0:
+            known = "sigma unknown, as nothing is read redundantly"
+        else:
+            found = math.sqrt(self.fit.solution.factor.sum_of_squares / freedom)
+            known = f"sigma {number(found, 3)} of {freedom_words(freedom)}"
+        shown = [f"suspected: {words}" for words in self.suspected] or ["nothing suspected"]
+        lengths = self.fit.quantities.get("U6")
+        return [known, *shown, self.now.words, *([] if lengths is None else self._maximum())]
+
+    def _maximum(self) -> list[str]:
+        """The largest U6, where the goal does not tell it."""
+        assert self.fit is not None
+        largest = self.fit.quantities["U6"].maximum * self.sigma / self.fit.sigma
+        return [] if math.isnan(largest) else [f"largest U6 {number(1e6 * largest)} µm"]
+
+    def _verdict(self) -> str:
+        if self.is_met:
+            return "target met: stop"
+        reason = self._reason()
+        if self.next is None:
+            return f"{reason}; no position is left to read"
+        one = self.next
+        more = "rest of " if one.name in self.read else ""
+        return f"{reason}; next: {more}{one.name} ({one.readings} readings), then {one.then.words}"
+
+    def _reason(self) -> str:
+        if self.now is None or not self.now.is_met:
+            return "target not met"
+        if self.suspected:
+            return "target met but for what is suspected: look at that first"
+        if math.isinf(self.bound):
+            return "target met only if the scatter is as stated, which nothing shows yet"
+        return (
+            "target met only if the scatter is as stated: with so few degrees of freedom it may be"
+            f" {number(self.bound, 2)} times as large"
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        cautions = () if self.fit is None else (self.fit.untested,)
+        doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
+        return (*self.observed.told, *doubts)
+
+    def to_dict(self) -> dict[str, Any]:
+        fit = self.fit
+        lengths = None if fit is None else fit.quantities.get("U6")
+        times = 1.0 if fit is None else self.sigma / fit.sigma
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "goal": str(self.goal),
+            "read": list(self.read),
+            "missing": dict(self.missing),
+            "redone": list(self.observed.redone),
+            "target_met": self.is_met,
+            "verdict": self._verdict(),
+            "why_no_estimate": self.why or None,
+            "sigma": None if fit is None else self.sigma,
+            "sigma_bound": finite(self.bound),
+            "degrees_of_freedom": None if fit is None else fit.degrees_of_freedom,
+            "suspected": list(self.suspected),
+            "U6_average": None if lengths is None else finite(times * lengths.average),
+            "U6_maximum": None if lengths is None else finite(times * lengths.maximum),
+            "goal_met": self.now is not None and self.now.is_met,
+            "goal_met_at_bound": self.is_sure,
+            "next": None if self.next is None else self.next.name,
+            "offered": [
+                {name: finite(one) if isinstance(one, float) else one for name, one in row.items()}
+                for row in self.rows()
+            ],
+            "remarks": list(self.notes),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each position that can be read next, the best first; U6 in metres."""
+        return [
+            {
+                "position": one.name,
+                "readings": one.readings,
+                "U6 average": one.average,
+                "undetermined": one.then.undetermined,
+                "target met": one.then.is_met,
+            }
+            for one in self.offered
+        ]

@@ -1,0 +1,175 @@
+"""`ballplate diff` as its users see it."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.cli import main
+from ballplate.results.fit import Fit
+
+PARK = Path("designs/park")
+
+
+@pytest.fixture(scope="module")
+def fits() -> list[Fit]:
+    return [bp.fit(bp.quickstart(), bp.simulate(bp.quickstart(), seed)) for seed in (1, 2)]
+
+
+@pytest.fixture
+def maps(tmp_path: Path, fits: list[Fit]) -> list[str]:
+    found = []
+    for name, date, one in zip("ab", ("2025-01-01", "2026-07-02"), fits, strict=True):
+        path = tmp_path / f"{name}.yaml"
+        bp.write_map(one.to_map(date), path)
+        found.append(str(path))
+    return found
+
+
+def test_maps_of_files_are_compared(
+    tmp_path: Path, maps: list[str], fits: list[Fit], capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, picture = tmp_path / "all.csv", tmp_path / "all.svg"
+    assert main(["diff", *maps, "--csv", str(table), "--plot", str(picture)]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("b less a: ") and "no change is shown" in out
+    assert "the campaigns are taken to be independent" in out
+    rows = list(csv.DictReader(table.read_text("utf-8").splitlines()))
+    diagonal = next(row for row in rows if row["kind"] == "body diagonals")
+    assert diagonal["figure"] == "(0, 0, 0) mm to (1000, 1000, 1000) mm"
+    ends = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    lengths = [np.linalg.norm(np.diff(fit.correct(ends).points, axis=0)) for fit in fits]
+    assert float(diagonal["difference"]) == pytest.approx(lengths[1] - lengths[0], abs=1e-10)
+    years = (365 + 182) / 365.25
+    assert float(diagonal["per year"]) == pytest.approx(float(diagonal["difference"]) / years)
+    assert "µm per year" in out and picture.read_text("utf-8").count("<svg") == 1
+    frame = bp.diff(*fits).to_frame()
+    assert {"balls of plate", "EXX", "edges"} <= set(frame["kind"])
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
+    assert main([*arguments, "--json"]) in (0, 1)
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_change_fails_where_that_is_asked(
+    tmp_path: Path, maps: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = bp.quickstart().with_({"true_machine.seed": 8})
+    bp.write_map(bp.fit(bp.quickstart(), bp.simulate(other, 3)).to_map(), tmp_path / "c.npz")  # type: ignore[attr-defined]
+    assert main(["diff", *maps, "--fail", "--grid", "2"]) == 0
+    capsys.readouterr()
+    assert main(["diff", maps[0], str(tmp_path / "c.npz"), "--fail", "--grid", "2", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["changed"] is True and found["years"] is None
+    assert found["tests"][0]["p"] < 1e-6 and len(found["tests"]) == 19
+
+
+def test_an_expected_map_is_compared_with(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    experiment = bp.load(PARK / "plate.yaml")
+    fit = bp.fit(experiment, bp.simulate(experiment, 4))
+    path = tmp_path / "measured.yaml"
+    bp.write_map(fit.to_map(), path)  # type: ignore[attr-defined]
+    machine = PARK / "machines" / "npl-like.yaml"
+    found = printed(capsys, "diff", str(machine), str(path), "--grid", "2")
+    assert found["changed"] is False and found["first"]["expected"] is True
+    named = {row["figure"]: row for row in found["figures"]}
+    edge = named["(0, 0, 0) mm to (900, 0, 0) mm"]
+    ends = np.array([[0.0, 0.0, 0.0], [0.9, 0.0, 0.0]])
+    corrected = fit.correct(ends, "down")  # type: ignore[attr-defined]
+    from ballplate.error_maps.volumetric_errors import Volumetric
+    from ballplate.simulator.experiment.machine_file import load_machine
+
+    described = Volumetric(load_machine(machine)).truth
+    p = np.broadcast_to([0.0, 0.0, -0.12], ends.shape)
+    true = ends + described.model.error(ends, described.a, p)
+    expected = np.subtract(*corrected.points[::-1]), np.subtract(*true[::-1])
+    lengths = [float(np.linalg.norm(one)) for one in expected]
+    assert edge["difference"] == pytest.approx(lengths[0] - lengths[1], abs=2e-9)
+    # What is stated of its lengths is added.
+    wider = printed(
+        capsys, "diff", str(machine), str(path), "--stated", "4 um + L/100000", "--grid", "2"
+    )
+    same = next(one for one in wider["figures"] if one["figure"] == edge["figure"])
+    u = np.hypot(edge["standard uncertainty"], 0.5 * (4e-6 + 0.9e-5))
+    assert same["standard uncertainty"] == pytest.approx(u, rel=1e-9)
+
+
+def test_what_is_undetermined_is_not_compared(capsys: pytest.CaptureFixture[str]) -> None:
+    # Nothing tells the scale.
+    experiment = bp.load("designs/hurt_foss/bar-bell.yaml", "length unknown")
+    found = bp.diff(*(bp.fit(experiment, bp.simulate(experiment, seed)) for seed in (1, 2)))  # type: ignore[arg-type]
+    edges = next(one for one in found.comparison.lengths if one.kind == "edges")
+    assert edges.undetermined == len(edges.names) and edges.count == 0
+    text = "\n".join(found.lines())
+    assert "0 (12 undetermined)" in text and "undetermined" in text
+    assert found.to_dict()["figures"][0]["E_n"] is None
+    assert found.comparison.test is not None and found.is_changed is False
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["--probe", "up"], 2, 'no probe "up" in both maps'),
+        (["--shared", "certificate"], 2, "does not hold what certificates do to it"),
+        (["--stated", "1 um"], 2, "an uncertainty is stated of a machine file"),
+        (["--stated", "1"], 2, "1"),
+        (["--points", "points.csv"], 2, "outside the volume"),
+        (["--grid", "9"], 2, "2 to 5 points"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    maps: list[str],
+    arguments: list[str],
+    status: int,
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("x_mm,y_mm,z_mm\n0,0,0\n3000,0,0\n", "utf-8")
+    given = [str(points) if one == "points.csv" else one for one in arguments]
+    try:
+        assert main(["diff", *maps, *given]) == status
+    except SystemExit as error:
+        assert error.code == status
+    assert words in capsys.readouterr().err
+
+
+def test_files_that_are_no_maps_are_refused(
+    maps: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine = str(PARK / "machines" / "npl-like.yaml")
+    assert main(["diff", machine, machine]) == 2
+    assert "nothing was measured" in capsys.readouterr().err
+    assert main(["diff", maps[0], "designs/quickstart.yaml"]) == 3
+    assert "names no readings" in capsys.readouterr().err
+    assert main(["diff", maps[0], "designs/reports/z-low.dmo"]) == 3
+    assert main(["diff", maps[0], "nowhere.yaml"]) == 3
+    with pytest.raises(TypeError, match="second=3"):
+        bp.diff(maps[0], 3)  # type: ignore[arg-type]
+
+
+@pytest.mark.long
+def test_experiments_with_readings_share_a_certificate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, seed in (("a", 1), ("b", 2)):
+        bp.simulate(bp.quickstart(), seed).to_csv(tmp_path / f"{name}.csv", index=False)
+        text = Path("designs/quickstart.yaml").read_text("utf-8")
+        (tmp_path / f"{name}.yaml").write_text(f"{text}readings: {{files: {name}.csv}}\n", "utf-8")
+    both = [str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")]
+    apart = printed(capsys, "diff", *both)
+    shared = printed(capsys, "diff", *both, "--shared", "certificate")
+    assert apart["shared_values"] is None and shared["shared_values"] == 4
+    pairs = zip(apart["figures"], shared["figures"], strict=True)
+    of_lengths = [(one, other) for one, other in pairs if one["kind"] == "body diagonals"]
+    for one, other in of_lengths:
+        assert other["standard uncertainty"] < 0.95 * one["standard uncertainty"]

@@ -1,0 +1,153 @@
+"""How often differences are found: where nothing has changed, and where something has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.results.differences.comparison import ComparisonSettings, MapComparison, compared
+from ballplate.results.differences.normalised_errors import FigureGroup
+from ballplate.results.differences.shared_certificates import (
+    NothingSharedError,
+    with_shared_certificates,
+)
+from ballplate.results.study import fit as fit_observed
+from ballplate.simulator.machines.protocol import Array
+from scipy.stats import chi2
+
+from tests.differences.campaigns import simulated_fit, simulated_map
+
+SETTINGS = ComparisonSettings()
+
+
+def pairs_of_campaigns(count: int, is_shared: bool = False) -> list[MapComparison]:
+    """Comparisons of a machine with itself, each of two campaigns with one plate."""
+    experiment, found = bp.quickstart(), []
+    for k in range(count):
+        certificate = 10**5 + k if is_shared else None
+        maps = [simulated_map(experiment, 100 + 2 * k + i, certificate) for i in (0, 1)]
+        if is_shared:
+            maps = list(with_shared_certificates(maps[0], maps[1])[:2])
+        found.append(compared(maps[0], maps[1], SETTINGS))
+    return found
+
+
+def shares(comparisons: Sequence[MapComparison]) -> tuple[float, float]:
+    """Mean share of |E_n| > 1 over all figures of a pair, and the standard deviation of the mean:
+    figures of a pair are correlated, pairs are not.
+    """
+    each = [
+        sum(group.exceeding for group in one.groups) / sum(group.count for group in one.groups)
+        for one in comparisons
+    ]
+    return float(np.mean(each)), float(np.std(each, ddof=1) / np.sqrt(len(each)))
+
+
+def assert_joint_tests_are_right(comparisons: Sequence[MapComparison]) -> None:
+    """Sums of independent chi-squared are chi-squared, whatever the number of pairs."""
+    for tests in (
+        [one.test for one in comparisons],
+        [one.plates[0].test for one in comparisons],
+    ):
+        total = sum(test.statistic for test in tests if test is not None)
+        dimensions = sum(test.dimensions for test in tests if test is not None)
+        assert dimensions == 69 * len(comparisons)
+        assert 1e-4 < chi2.cdf(total, dimensions) < 1.0 - 1e-4
+
+
+def test_a_machine_does_not_differ_from_itself() -> None:
+    assert_joint_tests_are_right(pairs_of_campaigns(2))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_one_figure_in_twenty_exceeds_by_chance(is_shared: bool) -> None:
+    found = pairs_of_campaigns(200, is_shared)
+    assert_joint_tests_are_right(found)
+    share, spread = shares(found)
+    by_chance = found[0].groups[0].by_chance
+    assert by_chance == pytest.approx(0.0455, abs=5e-4)
+    assert abs(share - by_chance) < 3.0 * spread
+    p = np.array([one.test.p for one in found if one.test is not None])
+    assert abs(np.mean(p < 0.05) - 0.05) < 3.0 * np.sqrt(0.05 * 0.95 / len(p))
+
+
+def along_x(found: MapComparison) -> tuple[FigureGroup, int]:
+    """The length of the machine's x axis."""
+    edges = next(one for one in found.lengths if one.kind == "edges")
+    return edges, edges.names.index("(0, 0, 0) mm to (1000, 0, 0) mm")
+
+
+def scale_change(size: float) -> tuple[Array, float]:
+    """A change of EXX that makes the x axis longer by `size` times U of that difference, and U."""
+    first, second = (simulated_map(bp.quickstart(), seed) for seed in (1, 2))
+    group, place = along_x(compared(first, second, SETTINGS))
+    expanded = float(2.0 * group.standard_uncertainties[place])
+    change = np.zeros(len(first.values))
+    own = [k for k, one in enumerate(first.model.parameters) if one.function == "EXX"]
+    ends = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    rows = first.rows(ends, first.offsets["down"]).reshape(2, 3, -1)[:, 0, own]
+    effect = rows[1] - rows[0]
+    change[own] = size * expanded * effect / (effect @ effect)
+    return change, expanded
+
+
+@pytest.mark.long
+def test_a_change_is_what_it_is() -> None:
+    change, expanded = scale_change(2.0)
+    first = simulated_map(bp.quickstart(), 1)
+    second = simulated_map(bp.quickstart(), 2)
+    group, place = along_x(compared(first, second, SETTINGS))
+    changed, _ = along_x(compared(first, replace(second, values=second.values + change), SETTINGS))
+    grown = changed.differences[place] - group.differences[place]
+    assert grown == pytest.approx(2.0 * expanded, rel=1e-9)
+
+
+@pytest.mark.long
+def test_a_change_of_twice_the_denominator_is_found() -> None:
+    change, _ = scale_change(2.0)
+    found = []
+    for k in range(200):
+        first = simulated_map(bp.quickstart(), 5000 + 2 * k)
+        second = simulated_map(bp.quickstart(), 5001 + 2 * k, changed=change)
+        group, place = along_x(compared(first, second, SETTINGS))
+        found.append(abs(group.normalised[place]) > 1.0)
+    # P(|N(4, 1)| > 2) is 0.977.
+    assert np.mean(found) >= 0.95
+
+
+def test_what_a_certificate_does_is_what_another_value_of_it_would() -> None:
+    experiment = bp.quickstart()
+    fits = [simulated_fit(experiment, seed, 7) for seed in (1, 2)]
+    maps = [simulated_map(experiment, seed, 7) for seed in (1, 2)]
+    first, second, count = with_shared_certificates(maps[0], maps[1])
+    assert count == 4
+    certified = next(
+        one for one in fits[0].design.observations if len(one) == 4 and one.word == "distance"
+    )
+    for k in range(2):
+        value = certified.value.copy()
+        value[k] += certified.uncertainty[k]
+        design = fits[0].design.observed(certified.given(value=value))
+        moved = fit_observed(experiment, replace(fits[0].observed, design=design))
+        change = moved.functions.at.state.a - fits[0].functions.at.state.a
+        assert first.shared[:, k] == pytest.approx(fits[0].sigma * change, rel=1e-3, abs=1e-12)
+    # Scale rests on the certificate alone: what is common to both cancels.
+    apart = compared(maps[0], maps[1], SETTINGS).lengths[0].standard_uncertainties
+    together = compared(first, second, SETTINGS).lengths[0].standard_uncertainties
+    assert (together < apart).all()
+    own = np.concatenate([first.root, second.root], axis=1)
+    covariance = own @ own.T - first.shared @ second.shared.T - second.shared @ first.shared.T
+    assert np.linalg.eigvalsh(covariance).min() > 0.0
+
+
+def test_other_certificates_are_not_shared() -> None:
+    experiment = bp.quickstart()
+    maps = [simulated_map(experiment, seed) for seed in (1, 2)]
+    with pytest.raises(NothingSharedError, match="no certified value in common"):
+        with_shared_certificates(maps[0], maps[1])
+    with pytest.raises(NothingSharedError, match="does not hold what certificates do"):
+        with_shared_certificates(replace(maps[0], fit=None), maps[1])
