@@ -27,7 +27,7 @@ from ...gross_errors.exact_values import diagnosis_of_all
 from ...gross_errors.leftover import too_many_entries
 from ...uncertainty.summaries import uncertainties
 from .lack_of_fit import PureError, chance_of, pure_error
-from .ladder_result import Criteria, Ladder, LengthChange, Rung
+from .ladder_result import Ladder, LengthChange, Rung
 from .nested import nested_sums
 from .rung_choice import (
     ROUNDING,
@@ -122,7 +122,8 @@ def climb(
             beyond = (*beyond, f"empirical, {count} coefficients or more")
             break
         every.append(fit_rung(experiment, observed, model).fitted)
-    return Climb(grid, every, *first_adequate(grid, every, Comparison(given)), beyond)
+    test = Comparison(given, observed.design.observation_count)
+    return Climb(grid, every, *first_adequate(grid, every, test), beyond)
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,8 @@ def ladder(
     given = (sigma or experiment.sigma) == "given"
     found = climb(experiment, observed, given, most)
     file = _of_file(experiment, observed.design.model, found)
-    models = _shown(found, file, Comparison(given))
+    test = Comparison(given, observed.design.observation_count)
+    models = _shown(found, file, test)
     fits = []
     for model in models:
         fits.append(fit_rung(experiment, observed, model))
@@ -208,14 +210,13 @@ def ladder(
     if faults and richest is not chosen and not _faults(richest, observed.x, repeats, given):
         chosen, faults, beaten = richest, (), Beaten(1.0, 0, "")
     scale = chosen.sigma(given)
-    test = Comparison(given)
     rungs = (
         Rung(
             one.model.words,
             one.model.count,
             one.fitted.sum_of_squares,
             one.fitted.degrees_of_freedom,
-            _criteria(one, given),
+            test.criteria(one.fitted),
             test.beaten(one.fitted, richer(one.fitted, found.every)),
             _change(one.at, chosen.at),
             one is chosen,
@@ -265,19 +266,6 @@ def _shown(found: Climb, file: LadderModel, test: Comparison) -> list[LadderMode
     return sorted(unique.values(), key=lambda one: one.count)
 
 
-def _criteria(fit: RungFit, given: bool) -> Criteria:
-    """Akaike's and Schwarz's criteria of a normal likelihood with all parameters, sigma among them
-    where it is estimated.
-    """
-    count = fit.at.design.observation_count
-    parameters = count - fit.fitted.degrees_of_freedom
-    misfit = fit.fitted.sum_of_squares
-    if not given:
-        parameters += 1
-        misfit = count * float(np.log(max(misfit / count, np.finfo(float).tiny)))
-    return Criteria(misfit + 2 * parameters, misfit + float(np.log(count)) * parameters)
-
-
 def _change(at: Linearisation, other: Linearisation) -> LengthChange:
     """How two fits differ in the lengths between all evaluation points."""
     first, second = (_lengths(one.design, one.state) for one in (at, other))
@@ -320,9 +308,7 @@ def _faults(fit: RungFit, x: Array, repeats: PureError, given: bool) -> tuple[st
         )
     square, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
     if given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:
-        found.append(
-            f"S^2 is {square / freedom:.3g} times what the stated uncertainties explain"
-        )
+        found.append(f"S^2 is {square / freedom:.3g} times what the stated uncertainties explain")
     if not too_many_entries(design):
         left = diagnosis_of_all(fit.at, x, freedom, not given).unexplained
         if left is not None and (left.words or left.too_large):

@@ -13,18 +13,10 @@ from ...presentation.result import FitResult
 from ...uncertainty.summaries import Quantity
 from ..adjustments import freedom_words
 from .lack_of_fit import PureError
-from .rung_choice import Beaten
+from .rung_choice import FALSE_STEP, Beaten, Criteria
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-
-@dataclass(frozen=True)
-class Criteria:
-    """Akaike's and Schwarz's information criteria; differences between models count."""
-
-    aic: float
-    bic: float
 
 
 @dataclass(frozen=True)
@@ -127,7 +119,7 @@ class Ladder(FitResult):
 
     def _of_file(self, file: Rung) -> str:
         chosen = next(one for one in self.rungs if one.is_recommended)
-        if file.beaten.chance < 0.01 and file.beaten.count:
+        if file.beaten.chance < FALSE_STEP and file.beaten.count:
             told = f"is too poor: {file.beaten.by} explains more (chance {file.beaten.chance:.1g})"
         elif file.parameters > chosen.parameters:
             told = "has more parameters than the readings call for"

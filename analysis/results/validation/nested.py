@@ -1,7 +1,7 @@
 """Sums of squares of all models that a rich one contains, from its linearisation alone.
 
 The readings are linear in the parameters of the machine to a millionth of the errors. With balls,
-poses and all others eliminated, S^2 is b + |t + X a|^2 in the machine's parameters a; a poorer model
+poses and all others eliminated, S^2 is b + |t + X a|^2 in the machine's parameters a; a poorer one
 has some of the columns of X only. NPL Report CISE 15/98, section 5.3, compares models by the same
 sums of squares.
 """

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.machines.kinematic import ErrorFunction
-from ballplate.simulator.machines.protocol import Array
 
 from .lack_of_fit import chance_of
 from .nested import NestedSums
@@ -24,6 +24,9 @@ LAST_COEFFICIENT = 0.01
 # Single functions with more coefficients than the others; of more, all have more.
 MOST_FUNCTIONS = 3
 
+# BIC above that of a model that is no richer form of the same, from which on the other is better.
+CLEARLY_WORSE = 10.0
+
 # Sums of squares for each degree of freedom below this are rounding.
 ROUNDING = 1e-12
 
@@ -35,6 +38,14 @@ class FittedSum:
     model: LadderModel
     sum_of_squares: float
     degrees_of_freedom: int
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """Akaike's and Schwarz's information criteria; differences between models count."""
+
+    aic: float
+    bic: float
 
 
 @dataclass(frozen=True)
@@ -55,9 +66,30 @@ class Beaten:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Tests of error models with sigma `given` or estimated."""
+    """Tests of error models on so many observations, with sigma `given` or estimated."""
 
     given: bool
+    observations: int
+
+    def criteria(self, one: FittedSum) -> Criteria:
+        """Akaike's and Schwarz's criteria of a normal likelihood with all parameters, sigma among
+        them where it is estimated.
+        """
+        count = self.observations
+        parameters, misfit = count - one.degrees_of_freedom, one.sum_of_squares
+        if not self.given:
+            parameters += 1
+            misfit = count * float(np.log(max(misfit / count, ROUNDING)))
+        return Criteria(misfit + 2 * parameters, misfit + float(np.log(count)) * parameters)
+
+    def is_worse(self, one: FittedSum, others: list[FittedSum]) -> bool:
+        """Whether BIC clearly prefers one of others with more parameters."""
+        mine = self.criteria(one).bic
+        return any(
+            self.criteria(other).bic < mine - CLEARLY_WORSE
+            for other in others
+            if other.model.count > one.model.count
+        )
 
     def chance(self, poor: FittedSum, rich: FittedSum) -> float:
         """Chance of what the richer model explains if the poorer one is right."""
@@ -84,22 +116,22 @@ class PolynomialGrid:
     sums: NestedSums
     make: Callable[[int, int, dict[str, int]], LadderModel]
 
-    @property
+    @cached_property
     def functions(self) -> tuple[ErrorFunction, ...]:
-        return chain_of(self.richest.model.model).functions
+        """The error functions that are polynomials; squareness is a single number."""
+        every = chain_of(self.richest.model.model).functions
+        return tuple(one for one in every if hasattr(one.basis, "coefficients"))
 
     def kept(self, model: LadderModel) -> Flags:
         """Which of the richest model's parameters a poorer one has."""
         chain = chain_of(self.richest.model.model)
-        kept = np.zeros(len(chain.parameters), bool)
-        for one in chain.functions:
-            own = chain.slices[one.name]
-            kept[own.start : own.start + self._size(model, one)] = True
+        kept = np.ones(len(chain.parameters), bool)
+        for one in self.functions:
+            first = chain.slices[one.name].start + self._size(model, one)
+            kept[first : chain.slices[one.name].stop] = False
         return kept
 
     def _size(self, model: LadderModel, one: ErrorFunction) -> int:
-        if one.name not in _polynomials(self.functions):
-            return one.basis.size
         return free_coefficients(one.basis, model.coefficients(one.name, one.rotation))
 
     def fitted(self, model: LadderModel) -> FittedSum:
@@ -128,55 +160,40 @@ class PolynomialGrid:
         return found
 
     def _one_more(self, start: FittedSum, test: Comparison) -> FittedSum | None:
-        model, kept = start.model, self.kept(start.model)
-        basis = self.sums.basis(kept)
+        """The model with more coefficients for the single function that calls for them most."""
+        model = start.model
+        assert model.numbers is not None
+        basis = self.sums.basis(self.kept(model))
         left = self.sums.left(basis)
-        offers = list(self._offers(model))
-        best, chosen = FALSE_FUNCTION / max(len(offers), 1), None
-        for name, count in offers:
-            wider = replace(model, own=tuple({**dict(model.own), name: count}.items()))
-            rich = self._gained(start, wider, kept, basis, left)
-            chance = test.chance(start, rich)
-            if chance < best:
-                best, chosen = chance, (name, count, rich)
-        if chosen is None:
+        first = {
+            one.name: chain_of(self.richest.model.model).slices[one.name] for one in self.functions
+        }
+
+        def with_more(one: ErrorFunction, size: int) -> FittedSum:
+            more = first[one.name].start + np.arange(self._size(model, one), size)
+            gain, dimensions = self.sums.gain(basis, left, more)
+            return FittedSum(
+                model, start.sum_of_squares - gain, start.degrees_of_freedom - dimensions
+            )
+
+        offers = [
+            (test.chance(start, with_more(one, size)), place, size)
+            for place, one in enumerate(self.functions)
+            for size in range(self._size(model, one) + 1, one.basis.size + 1)
+        ]
+        if not offers or min(offers)[0] >= FALSE_FUNCTION / len(offers):
             return None
-        name, count, rich = chosen
+        _, place, size = min(offers)
+        one = self.functions[place]
+        rich = with_more(one, size)
         # Of its coefficients the last ones that explain nothing are left out again.
-        while True:
-            fewer = replace(model, own=tuple({**dict(model.own), name: count - 1}.items()))
-            if self.kept(fewer).sum() <= kept.sum():
-                break
-            poor = self._gained(start, fewer, kept, basis, left)
+        while size - 1 > self._size(model, one):
+            poor = with_more(one, size - 1)
             if test.chance(poor, rich) < LAST_COEFFICIENT:
                 break
-            count, rich = count - 1, poor
-        assert model.numbers is not None
-        made = self.make(*model.numbers, {**dict(model.own), name: count})
-        return replace(rich, model=made)
-
-    def _offers(self, model: LadderModel) -> Iterator[tuple[str, int]]:
-        """Single functions with the numbers of coefficients that the richest model permits."""
-        names = _polynomials(self.functions)
-        for one in self.functions:
-            if one.name in names:
-                has = model.coefficients(one.name, one.rotation)
-                most = self.richest.model.coefficients(one.name, one.rotation)
-                for count in range(has + 1, most + 1):
-                    if free_coefficients(one.basis, count) > free_coefficients(one.basis, has):
-                        yield one.name, count
-
-    def _gained(
-        self, start: FittedSum, wider: LadderModel, kept: Flags, basis: Array, left: Array
-    ) -> FittedSum:
-        more = np.flatnonzero(self.kept(wider) & ~kept)
-        gain, dimensions = self.sums.gain(basis, left, more)
-        return FittedSum(wider, start.sum_of_squares - gain, start.degrees_of_freedom - dimensions)
-
-
-def _polynomials(functions: tuple[ErrorFunction, ...]) -> set[str]:
-    """Names of the functions that are polynomials; squareness is a single number."""
-    return {one.name for one in functions if hasattr(one.basis, "coefficients")}
+            size, rich = size - 1, poor
+        count = size + 1 + int(one.basis.zero_at_one)
+        return replace(rich, model=self.make(*model.numbers, {**dict(model.own), one.name: count}))
 
 
 def richer(model: FittedSum, every: list[FittedSum]) -> list[FittedSum]:
@@ -208,17 +225,14 @@ def first_adequate(
 ) -> tuple[FittedSum, Beaten]:
     """The model with the fewest parameters that no richer one beats, and the best of these.
 
-    Richer ones are all that contain it. Beside each of the polynomials stands the same with more
-    coefficients for single functions. If every model is beaten, the richest of all.
+    Richer ones are all that contain it; others with more parameters are compared by BIC. Each of the
+    polynomials has more coefficients for the single functions that call for them. If every model is
+    beaten, it is the richest of all.
     """
     for one in sorted(every, key=lambda one: one.model.count):
-        offers = [one] if one.model.numbers is None else [grid.with_functions(one, test), one]
-        for offer in offers:
-            if one.model.numbers is not None and offer is one and len(offers[0].model.own):
-                # A single function calls for more, whatever all of them together do.
-                continue
-            beaten = test.beaten(offer, richer(offer, every))
-            if beaten.chance >= FALSE_STEP:
-                return offer, beaten
+        offer = one if one.model.numbers is None else grid.with_functions(one, test)
+        beaten = test.beaten(offer, richer(offer, every))
+        if beaten.chance >= FALSE_STEP and not test.is_worse(offer, every):
+            return offer, beaten
     richest = max(every, key=lambda one: one.model.count)
     return richest, Beaten(1.0, 0, "")

@@ -30,7 +30,7 @@ POOREST = (2, 1)
 MOST_COEFFICIENTS = 8
 
 # Numbers of coefficients of the univariate functions of empirical models.
-EMPIRICAL = (3, 4, 5, 6)
+EMPIRICAL = (3, 4, 5)
 
 
 @dataclass(frozen=True)
