@@ -36,6 +36,7 @@ from .rung_choice import (
     FittedSum,
     PolynomialGrid,
     first_adequate,
+    is_at_limit,
     path,
     richer,
 )
@@ -90,6 +91,20 @@ class Climb:
     def richest(self) -> FittedSum:
         """That with the most parameters."""
         return max(self.every, key=lambda one: one.model.count)
+
+    def unconfirmed(self, model: LadderModel) -> tuple[str, bool]:
+        """Why nothing shows that a model has coefficients enough, empty where something does, and
+        whether that is for want of readings.
+        """
+        if not is_at_limit(model, self.grid, self.every):
+            return "", False
+        told = "the readings call for as many coefficients as "
+        if self.beyond:
+            return f"{told}this design determines: nothing shows that these are enough", True
+        return (
+            f"{told}were tried, and would for more, as where an error repeats over short distances",
+            False,
+        )
 
 
 @single_threaded
@@ -209,6 +224,9 @@ def ladder(
     faults, beaten = _faults(chosen, observed.x, repeats, given), found.beaten
     if faults and richest is not chosen and not _faults(richest, observed.x, repeats, given):
         chosen, faults, beaten = richest, (), Beaten(1.0, 0, "")
+    unconfirmed, for_want = found.unconfirmed(chosen.model)
+    if unconfirmed and not for_want:
+        faults = (*faults, unconfirmed)
     scale = chosen.sigma(given)
     rungs = (
         Rung(
@@ -242,8 +260,13 @@ def ladder(
         found.beyond,
         lengths,
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
-        too_many_entries(chosen.at.design),
+        tuple(filter(None, (unconfirmed if for_want else "", _untested(chosen.at.design)))),
     )
+
+
+def _untested(design: Design) -> str:
+    text = too_many_entries(design)
+    return f"{text}: the residuals were not searched for structure" if text else ""
 
 
 def _of_file(experiment: Experiment, model: ErrorModel, found: Climb) -> LadderModel:

@@ -78,7 +78,12 @@ class Ladder(FitResult):
     beyond: tuple[str, ...]
     lengths: Quantity
     coverage_factor: float
-    untested: str = ""
+    unsure: tuple[str, ...] = ()
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Why the choice is less sure than its tests say."""
+        return self.unsure
 
     @property
     def is_none(self) -> bool:
@@ -92,10 +97,7 @@ class Ladder(FitResult):
         """What to do, in words."""
         if self.is_none:
             return [
-                (
-                    f"none of these: even the richest leaves residuals that it does not explain;"
-                    f" {'; '.join(self.faults)}"
-                ),
+                (f"none of these: {'; '.join(self.faults)}"),
                 (
                     "look for gross errors and drifts first (ballplate fit), then for an error that"
                     " repeats in less than the distance of the balls, such as one of a lead screw's"
@@ -236,12 +238,6 @@ class Ladder(FitResult):
     def rows(self) -> list[dict[str, Any]]:
         """One row for each error model."""
         return [_rung_data(one, self.lengths.undetermined > 0) for one in self.rungs]
-
-    @property
-    def cautions(self) -> tuple[str, ...]:
-        if self.untested:
-            return (f"{self.untested}: residuals were not searched for structure",)
-        return ()
 
     @property
     def complaint(self) -> str:

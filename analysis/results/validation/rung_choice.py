@@ -60,8 +60,8 @@ class Beaten:
 
     @property
     def chance(self) -> float:
-        """The chance that any of so many explains as much."""
-        return min(1.0, self.least * self.count)
+        """The chance that any of so many explains as much; 1 without any."""
+        return min(1.0, self.least * max(self.count, 1))
 
 
 @dataclass(frozen=True)
@@ -196,6 +196,20 @@ class PolynomialGrid:
         return replace(rich, model=self.make(*model.numbers, {**dict(model.own), one.name: count}))
 
 
+def is_at_limit(model: LadderModel, grid: PolynomialGrid, every: list[FittedSum]) -> bool:
+    """Whether a model has as many coefficients, in all or in single functions, as any has, so that
+    nothing shows that these are enough.
+    """
+    if model.numbers is None:
+        return model.count == max(one.model.count for one in every if one.model.numbers is None)
+    most, poorest = grid.richest.model, dict(zip((False, True), POOREST, strict=True))
+    return any(
+        model.coefficients(one.name, one.rotation) == most.coefficients(one.name, one.rotation)
+        for one in grid.functions
+        if most.coefficients(one.name, one.rotation) > poorest[one.rotation]
+    )
+
+
 def richer(model: FittedSum, every: list[FittedSum]) -> list[FittedSum]:
     """The models that can do all that one can, and more."""
     return [one for one in every if contains(one.model, model.model)]
@@ -225,9 +239,9 @@ def first_adequate(
 ) -> tuple[FittedSum, Beaten]:
     """The model with the fewest parameters that no richer one beats, and the best of these.
 
-    Richer ones are all that contain it; others with more parameters are compared by BIC. Each of the
-    polynomials has more coefficients for the single functions that call for them. If every model is
-    beaten, it is the richest of all.
+    Richer ones are all that contain it; others with more parameters are compared by BIC. Each of
+    the polynomials has more coefficients for the single functions that call for them. If every
+    model is beaten, it is the richest of all.
     """
     for one in sorted(every, key=lambda one: one.model.count):
         offer = one if one.model.numbers is None else grid.with_functions(one, test)
