@@ -348,6 +348,10 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Report = unreported,
 ) -> Fit: ...
 
 
@@ -369,6 +373,10 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Report = unreported,
 ) -> FitResult: ...
 
 
@@ -389,6 +397,10 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Report = unreported,
 ) -> FitResult:
     """The estimate from readings: a table or several, or those that the experiment's file names.
 
@@ -401,8 +413,9 @@ def fit(
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
     `offsets` between its positions are estimated. With `components`, one of the
     `ballplate.GROUPINGS`, variances of groups of observations are estimated, and `reweight` puts
-    these in the place of the stated ones. What is to be known beside the figures is in the
-    result's `remarks`, `warnings` and `complaint`.
+    these in the place of the stated ones. With `trials` so many data sets of the fitted parameters
+    are fitted as well, from a `seed` and by several `workers`. What is to be known beside the
+    figures is in the result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
     >>> fit(quickstart(), readings).converged
@@ -417,6 +430,8 @@ def fit(
     from ballplate.simulator.readings.reading_files import read_readings
 
     from .estimators.estimator_choice import fit_readings
+    from .montecarlo.trials import MOST_TRIALS
+    from .results.fit import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=estimator)
@@ -428,7 +443,13 @@ def fit(
         ensure_one_of(GROUPINGS, components=components)
     asked = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
-    asked |= {"components": components, "reweight": reweight}
+    asked |= {"components": components, "reweight": reweight, "trials": trials}
+    ensure_whole(1, MOST_TRIALS, trials=trials)
+    ensure_whole(0, seed=seed)
+    ensure_whole(1, workers=workers)
+    ensure_report(report)
+    if trials is None and (seed is not None or workers != 1):
+        raise ValueError("seed and workers go with trials only; leave them out")
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} goes with the estimator {wrong[1]} only; leave it out")
@@ -441,7 +462,7 @@ def fit(
     if certificate is not None:
         chosen = read_certificate(_table("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
-    return fit_readings(
+    found = fit_readings(
         chosen,
         observed,
         estimator,
@@ -454,6 +475,9 @@ def fit(
         components,
         reweight,
     )
+    if trials is None or not isinstance(found, Fit) or not found.converged:
+        return found
+    return found.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
 
 
 def compare(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..estimators.estimator_choice import (
     DRAWN,
@@ -14,11 +15,17 @@ from ..estimators.estimator_choice import (
     takers,
 )
 from ..results.variance_components.groupings import GROUPINGS
-from .common import add_file, add_json, add_picture
+from .common import add_file, add_json, add_picture, add_workers, trial_count, whole
 from .compare import add_pairs
 from .outputs import UsageError, add_force, write
 from .table_options import add_tables
 from .telling import complain, note, warn
+
+if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
+    from ballplate.simulator.experiment.model import Experiment
+
+    from ..results.fit import Fit
 
 HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
@@ -65,6 +72,7 @@ def add_options(parser: ArgumentParser) -> None:
     )
     _add_estimators(parser)
     _add_components(parser)
+    _add_trials(parser)
     add_picture(
         parser,
         "--plot",
@@ -120,12 +128,29 @@ def _add_components(parser: ArgumentParser) -> None:
     )
 
 
+def _add_trials(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--trials",
+        metavar="N",
+        type=trial_count,
+        help=(
+            "fit N data sets of the fitted parameters as well, and tell what they scatter beside"
+            " the standard uncertainties (parametric bootstrap)"
+        ),
+    )
+    parser.add_argument(
+        "--seed", type=whole, help="with --trials: seed of the data sets, instead of the file's"
+    )
+    add_workers(parser)
+
+
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
+    from ..results.fit import Fit
     from .common import show, single
     from .table_options import named_sources, with_options
 
@@ -154,6 +179,8 @@ def run(options: Namespace) -> int:
         options.components,
         options.reweight,
     )
+    if options.trials and isinstance(result, Fit) and result.converged:
+        result = _with_trials(options, result, experiment)
     if options.plot and result.converged:
         write(options, {options.plot: result.plot})
     show(options, result)
@@ -161,6 +188,25 @@ def run(options: Namespace) -> int:
     if result.complaint:
         complain(result.complaint)
     return 1 if result.complaint else 0
+
+
+def _with_trials(options: Namespace, result: Fit, experiment: Experiment) -> Fit:
+    from ballplate.simulator.computing.processes import processors
+    from ballplate.simulator.inputs.messages import refused
+
+    from .progress import progress
+
+    seed = experiment.seed if options.seed is None else options.seed
+    with progress(options) as shown:
+
+        def report(step: ProgressStep) -> None:
+            options.interruption.answer()
+            shown.show(step)
+
+        try:
+            return result.with_trials(options.trials, seed, options.workers or processors(), report)
+        except ValueError as error:
+            raise refused(experiment.source, f"{error}; leave --trials out") from None
 
 
 def _refuse_misused(options: Namespace) -> None:
@@ -175,6 +221,8 @@ def _refuse_misused(options: Namespace) -> None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
         raise UsageError(f"--{option} goes with --estimator {estimators} only; leave it out")
+    if options.trials is None and (options.seed is not None or options.workers is not None):
+        raise UsageError("--seed and --workers go with --trials only; leave them out")
     reason = misused(options.components, options.reweight, options.sigma)
     if reason:
         for name in ("components", "sigma"):

@@ -36,6 +36,7 @@ TAKE: dict[str, tuple[str, ...]] = {
     "monomials": ("full", *OF_DISTANCES),
     "components": ("full",),
     "reweight": ("full",),
+    "trials": ("full",),
 }
 
 
