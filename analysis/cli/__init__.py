@@ -27,6 +27,7 @@ COMMANDS = (
         "fit",
         "ladder",
         "validate",
+        "correct",
         "compare",
         "sweep",
         "export",

@@ -34,7 +34,7 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from .lack_of_fit import chance_of
-from .left_out_result import LeftOut, LengthDifference, PredictedReading, Validation
+from .left_out_result import PredictedGroup, LengthDifference, PredictedReading, Validation
 
 # How many times as uncertain what is left out is; the square of this is what it tells at the most.
 OUT = 1e3
@@ -210,10 +210,10 @@ def validate(
 
 def _left_out(
     full: Linearisation, freedom: int, observed: ObservedReadings, group: LeftGroup, given: bool
-) -> LeftOut:
+) -> PredictedGroup:
     rest = rest_of(full.design, observed.x, group)
     if rest is None:
-        return LeftOut(group.kind, group.name, 0, float("nan"), float("nan"), 1.0, False)
+        return PredictedGroup(group.kind, group.name, 0, float("nan"), float("nan"), 1.0, False)
     predicted = freedom - rest.degrees_of_freedom
     square = max(full.factor.sum_of_squares - rest.sum_of_squares, 0.0)
     scale = 1.0
@@ -221,7 +221,7 @@ def _left_out(
         left = rest.sum_of_squares / max(rest.degrees_of_freedom, 1)
         scale = float(np.sqrt(left)) if rest.degrees_of_freedom > 0 else float("nan")
     chance = chance_of(square, predicted, rest.sum_of_squares, rest.degrees_of_freedom, given)
-    return LeftOut(
+    return PredictedGroup(
         group.kind,
         group.name,
         predicted,

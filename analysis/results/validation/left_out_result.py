@@ -48,7 +48,7 @@ class LengthDifference:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class PredictedGroup:
     """A position, plate or direction that was left out and predicted.
 
     `predicted` are the independent co-ordinates that the others predict, and `mean_square` the mean
@@ -74,12 +74,12 @@ class Validation(FitResult):
     label: str
     title: str
     observed: ObservedReadings
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[PredictedGroup, ...]
     sigma_is_given: bool
     coverage_factor: float
 
     @property
-    def failed(self) -> tuple[LeftOut, ...]:
+    def failed(self) -> tuple[PredictedGroup, ...]:
         """What is predicted worse than chance explains, all tests together."""
         tested = [one for one in self.left_out if one.predicted > 0]
         return tuple(one for one in tested if one.chance * len(tested) < FAILED)
@@ -165,7 +165,7 @@ class Validation(FitResult):
         ]
 
 
-def _cells(one: LeftOut, k: float) -> list[str]:
+def _cells(one: PredictedGroup, k: float) -> list[str]:
     if not one.converged:
         return ["", "", "", "not converged", "", "", ""]
     if not one.predicted:
@@ -184,7 +184,7 @@ def _cells(one: LeftOut, k: float) -> list[str]:
     return [*cells, number(1e6 * lengths.change, 3), number(1e6 * u, 3)]
 
 
-def _data(one: LeftOut) -> dict[str, Any]:
+def _data(one: PredictedGroup) -> dict[str, Any]:
     found: dict[str, Any] = as_data(
         {
             "kind": one.kind,
