@@ -28,6 +28,7 @@ COMMANDS = (
         "ladder",
         "validate",
         "correct",
+        "convert",
         "compare",
         "sweep",
         "export",

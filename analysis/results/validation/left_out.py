@@ -34,7 +34,7 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from .lack_of_fit import chance_of
-from .left_out_result import PredictedGroup, LengthDifference, PredictedReading, Validation
+from .left_out_result import LengthDifference, PredictedGroup, PredictedReading, Validation
 
 # How many times as uncertain what is left out is; the square of this is what it tells at the most.
 OUT = 1e3
