@@ -29,9 +29,8 @@ from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
 
 from .estimators.estimator_choice import (
+    COMPARED,
     ESTIMATORS,
-    OF_DISTANCES,
-    OF_LENGTHS,
     EstimatorName,
     misused,
     takers,
@@ -494,8 +493,8 @@ def compare(
     published_maximum: str | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
-    """How far the distances that an estimator of distances or lengths alone corrects are from those
-    by the full one, on synthetic data sets of the true machine.
+    """How far the distances that another estimator corrects are from those by the full one, and
+    both from the true machine's, on synthetic data sets.
 
     `published` values, as texts with a unit, are placed among the differences.
 
@@ -507,7 +506,7 @@ def compare(
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
-    ensure_one_of((*OF_DISTANCES, *OF_LENGTHS), estimator=estimator)
+    ensure_one_of(COMPARED, estimator=estimator)
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)

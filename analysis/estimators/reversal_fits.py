@@ -16,6 +16,7 @@ import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State, reading_noise
 from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.reversal import (
     Reversal,
     UndeterminedError,
@@ -102,6 +103,28 @@ def fit_reversal(
         _redundant(design, full, k, m) if full.converged else (),
         chance,
     )
+
+
+def reversal_beside_full(
+    experiment: Experiment, observed: ObservedReadings
+) -> tuple[Array, Array] | None:
+    """The machine's parameters by the full estimator and by the reversal from the same readings;
+    None where either finds none.
+
+    :raises ExperimentError: the experiment is no reversal; every reason at once.
+    """
+    _refuse_others(experiment, observed, None)
+    full = estimate(observed.design, observed.x)
+    seen = _mean_readings(observed)[:, _in_both(observed)]
+    first, second = seen if turn_between(*seen) < 0.0 else seen[::-1]
+    scale = experiment.error_model.plane_scale
+    try:
+        found = reverse(first, second, scale)
+    except UndeterminedError:
+        return None
+    if full.status != "converged":
+        return None
+    return full.state.a, np.array([found.alpha, found.gamma][: 1 if scale == "none" else 2])
 
 
 PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
