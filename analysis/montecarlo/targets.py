@@ -229,7 +229,8 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
     between = places[first] - places[second]
     length = np.linalg.norm(between, axis=1)
     true_length = np.linalg.norm(of.truly[first] - of.truly[second], axis=1)
-    uncertainty = pairs_of(of.moved, np.stack(ends, axis=1)).uncertainties
+    pairs = pairs_of(of.moved, np.stack(ends, axis=1))
+    uncertainty = np.where(pairs.is_open, np.nan, pairs.uncertainties)
 
     squared, double = length**2, 2.0 * between
 
