@@ -15,9 +15,12 @@ if TYPE_CHECKING:
         certificate,
         check,
         compare,
+        convert,
         correct,
+        cross_validate,
         experiment,
         fit,
+        ladder,
         lengths,
         load,
         load_all,
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
         sheet,
         simulate,
         spline,
+        validate,
         write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
@@ -53,9 +57,12 @@ __all__ = [
     "certificate",
     "check",
     "compare",
+    "convert",
     "correct",
+    "cross_validate",
     "experiment",
     "fit",
+    "ladder",
     "lengths",
     "load",
     "load_all",
@@ -75,6 +82,7 @@ __all__ = [
     "stored",
     "sweep",
     "sweep_report",
+    "validate",
     "write_map",
 ]
 

@@ -58,11 +58,16 @@ if TYPE_CHECKING:
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
+    from .results.converted_map import ConvertedMap
     from .results.correction import Correction
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
+    from .results.validation.cross_validation import CrossValidation
+    from .results.validation.ladder_result import Ladder
+    from .results.validation.left_out_result import Validation
     from .simulator.maps.fitted_map import FittedMap
+    from .simulator.readings.observed_readings import ObservedReadings
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -442,7 +447,7 @@ def fit(
     ensure_type(bool, "True or False", offsets=offsets, reweight=reweight)
     if components is not None:
         ensure_one_of(GROUPINGS, components=components)
-    asked = {"scale": scale, "offsets": not offsets, "pairs": pairs}
+    asked: dict[str, object] = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
     asked |= {"components": components, "reweight": reweight, "trials": trials}
     ensure_whole(1, MOST_TRIALS, trials=trials)
@@ -479,6 +484,107 @@ def fit(
     if trials is None or not isinstance(found, Fit) or not found.converged:
         return found
     return found.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
+
+
+def ladder(
+    experiment: Experiment | PathLike,
+    readings: Tables = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    coefficients: int = 8,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    report: Report = unreported,
+) -> Ladder:
+    """Which error model readings call for: kinematic ones with up to so many `coefficients`,
+    and empirical ones, compared by what richer ones explain, and what each changes in lengths.
+
+    >>> readings = simulate(quickstart())
+    >>> ladder(quickstart(), readings, coefficients=6).recommended
+    'kinematic, 5 and 5 coefficients'
+    """
+    from .results.validation.ladder import ladder as compared
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_whole(3, 12, coefficients=coefficients)
+    ensure_report(report)
+    chosen, observed = _observed(experiment, readings, certificate)
+    return compared(chosen, observed, sigma, coefficients, report)
+
+
+def validate(
+    experiment: Experiment | PathLike,
+    readings: Tables = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    report: Report = unreported,
+) -> Validation:
+    """Positions, plates and directions left out in turn and predicted from the rest.
+
+    >>> validate(quickstart(), simulate(quickstart()))
+    <Validation of quickstart: 9 left out in turn, 0 predicted wrongly>
+    """
+    from .results.validation.left_out import validate as predicted
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_report(report)
+    chosen, observed = _observed(experiment, readings, certificate)
+    return predicted(chosen, observed, sigma, report)
+
+
+def cross_validate(
+    experiment: Experiment | PathLike,
+    readings: Tables,
+    against: Tables,
+    sigma: Literal["estimated", "given"] | None = None,
+    certificate: PathLike | pandas.DataFrame | None = None,
+) -> CrossValidation:
+    """Readings of two campaigns by the same experiment compared throughout the volume, the rigid
+    motion between what they find taken out.
+
+    >>> twice = [simulate(quickstart(), seed) for seed in (1, 2)]
+    >>> cross_validate(quickstart(), *twice).complaint
+    ''
+    """
+    from .results.validation.cross_validation import cross_validate as compared
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    chosen, first = _observed(experiment, readings, certificate)
+    return compared(chosen, first, _observed(chosen, against, None)[1], sigma)
+
+
+def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:
+    """A map in another error model: a kind such as "empirical", settings such as "{kind: kinematic,
+    position_coefficients: 3}", or the path of an experiment file whose model is taken.
+
+    Its `map` is the new one, with its covariance.
+
+    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> convert(fitted, "{kind: empirical, coefficients: 5}")
+    <ConvertedMap of map: empirical, 195 parameters, the same corrections>
+    """
+    from .results.converted_map import convert as converted
+    from .simulator.maps.fitted_map import FittedMap
+
+    ensure_type(str, 'an error model such as "empirical"', to=to)
+    if isinstance(fitted, FittedMap):
+        return converted(fitted, to, "map")
+    return converted(load_map(fitted), to, Path(fitted).stem)
+
+
+def _observed(
+    experiment: Experiment | PathLike,
+    readings: Tables,
+    certificate: PathLike | pandas.DataFrame | None,
+) -> tuple[Experiment, ObservedReadings]:
+    """An experiment with its certificate, and what its readings are."""
+    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.readings.certificate_files import read_certificate
+    from ballplate.simulator.readings.reading_files import read_readings
+
+    chosen = _experiment(experiment)
+    tables = _tables(readings, chosen)
+    if certificate is not None:
+        chosen = read_certificate(_table("certificate", certificate), chosen)
+    return chosen, read_readings(tables, lay_out(chosen), settings=chosen.readings)
 
 
 def compare(

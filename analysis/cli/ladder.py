@@ -22,10 +22,10 @@ LEAST, MOST = 3, 12
 def add_options(parser: ArgumentParser) -> None:
     add_readings(parser)
     parser.add_argument(
-        "--most",
+        "--coefficients",
         metavar="N",
         type=_coefficients,
-        help=f"coefficients that are tried, {LEAST} to {MOST}; default 8",
+        help=f"most coefficients that are tried, {LEAST} to {MOST}; default 8",
     )
     add_json(parser)
 
@@ -47,7 +47,7 @@ def run(options: Namespace) -> int:
 
     experiment, observed = observed_readings(options)
     with progress(options) as shown:
-        most = options.most or MOST_COEFFICIENTS
+        most = options.coefficients or MOST_COEFFICIENTS
         result = ladder(experiment, observed, options.sigma, most, shown.show)
     show(options, result)
     warn(result.cautions)

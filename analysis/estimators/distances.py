@@ -412,7 +412,7 @@ def _of_truth(
     lengths = uncertainties(linearise(design), symbols=("U6",)).get("U6")
     if lengths is None or lengths.undetermined or len(errors) < 2:
         return {}
-    found = {}
+    found: dict[str, TruthErrors] = {}
     for name, own in zip(("full", estimator), np.stack(errors, axis=1), strict=True):
         of_one = truth_errors(own)
         found |= {} if of_one is None else {name: of_one}

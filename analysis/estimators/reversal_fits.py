@@ -232,8 +232,8 @@ def _refuse_turn(observed: ObservedReadings, say: Callable[[Steps, str], None]) 
 def _in_both(observed: ObservedReadings) -> Integers:
     """Balls that are read in both positions."""
     readings = observed.design.readings
-    found = [np.unique(readings.ball[readings.position == k]) for k in range(2)]
-    return np.intersect1d(*found)
+    first, second = (readings.ball[readings.position == k] for k in range(2))
+    return np.intersect1d(first, second)
 
 
 def _of_difference(

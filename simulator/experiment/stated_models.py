@@ -102,4 +102,5 @@ def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> E
 
 @cache
 def _adapter() -> TypeAdapter[Any]:
-    return TypeAdapter(ErrorModelSettings)
+    kinds: Any = ErrorModelSettings
+    return TypeAdapter(kinds)

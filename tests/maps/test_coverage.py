@@ -22,9 +22,7 @@ def shares_covered(
 ) -> np.ndarray:
     """For each of so many campaigns the share of corrected lengths whose U holds the true one."""
     design = lay_out(experiment)
-    truth = true_machine(
-        experiment.true_machine, design.model, *experiment.machine.volume.corners
-    )
+    truth = true_machine(experiment.true_machine, design.model, *experiment.machine.volume.corners)
     generator = np.random.default_rng(5)
     volume, offset = design.machine.volume, design.probes.offsets[:1]
     shares = []

@@ -158,9 +158,10 @@ def test_plans_and_trials_know_the_map(tmp_path: Path) -> None:
         "B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}]
     )
     found = bp.run(with_map, trials=40, seed=1, workers=1)
-    assert found.quantities["U6"].average < bp.run(
-        campaigns.experiment("B", campaigns.second)
-    ).quantities["U6"].average
+    assert (
+        found.quantities["U6"].average
+        < bp.run(campaigns.experiment("B", campaigns.second)).quantities["U6"].average
+    )
     assert found.monte_carlo is not None and not found.monte_carlo.failed
 
 
@@ -169,7 +170,10 @@ CASES = {
         {"machine": IN_SPACE["machine"] | {"volume": ["500 mm", "500 mm", "600 mm"]}},
         "its volume goes from 0 mm to 500 mm in z, but machine.volume from 0 mm to 600 mm",
     ),
-    "model": ({"error_model": {"kind": "empirical"}}, "is of another error model (parameters differ"),
+    "model": (
+        {"error_model": {"kind": "empirical"}},
+        "is of another error model (parameters differ",
+    ),
     "file": ({"priors": [{"kind": "map", "file": "none.yaml"}]}, "there is no such file"),
     "age": (
         {"priors": [{"kind": "map", "file": "first.yaml", "drift_per_year": "1 um"}]},
@@ -192,7 +196,10 @@ CASES = {
         {"priors": [{"kind": "map", "file": "first.yaml", "years": 1}]},
         "an age needs a drift",
     ),
-    "slip": ({"priors": [{"kind": "map", "file": "first.yaml", "inflat": 1}]}, "inflat: unknown key"),
+    "slip": (
+        {"priors": [{"kind": "map", "file": "first.yaml", "inflat": 1}]},
+        "inflat: unknown key",
+    ),
 }
 
 

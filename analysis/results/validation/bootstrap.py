@@ -200,7 +200,7 @@ class Bootstrap(Result):
 
 
 @single_threaded
-def replicate(
+def replicated(
     design: Design, truth: State, sigma: float, monomials: bool, seed: int, trial: int
 ) -> Replicate:
     """Estimates from one data set of `truth`, whose stated uncertainties `sigma` multiplies; the
@@ -227,9 +227,12 @@ def replicate(
     return Replicate("converged", estimated_functions(at, monomials).values, float(np.sqrt(left)))
 
 
-def _task(*given: Any) -> list[Replicate]:
-    *common, first, last = given
-    return [replicate(*common, trial) for trial in range(first, last)]
+def _task(
+    design: Design, truth: State, sigma: float, monomials: bool, seed: int, first: int, last: int
+) -> list[Replicate]:
+    return [
+        replicated(design, truth, sigma, monomials, seed, trial) for trial in range(first, last)
+    ]
 
 
 def bootstrap(

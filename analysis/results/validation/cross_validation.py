@@ -92,7 +92,7 @@ class CrossValidation(FitResult):
             [
                 "largest",
                 number(1e6 * size.max(), 3),
-                number(1e6 * np.linalg.norm(self.uncertainties[int(size.argmax())]), 3),
+                number(1e6 * float(np.linalg.norm(self.uncertainties[int(size.argmax())])), 3),
             ],
             [
                 f"largest in its u, {worst.max():.2f} times: {'xyz'[axis]} at ({where}) mm",

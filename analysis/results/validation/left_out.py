@@ -16,7 +16,12 @@ from typing import Literal
 import numpy as np
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, measured, reading_uncertainties
+from ballplate.simulator.design.arrays import (
+    Design,
+    Observations,
+    measured,
+    reading_uncertainties,
+)
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.functions import (
@@ -99,8 +104,8 @@ def without(design: Design, group: LeftGroup) -> tuple[Design, Flags]:
     readings, lengths = design.readings, design.of(Lengths)
     out = np.isin(readings.position, group.positions)
     uncertainty = reading_uncertainties(design, readings) * np.where(out, OUT, 1.0)[:, None]
-    changed = [lengths.select(~out[lengths.first])]
-    is_out = {Lengths: np.zeros(0, bool)}
+    changed: list[Observations] = [lengths.select(~out[lengths.first])]
+    is_out: dict[type[Observations], Flags] = {}
     for one in design.observations:
         if not isinstance(one, Lengths):
             mine = np.zeros(one.count(design), bool)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
@@ -89,7 +89,9 @@ def kinematic_rung(
     given = experiment.error_model
     if not isinstance(given, KinematicSettings):
         given = KinematicSettings(kind="kinematic")
-    basis = "monomial" if given.basis == "monomial" else "chebyshev"
+    basis: Literal["monomial", "chebyshev"] = (
+        "monomial" if given.basis == "monomial" else "chebyshev"
+    )
     single = {} if own is None else dict(own)
     settings = KinematicSettings(
         kind="kinematic",
@@ -115,7 +117,7 @@ def empirical_rung(experiment: Experiment, coefficients: int) -> LadderModel:
     words = f"empirical, {coefficients} coefficients"
     model = _built(experiment, settings)
     kinematic = kinematic_rung(experiment, coefficients, coefficients)
-    within = coefficients if _is_within(kinematic.model, model) else 0
+    within = coefficients if _within_once(kinematic.model, model) else 0
     return LadderModel(words, settings, model, within=within)
 
 
@@ -152,7 +154,6 @@ def contains(outer: LadderModel, inner: LadderModel) -> bool:
     )
 
 
-@lru_cache(maxsize=256)
 def _is_within(inner: ErrorModel, outer: ErrorModel) -> bool:
     if outer.dimension != 3:
         # Models are compared in space only.
@@ -162,6 +163,10 @@ def _is_within(inner: ErrorModel, outer: ErrorModel) -> bool:
     except NotContainedError:
         return False
     return True
+
+
+_within_once: Any = lru_cache(maxsize=32)(_is_within)
+"""The same for models of this program, which are hashed: it takes as long as a fit."""
 
 
 def chain_of(model: ErrorModel) -> KinematicModel:
