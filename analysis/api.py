@@ -536,19 +536,21 @@ def cross_validate(
     against: Tables,
     sigma: Literal["estimated", "given"] | None = None,
     certificate: PathLike | pandas.DataFrame | None = None,
+    common: bool = True,
 ) -> CrossValidation:
     """Readings of two campaigns by the same experiment compared throughout the volume, the rigid
-    motion between what they find taken out.
+    motion between what they find taken out. Errors of certificates are in `common`, unless the
+    second campaign read another plate.
 
     >>> twice = [simulate(quickstart(), seed) for seed in (1, 2)]
-    >>> cross_validate(quickstart(), *twice).complaint
+    >>> cross_validate(quickstart(), *twice, common=False).complaint
     ''
     """
     from .results.validation.cross_validation import cross_validate as compared
 
     ensure_one_of(SIGMAS, sigma=sigma)
     chosen, first = _observed(experiment, readings, certificate)
-    return compared(chosen, first, _observed(chosen, against, None)[1], sigma)
+    return compared(chosen, first, _observed(chosen, against, None)[1], sigma, common)
 
 
 def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:

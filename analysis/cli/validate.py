@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .common import add_json
 from .observed import add_readings, observed_readings, tables
+from .outputs import UsageError
 
 HELP = "leave out positions, plates and directions in turn and predict them; compare two campaigns"
 DESCRIPTION = (
@@ -27,6 +28,14 @@ def add_options(parser: ArgumentParser) -> None:
         default=[],
         help="readings of a second campaign by the same file; may be repeated for several tables",
     )
+    parser.add_argument(
+        "--other-plate",
+        action="store_true",
+        help=(
+            "with --against: the second campaign read another plate, or one that was certified"
+            " anew, so that errors of certificates are not the same in both"
+        ),
+    )
     add_json(parser)
 
 
@@ -37,13 +46,16 @@ def run(options: Namespace) -> int:
     from .progress import progress
     from .telling import complain
 
+    if options.other_plate and not options.against:
+        raise UsageError("--other-plate goes with --against only; leave it out")
     experiment, observed = observed_readings(options)
     result: FitResult
     if options.against:
         from ..results.validation.cross_validation import cross_validate
 
         other = tables(options, experiment, options.against)
-        result = cross_validate(experiment, observed, other, options.sigma)
+        common = not options.other_plate
+        result = cross_validate(experiment, observed, other, options.sigma, common)
     else:
         from ..results.validation.left_out import validate
 

@@ -138,7 +138,7 @@ def test_the_change_of_a_length_scatters_as_it_says() -> None:
     design = lay_out(small())
     group = groups_to_leave(design)[1]
     standardised = []
-    for seed in range(20):
+    for seed in range(10):
         observed = campaign(design, 100 + seed)
         found = validate_one(observed, group)
         standardised.append(found)
@@ -227,19 +227,23 @@ def test_a_campaign_does_not_differ_from_itself() -> None:
     assert np.abs(found.differences).max() < 1e-15 and found.chance > 0.999
 
 
-def differences(count: int) -> Real:
-    """Sums of squares, over their dimensions, of pairs of campaigns with the same certificate."""
+def differences(count: int, common: bool = True) -> Real:
+    """Sums of squares, over their dimensions, of pairs of campaigns with the same certificate, or
+    each with its own.
+    """
     design, found = lay_out(small()), []
     for k in range(count):
-        pair = [campaign(design, 1000 + 2 * k + j, k) for j in range(2)]
-        one = cross_validate(small(), *pair, "given")
+        seeds = [1000 + 2 * k + j for j in range(2)]
+        pair = [campaign(design, seed, k if common else seed) for seed in seeds]
+        one = cross_validate(small(), *pair, "given", common)
         found.append(one.sum_of_squares / one.dimensions)
         dimensions = one.dimensions
     return np.array([*found, dimensions])
 
 
-def test_two_campaigns_differ_by_what_their_covariance_says() -> None:
-    *ratios, dimensions = differences(20)
+@pytest.mark.parametrize("common", [True, False])
+def test_two_campaigns_differ_by_what_their_covariance_says(common: bool) -> None:
+    *ratios, dimensions = differences(10, common)
     error = np.sqrt(2.0 / dimensions / len(ratios))
     assert abs(np.mean(ratios) - 1.0) < 4.0 * error
 

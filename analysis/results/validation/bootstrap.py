@@ -27,6 +27,9 @@ COVERED = 0.95
 # Standard errors from which on a standard deviation differs from its linear one.
 DIFFERS = 4.0
 
+# Share of the largest uncertainty in its unit below which one is rounding.
+EXACT = 1e-6
+
 # Numbers of data sets that are named where they did not converge.
 MOST_NAMED = 20
 
@@ -96,8 +99,11 @@ class Bootstrap(Result):
         return 1.0 / float(np.sqrt(2.0 * max(len(self.deviations) - 1, 1)))
 
     def _ratios(self) -> Array:
-        u = np.where(self.uncertainties > 0.0, self.uncertainties, np.nan)
-        return np.asarray(self.standard_deviations / u)
+        """Standard deviations (m,) in the linear ones; NaN where these are rounding."""
+        units = np.array([one.unit for one in self.functions])
+        u = np.nan_to_num(self.uncertainties)
+        largest = np.array([u[units == unit].max() for unit in units])
+        return np.asarray(self.standard_deviations / np.where(u > EXACT * largest, u, np.nan))
 
     @property
     def differing(self) -> tuple[str, ...]:

@@ -155,8 +155,11 @@ def cross_validate(
     first: ObservedReadings,
     second: ObservedReadings,
     sigma: Literal["estimated", "given"] | None = None,
+    common: bool = True,
 ) -> CrossValidation:
     """Compare the estimates from the readings of two campaigns by the same file.
+
+    Errors of its certificates are in `common`, unless the plates were others.
 
     :raises ExperimentError: one of them does not converge, or nothing can be compared.
     """
@@ -174,7 +177,7 @@ def cross_validate(
         correction_rows(at.design, at.layout, at.state, places, probes).reshape(len(change), -1)
         for at, _ in fits
     ]
-    root = _root(fits, (first.x, second.x), rows)
+    root = _root(fits, (first.x, second.x), rows, common)
     # Motions, and what the readings leave open, are no difference.
     free = [
         _motions(places),
@@ -225,12 +228,15 @@ def _fitted(
 
 
 def _root(
-    fits: list[tuple[Linearisation, float]], x: tuple[Array, Array], rows: list[Array]
+    fits: list[tuple[Linearisation, float]],
+    x: tuple[Array, Array],
+    rows: list[Array],
+    have_common: bool,
 ) -> Array:
     """A square root (m, k) of the covariance of differences of functions with derivatives `rows`.
 
     Each estimate follows its observations by the root of the hat matrix. Certificates of plates are
-    the same observations in both.
+    the same observations in both if they `have_common` ones.
     """
     parts: list[Array] = []
     common: list[Array] = []
@@ -241,7 +247,7 @@ def _root(
             follows[:, some.rows] = function @ some.common[:, : function.shape[1]].T
         is_common = np.zeros(follows.shape[1], bool)
         for one in at.design.observations:
-            if one.balls.shape[1]:
+            if have_common and one.balls.shape[1]:
                 is_common[row_places(at.design)[one.word]] = True
         parts.append(scale * follows[:, ~is_common])
         common.append(follows[:, is_common])

@@ -161,9 +161,8 @@ def _richest_polynomials(
 ) -> tuple[LadderModel, tuple[str, ...]]:
     """The richest polynomials that a design determines, and in words which it does not."""
     n = m = most
-    while n > POOREST[0] and not judge.determines(make(n, m, {})):
-        n, m = n - 1, m - 1
-    together = n
+    while (n, m) != POOREST and not judge.determines(make(n, m, {})):
+        n, m = max(n - 1, POOREST[0]), max(m - 1, POOREST[1])
     while n < most and judge.determines(make(n + 1, m, {})):
         n += 1
     while m < most and judge.determines(make(n, m + 1, {})):
@@ -171,7 +170,6 @@ def _richest_polynomials(
     if n == m == most:
         return make(n, m, {}), ()
     told = f"kinematic, more than {n} and {m} coefficients"
-    assert together <= n
     return make(n, m, {}), (told,)
 
 
