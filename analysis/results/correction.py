@@ -372,11 +372,16 @@ def correction(
         pairs = np.arange(len(ends)).reshape(-1, 2)
         mapped = mapped_lengths(fitted, ends, lengths.probes.ravel(), pairs, scatter)
         values = np.where(np.isnan(mapped.standard_uncertainties), np.nan, mapped.values)
-        columns = mapped.read, values, mapped.standard_uncertainties
+        uncertainties = mapped.standard_uncertainties.tolist()
         found = tuple(
-            CorrectedLength(name, *amounts, target)
-            for name, *amounts, target in zip(
-                lengths.names, *(one.tolist() for one in columns), lengths.targets, strict=True
+            CorrectedLength(*one)
+            for one in zip(
+                lengths.names,
+                mapped.read.tolist(),
+                values.tolist(),
+                uncertainties,
+                lengths.targets,
+                strict=True,
             )
         )
     factor = coverage_factor or fitted.coverage_factor
