@@ -59,6 +59,19 @@ RECIPES = (
     "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
+    "fit small.yaml small-readings.csv --trials 2 --seed 3 --workers 1",
+    "ladder small.yaml small-readings.csv --coefficients 3",
+    (
+        "ladder tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma given"
+        " --coefficients 3 --json"
+    ),
+    "validate small.yaml small-readings.csv --sigma estimated",
+    (
+        "validate tables.yaml tables-readings.csv --certificate tables-certificate.csv --against"
+        " tables-readings.csv --other-plate --json"
+    ),
+    "convert map.yaml --to empirical -o out.yaml",
+    "convert map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"
