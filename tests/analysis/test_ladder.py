@@ -16,6 +16,7 @@ from ballplate.results.validation.nested import nested_sums
 from ballplate.results.validation.rung_choice import Comparison, FittedSum, PolynomialGrid
 from ballplate.results.validation.rungs import kinematic_rung, with_model
 from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -122,9 +123,9 @@ def test_sums_of_single_functions_are_those_of_fits_with_them() -> None:
             assert found.degrees_of_freedom == again.degrees_of_freedom
 
 
-@pytest.mark.parametrize("kind", [3, 6, 9])
+@pytest.mark.parametrize("kind", [6, 9])
 def test_the_true_model_is_recommended(kind: int) -> None:
-    found = climb(quickstart(), campaign(kind, 0), False, 6)
+    found = climb(quickstart(), campaign(kind, 0), False, 7)
     assert found.chosen.model.words == true_model(kind).words
 
 
@@ -157,11 +158,12 @@ class Wave:
         return self.base.reported()
 
 
-@pytest.mark.parametrize("sigma", ["estimated", "given"])
+@pytest.mark.parametrize("sigma", ["estimated", pytest.param("given", marks=pytest.mark.long)])
 def test_none_follows_a_wave(sigma: str) -> None:
     generator = np.random.default_rng(5)
     a = 10.0 * uncertainties(3) * generator.standard_normal(len(uncertainties(3)))
-    found = ladder(quickstart(), readings_of(Wave(1e-6), a, generator), sigma)  # type: ignore[arg-type]
+    observed = readings_of(Wave(1e-6), a, generator)
+    found = ladder(quickstart(), observed, sigma, 5)  # type: ignore[arg-type]
     assert found.is_none and found.complaint and found.to_dict()["recommended"] is None
     assert found.lines()[-2].startswith("none of these: ")
 
@@ -191,18 +193,28 @@ def test_pure_error_is_the_scatter_of_repeats_about_their_means() -> None:
 
 
 def test_what_the_design_cannot_determine_is_no_candidate() -> None:
-    """Three balls along each side in two planes tell no more than a few coefficients."""
+    """Three balls along each side in six positions tell no more than a few coefficients, of which
+    the first that are too many leave something undetermined.
+    """
     experiment = small()
-    found = ladder(experiment, simulated(experiment))
-    assert found.beyond and "not determined by this design" in "\n".join(found.lines())
-    for one in found.rungs:
-        assert one.undetermined == 0
+    found = climb(experiment, simulated(experiment), False)
+    assert found.beyond
+    numbers = found.grid.richest.model.numbers
+    assert numbers is not None and max(numbers) < 8
+    for more in ((1, 0), (0, 1)):
+        model = kinematic_rung(experiment, numbers[0] + more[0], numbers[1] + more[1])
+        at = linearise(with_model(lay_out(experiment), model.model))
+        left = at.design.observation_count - at.design.parameter_count
+        assert at.deficiency > 0 or left <= 0
+    assert (
+        linearise(with_model(lay_out(experiment), found.grid.richest.model.model)).deficiency == 0
+    )
 
 
 def test_changes_of_lengths_are_those_between_fits() -> None:
     experiment = small()
     readings = bp.simulate(experiment)
-    found = bp.ladder(experiment, readings, coefficients=4)
+    found = bp.ladder(experiment, readings, coefficients=3)
     chosen = experiment.with_({"error_model": found.error_model})
     points = bp.fit(experiment, readings).design.evaluation.points
     first, second = (bp.fit(one, readings).correct(points).points for one in (experiment, chosen))

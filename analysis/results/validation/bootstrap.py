@@ -27,6 +27,9 @@ COVERED = 0.95
 # Standard errors from which on a standard deviation differs from its linear one.
 DIFFERS = 4.0
 
+# Relative deviation that has to show for data sets to be enough.
+TOO_FEW = 0.5
+
 # Share of the largest uncertainty in its unit below which one is rounding.
 EXACT = 1e-6
 
@@ -161,6 +164,8 @@ class Bootstrap(Result):
         open_ = int(np.isnan(self.uncertainties).sum())
         if open_:
             lines.append(f"{open_} estimates are undetermined, and are left out")
+        if DIFFERS * self.ratio_error > TOO_FEW:
+            return [*lines, "so few data sets tell nothing of standard deviations; try a hundred"]
         differing = self.differing
         told = f"within {100 * DIFFERS * self.ratio_error:.2g} % of the linear ones"
         if not differing:

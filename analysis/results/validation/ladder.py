@@ -36,7 +36,7 @@ from .rung_choice import (
     FittedSum,
     PolynomialGrid,
     first_adequate,
-    is_at_limit,
+    limits_reached,
     path,
     richer,
 )
@@ -78,7 +78,8 @@ class RungFit:
 class Climb:
     """The models that a design determines, with their S^2, and what was chosen of them.
 
-    `beyond` says in words which models the design leaves undetermined.
+    `beyond` says in words which models the design leaves undetermined, `most` is the number of
+    coefficients up to which they were tried.
     """
 
     grid: PolynomialGrid
@@ -86,6 +87,7 @@ class Climb:
     chosen: FittedSum
     beaten: Beaten
     beyond: tuple[str, ...]
+    most: int
 
     @property
     def richest(self) -> FittedSum:
@@ -96,10 +98,12 @@ class Climb:
         """Why nothing shows that a model has coefficients enough, empty where something does, and
         whether that is for want of readings.
         """
-        if not is_at_limit(model, self.grid, self.every):
+        reached = limits_reached(model, self.grid, self.every)
+        if not reached:
             return "", False
         told = "the readings call for as many coefficients as "
-        if self.beyond:
+        ended = any("empirical" in words for words in self.beyond)
+        if ended if reached == (0,) else self.most not in reached:
             return f"{told}this design determines: nothing shows that these are enough", True
         return (
             f"{told}were tried, and would for more, as where an error repeats over short distances",
@@ -138,7 +142,7 @@ def climb(
             break
         every.append(fit_rung(experiment, observed, model).fitted)
     test = Comparison(given, observed.design.observation_count)
-    return Climb(grid, every, *first_adequate(grid, every, test), beyond)
+    return Climb(grid, every, *first_adequate(grid, every, test), beyond, most)
 
 
 @dataclass(frozen=True)

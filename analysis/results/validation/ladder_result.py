@@ -14,6 +14,7 @@ from ...uncertainty.summaries import Quantity
 from ..adjustments import freedom_words
 from .lack_of_fit import PureError
 from .rung_choice import FALSE_STEP, Beaten, Criteria
+from .rungs import FILE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,8 +132,8 @@ class Ladder(FitResult):
                 "the better" if better else "the worse"
             )
         return (
-            f"the file's error model, {file.model}, {told}; it changes lengths by"
-            f" {self._length(file.change.rms)} µm rms"
+            f"the file's error model, {file.model.removeprefix(FILE)}, {told}; it changes"
+            f" lengths by {self._length(file.change.rms)} µm rms"
         )
 
     def lines(self) -> list[str]:
@@ -146,7 +147,7 @@ class Ladder(FitResult):
                 words
                 for words, is_so in (
                     ("recommended", one.is_recommended and not self.is_none),
-                    ("the file's", one.is_of_file and one.model != "the file's"),
+                    ("the file's", one.is_of_file and not one.model.startswith(FILE)),
                     (f"{one.undetermined} undetermined", one.undetermined > 0),
                 )
                 if is_so

@@ -196,18 +196,21 @@ class PolynomialGrid:
         return replace(rich, model=self.make(*model.numbers, {**dict(model.own), one.name: count}))
 
 
-def is_at_limit(model: LadderModel, grid: PolynomialGrid, every: list[FittedSum]) -> bool:
-    """Whether a model has as many coefficients, in all or in single functions, as any has, so that
-    nothing shows that these are enough.
+def limits_reached(
+    model: LadderModel, grid: PolynomialGrid, every: list[FittedSum]
+) -> tuple[int, ...]:
+    """Numbers of coefficients, of all or of single functions, that are the most that any model has,
+    so that nothing shows that these are enough; 0 stands for those of an empirical model.
     """
     if model.numbers is None:
-        return model.count == max(one.model.count for one in every if one.model.numbers is None)
+        largest = max(one.model.count for one in every if one.model.numbers is None)
+        return (0,) if model.count == largest else ()
     most, poorest = grid.richest.model, dict(zip((False, True), POOREST, strict=True))
-    return any(
-        model.coefficients(one.name, one.rotation) == most.coefficients(one.name, one.rotation)
-        for one in grid.functions
-        if most.coefficients(one.name, one.rotation) > poorest[one.rotation]
+    both = (
+        (model.coefficients(*one), most.coefficients(*one), poorest[one[1]])
+        for one in ((function.name, function.rotation) for function in grid.functions)
     )
+    return tuple(sorted({mine for mine, limit, least in both if mine == limit > least}))
 
 
 def richer(model: FittedSum, every: list[FittedSum]) -> list[FittedSum]:

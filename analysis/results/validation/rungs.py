@@ -23,6 +23,9 @@ from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.settings import build_error_model
 
+# What the file's own model is called in front of its kind, where it is none of the others.
+FILE = "the file's, "
+
 # Coefficients of positional and rotational errors of the poorest rung: straight axes.
 POOREST = (2, 1)
 
@@ -124,7 +127,7 @@ def empirical_rung(experiment: Experiment, coefficients: int) -> LadderModel:
 def own_rung(experiment: Experiment, model: ErrorModel) -> LadderModel:
     """The error model of the file."""
     settings: Any = experiment.error_model
-    return LadderModel(f"the file's, {settings.kind}", settings, model)
+    return LadderModel(f"{FILE}{settings.kind}", settings, model)
 
 
 def _built(experiment: Experiment, settings: Settings) -> ErrorModel:
