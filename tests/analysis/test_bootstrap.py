@@ -80,7 +80,7 @@ def test_standard_deviations_are_the_linear_ones(deficient: bool) -> None:
     """
     fit = fitted(deficient)
     assert bool(fit.verdict.deficiency) == deficient
-    within_linear_theory(fit, 40)
+    within_linear_theory(fit, 24)
     if deficient:
         found = fit.with_trials(2, 5).bootstrap
         assert found is not None and np.isnan(found.standard_deviations).any()

@@ -123,7 +123,7 @@ def test_sums_of_single_functions_are_those_of_fits_with_them() -> None:
             assert found.degrees_of_freedom == again.degrees_of_freedom
 
 
-@pytest.mark.parametrize("kind", [6, 9])
+@pytest.mark.parametrize("kind", [6, pytest.param(9, marks=pytest.mark.long)])
 def test_the_true_model_is_recommended(kind: int) -> None:
     found = climb(quickstart(), campaign(kind, 0), False, 7)
     assert found.chosen.model.words == true_model(kind).words
