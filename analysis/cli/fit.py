@@ -26,7 +26,7 @@ from .common import (
     whole,
 )
 from .compare import add_pairs
-from .outputs import UsageError, add_force, add_output, write
+from .outputs import UsageError, Writer, add_force, add_output, write
 from .table_options import add_tables
 from .telling import complain, note, warn
 
@@ -206,12 +206,14 @@ def run(options: Namespace) -> int:
     )
     if options.trials and isinstance(result, Fit) and result.converged:
         result = _with_trials(options, result, experiment)
+    writers: dict[Path, Writer] = {}
     if options.plot and result.converged:
-        write(options, {options.plot: result.plot})
+        writers[options.plot] = result.plot
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
-        write(options, {options.output: lambda path: write_map(fitted, path)})
-        warn([left_out_words(fitted)] if fitted.left_out else [])
+        writers[options.output] = lambda path: write_map(fitted, path)
+    if writers:
+        write(options, writers)
     show(options, result)
     warn(result.cautions)
     if result.complaint:

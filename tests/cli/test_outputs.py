@@ -80,9 +80,30 @@ WALK = {
     ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
-        {"--plot": "fit.svg"},
+        {"--plot": "fit.svg", "-o": "fitted.yaml"},
         also=("balls.csv",),
     ),
+    "ladder": Walk(
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
+        {},
+        ("--coefficients", "3"),
+        also=("balls.csv",),
+    ),
+    "validate": Walk(
+        EXPERIMENT
+        | {
+            "READINGS": "readings.csv",
+            "--certificate": "certificate.csv",
+            "--against": "again.csv",
+        },
+        {},
+        also=("balls.csv",),
+    ),
+    "correct": Walk(
+        {"MAP": "map.yaml", "POINTS": "to-correct.csv", "--lengths": "l.csv", "--tasks": "t.yaml"},
+        {"-o": "corrected.csv", "--covariance": "of-all.csv"},
+    ),
+    "convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
@@ -128,6 +149,7 @@ WALK = {
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--store", "--folder", "--results", "--designs")
+LEFT_OUT += ("--lengths", "--tasks", "--against")
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +191,11 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(certificate),
     ]
     assert main(arguments) == 0
+    fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
+    assert main(fit) == 0
+    (folder / "to-correct.csv").write_text("name,x_mm,y_mm\nA,50,200\nB,450,200\n", "utf-8")
+    for name in ("l.csv", "t.yaml", "again.csv"):
+        (folder / name).write_text("is not read\n", encoding="utf-8")
     return folder
 
 
