@@ -214,6 +214,8 @@ def run(options: Namespace) -> int:
         writers[options.output] = lambda path: write_map(fitted, path)
     if writers:
         write(options, writers)
+    if options.output in writers and fitted.left_out:
+        warn([left_out_words(fitted)])
     show(options, result)
     warn(result.cautions)
     if result.complaint:
