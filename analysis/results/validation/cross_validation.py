@@ -25,7 +25,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ...presentation.formatting import aligned, as_data, number
 from ...presentation.result import FitResult
-from .lack_of_fit import chance_of
+from .lack_of_fit import chance_of, chance_words
 from .left_out import MOST_POINTS
 from .left_out_result import FAILED
 
@@ -40,7 +40,7 @@ class CrossValidation(FitResult):
 
     `sum_of_squares` of the differences, weighted with their covariance, has `dimensions`, and
     `chance` is that of one so large. `lengths` are the largest difference of a length between two
-    places, and its standard uncertainty.
+    places, and its standard uncertainty. `common` tells whether both had the same certificates.
     """
 
     label: str
@@ -55,6 +55,7 @@ class CrossValidation(FitResult):
     lengths: tuple[float, float]
     sigmas: tuple[float, float]
     coverage_factor: float
+    common: bool = True
 
     @property
     def complaint(self) -> str:
@@ -109,14 +110,15 @@ class CrossValidation(FitResult):
             f"{self.label}: {self.title}",
             (
                 f"two campaigns at {len(self.places)} places; sigma {self.sigmas[0]:.3g} and"
-                f" {self.sigmas[1]:.3g}; u of the difference without what certificates do to both;"
-                f" compare differences with {k:g} u"
+                f" {self.sigmas[1]:.3g}; u of the difference"
+                f"{' without what certificates do to both' if self.common else ''}; compare"
+                f" differences with {k:g} u"
             ),
             "",
             *aligned(rows, [False, True, True]),
             (
                 f"{self.headline()}: S^2 = {self.sum_of_squares:.4g} of {self.dimensions}"
-                f" independent differences, chance {self.chance:.2g}"
+                f" independent differences, chance {chance_words(self.chance)}"
             ),
         ]
 
@@ -206,6 +208,7 @@ def cross_validate(
         _largest_length(places, change, root),
         (scale_1, scale_2),
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
+        common,
     )
 
 

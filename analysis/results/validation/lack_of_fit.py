@@ -52,6 +52,19 @@ def pure_error(design: Design, state: State, x: Array) -> PureError:
     return PureError(float((weight * (off - mean[group]) ** 2).sum()), freedom)
 
 
+# Chances below this are told as that.
+LEAST_TOLD = 1e-6
+
+
+def chance_words(chance: float) -> str:
+    """A chance in two digits, or that it is next to none.
+
+    >>> chance_words(0.0345), chance_words(1e-300)
+    ('0.035', '<1e-06')
+    """
+    return f"{chance:.2g}" if chance >= LEAST_TOLD else f"<{LEAST_TOLD:.0e}"
+
+
 def chance_of(square: float, dimensions: int, rest: float, freedom: int, given: bool) -> float:
     """Chance that so many dimensions explain a sum of squares so large, beside a `rest` with its
     degrees of freedom: of chi-squared with `given` sigma, otherwise of Fisher's F.

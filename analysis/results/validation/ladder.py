@@ -26,7 +26,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ...gross_errors.exact_values import diagnosis_of_all
 from ...gross_errors.leftover import too_many_entries
 from ...uncertainty.summaries import uncertainties
-from .lack_of_fit import PureError, chance_of, pure_error
+from .lack_of_fit import PureError, chance_of, chance_words, pure_error
 from .ladder_result import Ladder, LengthChange, Rung
 from .nested import nested_sums
 from .rung_choice import (
@@ -329,7 +329,7 @@ def _faults(fit: RungFit, x: Array, repeats: PureError, given: bool) -> tuple[st
     if chance < MISFIT:
         found.append(
             f"lack of fit: the residuals are larger than the scatter of repeated readings explains"
-            f" (chance {chance:.1g})"
+            f" (chance {chance_words(chance)})"
         )
     square, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
     if given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:

@@ -12,7 +12,7 @@ from ...presentation.formatting import aligned, finite, number
 from ...presentation.result import FitResult
 from ...uncertainty.summaries import Quantity
 from ..adjustments import freedom_words
-from .lack_of_fit import PureError
+from .lack_of_fit import PureError, chance_words
 from .rung_choice import FALSE_STEP, Beaten, Criteria
 from .rungs import FILE
 
@@ -108,7 +108,7 @@ class Ladder(FitResult):
         if self.beaten.count:
             why = (
                 f"none of {self.beaten.count} richer models that this design determines explains"
-                f" significantly more; least chance {self.beaten.least:.2g}"
+                f" significantly more; least chance {chance_words(self.beaten.least)}"
             )
             if self.beaten.by:
                 why += f", of {self.beaten.by}"
@@ -123,7 +123,8 @@ class Ladder(FitResult):
     def _of_file(self, file: Rung) -> str:
         chosen = next(one for one in self.rungs if one.is_recommended)
         if file.beaten.chance < FALSE_STEP and file.beaten.count:
-            told = f"is too poor: {file.beaten.by} explains more (chance {file.beaten.chance:.1g})"
+            chance = chance_words(file.beaten.chance)
+            told = f"is too poor: {file.beaten.by} explains more (chance {chance})"
         elif file.parameters > chosen.parameters:
             told = "has more parameters than the readings call for"
         else:
@@ -158,7 +159,7 @@ class Ladder(FitResult):
                     str(one.parameters),
                     str(one.degrees_of_freedom),
                     f"{one.sigma:.4g}",
-                    f"{one.beaten.chance:.2g}" if one.beaten.count else "-",
+                    chance_words(one.beaten.chance) if one.beaten.count else "-",
                     f"{one.criteria.aic - least[0]:.1f}",
                     f"{one.criteria.bic - least[1]:.1f}",
                     self._length(one.change.largest),
@@ -208,7 +209,9 @@ class Ladder(FitResult):
         )
         if math.isnan(self.lack_of_fit):
             return [f"{told}; nothing else is left to test lack of fit"]
-        return [f"{told}; lack of fit of {self.recommended}: chance {self.lack_of_fit:.2g}"]
+        return [
+            f"{told}; lack of fit of {self.recommended}: chance {chance_words(self.lack_of_fit)}"
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         return {

@@ -9,6 +9,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ...presentation.formatting import aligned, as_data, number
 from ...presentation.result import FitResult
+from .lack_of_fit import chance_words
 
 # Chance, of all that is left out together, below which a prediction fails.
 FAILED = 0.01
@@ -122,7 +123,7 @@ class Validation(FitResult):
         if not failed:
             told = (
                 f"no prediction fails: the least of {tested} chances is"
-                f" {min(one.chance for one in self.left_out if one.predicted > 0):.2g}"
+                f" {chance_words(min(one.chance for one in self.left_out if one.predicted > 0))}"
             )
             return [*lines, told]
         names = ", ".join(f"{one.kind} {one.name}" for one in failed)
@@ -172,7 +173,7 @@ def _cells(one: PredictedGroup, k: float) -> list[str]:
         return ["nothing", "", "", "", "", "", ""]
     worst, lengths = one.worst, one.lengths
     error = (one.mean_square**0.5) / one.sigma if one.sigma > 0.0 else float("nan")
-    cells = [str(one.predicted), number(error, 3), f"{one.chance:.2g}"]
+    cells = [str(one.predicted), number(error, 3), chance_words(one.chance)]
     if worst is None:
         cells += ["", ""]
     else:
