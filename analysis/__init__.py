@@ -16,10 +16,13 @@ if TYPE_CHECKING:
         certificate,
         check,
         compare,
+        convert,
         correct,
+        cross_validate,
         diff,
         experiment,
         fit,
+        ladder,
         lengths,
         load,
         load_all,
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
         sheet,
         simulate,
         spline,
+        validate,
         write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
@@ -56,10 +60,13 @@ __all__ = [
     "certificate",
     "check",
     "compare",
+    "convert",
     "correct",
+    "cross_validate",
     "diff",
     "experiment",
     "fit",
+    "ladder",
     "lengths",
     "load",
     "load_all",
@@ -79,6 +86,7 @@ __all__ = [
     "stored",
     "sweep",
     "sweep_report",
+    "validate",
     "write_map",
 ]
 

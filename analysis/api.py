@@ -30,9 +30,8 @@ from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
 
 from .estimators.estimator_choice import (
+    COMPARED,
     ESTIMATORS,
-    OF_DISTANCES,
-    OF_LENGTHS,
     EstimatorName,
     misused,
     takers,
@@ -61,12 +60,17 @@ if TYPE_CHECKING:
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
     from .results.adjusted_machine import AdjustedMachine
+    from .results.converted_map import ConvertedMap
     from .results.correction import Correction
     from .results.differences.map_difference import MapDifference
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
+    from .results.validation.cross_validation import CrossValidation
+    from .results.validation.ladder_result import Ladder
+    from .results.validation.left_out_result import Validation
     from .simulator.maps.fitted_map import FittedMap
+    from .simulator.readings.observed_readings import ObservedReadings
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -356,6 +360,10 @@ def fit(
     coordinates: str | None = None,
     names: str | None = None,
     swap_names: bool | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Report = unreported,
 ) -> Fit: ...
 
 
@@ -379,6 +387,10 @@ def fit(
     coordinates: str | None = None,
     names: str | None = None,
     swap_names: bool | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Report = unreported,
 ) -> FitResult: ...
 
 
@@ -401,6 +413,10 @@ def fit(
     coordinates: str | None = None,
     names: str | None = None,
     swap_names: bool | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Report = unreported,
 ) -> FitResult:
     """The estimate from readings: a table or several, or those that the experiment's file names;
     also reports of measuring programs, as `read_report` reads them.
@@ -415,8 +431,9 @@ def fit(
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
     `offsets` between its positions are estimated. With `components`, one of the
     `ballplate.GROUPINGS`, variances of groups of observations are estimated, and `reweight` puts
-    these in the place of the stated ones. What is to be known beside the figures is in the
-    result's `remarks`, `warnings` and `complaint`.
+    these in the place of the stated ones. With `trials` so many data sets of the fitted parameters
+    are fitted as well, from a `seed` and by several `workers`. What is to be known beside the
+    figures is in the result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
     >>> fit(quickstart(), readings).converged
@@ -431,6 +448,8 @@ def fit(
     from ballplate.simulator.readings.reading_files import read_readings
 
     from .estimators.estimator_choice import fit_readings
+    from .montecarlo.trials import MOST_TRIALS
+    from .results.fit import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=estimator)
@@ -440,9 +459,15 @@ def fit(
     ensure_type(bool, "True or False", offsets=offsets, reweight=reweight)
     if components is not None:
         ensure_one_of(GROUPINGS, components=components)
-    asked = {"scale": scale, "offsets": not offsets, "pairs": pairs}
+    asked: dict[str, object] = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
-    asked |= {"components": components, "reweight": reweight}
+    asked |= {"components": components, "reweight": reweight, "trials": trials}
+    ensure_whole(1, MOST_TRIALS, trials=trials)
+    ensure_whole(0, seed=seed)
+    ensure_whole(1, workers=workers)
+    ensure_report(report)
+    if trials is None and (seed is not None or workers != 1):
+        raise ValueError("seed and workers go with trials only; leave them out")
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} goes with the estimator {wrong[1]} only; leave it out")
@@ -457,7 +482,7 @@ def fit(
         chosen = read_certificate(_table("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
     observed = replace(observed, of_certificate=chosen.doubts[stated:])
-    return fit_readings(
+    found = fit_readings(
         chosen,
         observed,
         estimator,
@@ -470,6 +495,112 @@ def fit(
         components,
         reweight,
     )
+    if trials is None or not isinstance(found, Fit) or not found.converged:
+        return found
+    return found.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
+
+
+def ladder(
+    experiment: Experiment | PathLike,
+    readings: Tables = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    coefficients: int = 8,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    report: Report = unreported,
+) -> Ladder:
+    """Which error model readings call for: kinematic ones with up to so many `coefficients`,
+    and empirical ones, compared by what richer ones explain, and what each changes in lengths.
+
+    >>> readings = simulate(quickstart())
+    >>> ladder(quickstart(), readings, coefficients=6).recommended
+    'kinematic, 5 and 5 coefficients'
+    """
+    from .results.validation.ladder import ladder as compared
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_whole(3, 12, coefficients=coefficients)
+    ensure_report(report)
+    chosen, observed = _observed(experiment, readings, certificate)
+    return compared(chosen, observed, sigma, coefficients, report)
+
+
+def validate(
+    experiment: Experiment | PathLike,
+    readings: Tables = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    report: Report = unreported,
+) -> Validation:
+    """Positions, plates and directions left out in turn and predicted from the rest.
+
+    >>> validate(quickstart(), simulate(quickstart()))
+    <Validation of quickstart: 9 left out in turn, 0 predicted wrongly>
+    """
+    from .results.validation.left_out import validate as predicted
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_report(report)
+    chosen, observed = _observed(experiment, readings, certificate)
+    return predicted(chosen, observed, sigma, report)
+
+
+def cross_validate(
+    experiment: Experiment | PathLike,
+    readings: Tables,
+    against: Tables,
+    sigma: Literal["estimated", "given"] | None = None,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    common: bool = True,
+) -> CrossValidation:
+    """Readings of two campaigns by the same experiment compared throughout the volume, the rigid
+    motion between what they find taken out. Errors of certificates are in `common`, unless the
+    second campaign read another plate.
+
+    >>> twice = [simulate(quickstart(), seed) for seed in (1, 2)]
+    >>> cross_validate(quickstart(), *twice, common=False).complaint
+    ''
+    """
+    from .results.validation.cross_validation import cross_validate as compared
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    chosen, first = _observed(experiment, readings, certificate)
+    return compared(chosen, first, _observed(chosen, against, None)[1], sigma, common)
+
+
+def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:
+    """A map in another error model: a kind such as "empirical", settings such as "{kind: kinematic,
+    position_coefficients: 3}", or the path of an experiment file whose model is taken.
+
+    Its `map` is the new one, with its covariance.
+
+    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> convert(fitted, "{kind: empirical, coefficients: 5}")
+    <ConvertedMap of map: empirical, 195 parameters, the same corrections>
+    """
+    from .results.converted_map import convert as converted
+    from .simulator.maps.fitted_map import FittedMap
+
+    ensure_type(str, 'an error model such as "empirical"', to=to)
+    if isinstance(fitted, FittedMap):
+        return converted(fitted, to, "map")
+    return converted(load_map(fitted), to, Path(fitted).stem)
+
+
+def _observed(
+    experiment: Experiment | PathLike,
+    readings: Tables,
+    certificate: PathLike | pandas.DataFrame | None,
+) -> tuple[Experiment, ObservedReadings]:
+    """An experiment with its certificate, and what its readings are."""
+    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.readings.certificate_files import read_certificate
+    from ballplate.simulator.readings.reading_files import read_readings
+
+    chosen = _experiment(experiment)
+    tables = _tables(readings, chosen)
+    if certificate is not None:
+        chosen = read_certificate(_table("certificate", certificate), chosen)
+    return chosen, read_readings(tables, lay_out(chosen), settings=chosen.readings)
 
 
 def diff(
@@ -538,8 +669,8 @@ def compare(
     published_maximum: str | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
-    """How far the distances that an estimator of distances or lengths alone corrects are from those
-    by the full one, on synthetic data sets of the true machine.
+    """How far the distances that another estimator corrects are from those by the full one, and
+    both from the true machine's, on synthetic data sets.
 
     `published` values, as texts with a unit, are placed among the differences.
 
@@ -551,7 +682,7 @@ def compare(
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
-    ensure_one_of((*OF_DISTANCES, *OF_LENGTHS), estimator=estimator)
+    ensure_one_of(COMPARED, estimator=estimator)
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)

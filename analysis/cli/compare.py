@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from ..estimators.estimator_choice import OF_DISTANCES, OF_LENGTHS
+from ..estimators.estimator_choice import COMPARED
 from .common import add_file, add_json, at_most, count, trial_count, whole
 
 HELP = "compare an alternative estimator with the full one on synthetic data"
 DESCRIPTION = (
     "Estimate synthetic data sets of the file's true machine with the full estimator"
-    " and with one that uses distances or lengths alone, and compare the distances that"
-    " the two correct (NPL Report CISE 15/98, section 6.2.7). The exit status is 0 if"
-    " all estimates converged, otherwise 1."
+    " and with another, and compare the distances that the two correct with one another (NPL Report"
+    " CISE 15/98, section 6.2.7) and with the true machine's. The exit status is 0 if all estimates"
+    " converged, otherwise 1."
 )
 
 
@@ -27,11 +27,11 @@ def add_options(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--estimator",
-        choices=(*OF_DISTANCES, *OF_LENGTHS),
+        choices=COMPARED,
         default="distances",
         help=(
             "default: distances; of ball bars and Bryan gauges length-equations or"
-            " sphere-then-metric"
+            " sphere-then-metric; reversal of a plate in two dimensions"
         ),
     )
     add_pairs(parser)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..estimators.estimator_choice import (
     DRAWN,
@@ -14,11 +15,25 @@ from ..estimators.estimator_choice import (
     takers,
 )
 from ..results.variance_components.groupings import GROUPINGS
-from .common import add_json, add_picture, day, map_path
+from .common import (
+    add_json,
+    add_picture,
+    add_workers,
+    day,
+    map_path,
+    trial_count,
+    whole,
+)
 from .compare import add_pairs
 from .outputs import UsageError, Writer, add_force, add_output, write
 from .reading_options import add_readings, observed_readings
 from .telling import complain, warn
+
+if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
+    from ballplate.simulator.experiment.model import Experiment
+
+    from ..results.fit import Fit
 
 HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
@@ -37,6 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
     )
     _add_estimators(parser)
     _add_components(parser)
+    _add_trials(parser)
     add_picture(
         parser,
         "--plot",
@@ -106,6 +122,22 @@ def _add_components(parser: ArgumentParser) -> None:
     )
 
 
+def _add_trials(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--trials",
+        metavar="N",
+        type=trial_count,
+        help=(
+            "fit N data sets of the fitted parameters as well, and tell what they scatter beside"
+            " the standard uncertainties (parametric bootstrap)"
+        ),
+    )
+    parser.add_argument(
+        "--seed", type=whole, help="with --trials: seed of the data sets, instead of the file's"
+    )
+    add_workers(parser)
+
+
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.map_files import write_map
@@ -129,20 +161,42 @@ def run(options: Namespace) -> int:
         options.components,
         options.reweight,
     )
+    if options.trials and isinstance(result, Fit) and result.converged:
+        result = _with_trials(options, result, experiment)
     writers: dict[Path, Writer] = {}
     if options.plot and result.converged:
         writers[options.plot] = result.plot
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
         writers[options.output] = lambda path: write_map(fitted, path)
-        warn([left_out_words(fitted)] if fitted.left_out else [])
     if writers:
         write(options, writers)
+    if options.output in writers and fitted.left_out:
+        warn([left_out_words(fitted)])
     show(options, result)
     warn(result.cautions)
     if result.complaint:
         complain(result.complaint)
     return 1 if result.complaint else 0
+
+
+def _with_trials(options: Namespace, result: Fit, experiment: Experiment) -> Fit:
+    from ballplate.simulator.computing.processes import processors
+    from ballplate.simulator.inputs.messages import refused
+
+    from .progress import progress
+
+    seed = experiment.seed if options.seed is None else options.seed
+    with progress(options) as shown:
+
+        def report(step: ProgressStep) -> None:
+            options.interruption.answer()
+            shown.show(step)
+
+        try:
+            return result.with_trials(options.trials, seed, options.workers or processors(), report)
+        except ValueError as error:
+            raise refused(experiment.source, f"{error}; leave --trials out") from None
 
 
 def _refuse_misused(options: Namespace) -> None:
@@ -157,17 +211,13 @@ def _refuse_misused(options: Namespace) -> None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
         raise UsageError(f"--{option} goes with --estimator {estimators} only; leave it out")
+    if options.trials is None and (options.seed is not None or options.workers is not None):
+        raise UsageError("--seed and --workers go with --trials only; leave them out")
     reason = misused(options.components, options.reweight, options.sigma)
     if reason:
         for name in ("components", "sigma"):
             reason = reason.replace(f" {name}", f" --{name}")
         raise UsageError(f"--{reason}")
-    first = options.files[0]
-    for second in options.readings:
-        if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
-            raise UsageError(
-                f"the experiment file comes first, then the readings: fit {second} {first}"
-            )
     if options.output and options.estimator != "full":
         raise UsageError("-o writes the map of the full estimator; leave it out")
     if options.date and not options.output:

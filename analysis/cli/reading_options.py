@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common import add_file, single
+from .outputs import UsageError
 from .table_options import add_tables, named_sources, with_options
 from .telling import complain, note, warn
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
@@ -54,22 +57,41 @@ def add_readings(parser: ArgumentParser) -> None:
 def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]:
     """The experiment that the options choose and its readings; says what is to be said of these.
 
+    :raises UsageError: the readings come first, and the experiment file after them.
     :raises ExperimentError: one of the files is wrong.
     """
-    from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.readings.certificate_files import read_certificate
-    from ballplate.simulator.readings.reading_files import read_readings
 
+    first = options.files[0]
+    for second in options.readings:
+        if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
+            raise UsageError(
+                "the experiment file comes first, then the readings:"
+                f" {options.command} {second} {first}"
+            )
     experiment = with_options(options, single(options))
     stated = len(experiment.doubts)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
     sources = options.readings or named_sources(experiment)
+    return experiment, tables(options, experiment, sources, experiment.doubts[stated:])
+
+
+def tables(
+    options: Namespace,
+    experiment: Experiment,
+    sources: Sequence[Path],
+    of_certificate: tuple[str, ...] = (),
+) -> ObservedReadings:
+    """Readings of tables; says what is to be said of them, and of a certificate's values."""
+    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.readings.reading_files import read_readings
+
     observed = read_readings(sources, lay_out(experiment), settings=experiment.readings)
-    observed = replace(observed, of_certificate=experiment.doubts[stated:])
+    observed = replace(observed, of_certificate=of_certificate)
     for remark in observed.told:
         note(options, remark)
     for remark in observed.remarks[len(observed.told) :]:
         complain(f"{', '.join(map(str, sources))}: {remark}")
     warn(observed.doubts)
-    return experiment, observed
+    return observed

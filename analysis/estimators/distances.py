@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
@@ -23,6 +23,7 @@ from ballplate.simulator.estimation.length_equations import (
     NotAMetricError,
     length_estimate,
 )
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.ball_layouts import pairs
@@ -40,7 +41,10 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings, obs
 from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
 from ..presentation.result import FitResult, Result
 from ..results.estimates import ParameterEstimate, estimate_rows
+from ..uncertainty.summaries import uncertainties
 from .length_fits import has_all_errors
+from .reversal_fits import reversal_beside_full
+from .truth_errors import TruthErrors, truth_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
@@ -48,12 +52,16 @@ QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 # each, and more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
-# Pairs of points of a comparison.
+# Pairs of points of a comparison, and those of them that are followed through all data sets.
 MOST_POINTS = 100_000
+MOST_SAME_PAIRS = 200
 
 # Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth
 # of that.
 COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
+
+
+ComparedEstimator = AlternativeName | LengthEstimator | Literal["reversal"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -109,11 +117,14 @@ class EstimatorComparison(Result):
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
     the other data sets, from 0. `published` values, by "rms" and "maximum", are placed among them.
+    `of_truth` has, by the names of both estimators, what the distances between the same pairs of
+    points in all data sets miss the true machine's by; nothing where the design leaves distances
+    undetermined.
     """
 
     label: str
     title: str
-    estimator: AlternativeName | LengthEstimator
+    estimator: ComparedEstimator
     trials: int
     pairs: int
     lengths: int
@@ -123,6 +134,7 @@ class EstimatorComparison(Result):
     maximum: Array
     failed: tuple[int, ...]
     published: Mapping[str, float | None] = field(default_factory=dict)
+    of_truth: Mapping[str, TruthErrors] = field(default_factory=dict)
 
     def headline(self) -> str:
         median = f"{1e6 * float(np.median(self.rms)):.3g} µm" if len(self.rms) else "unknown"
@@ -312,7 +324,7 @@ def fit_alternative(
 def compare_estimators(
     experiment: Experiment,
     trials: int,
-    estimator: AlternativeName | LengthEstimator = "distances",
+    estimator: ComparedEstimator = "distances",
     pair_set: str | None = None,
     across_probes: bool = False,
     seed: int | None = None,
@@ -331,7 +343,7 @@ def compare_estimators(
     chosen = np.zeros((0, 2), np.int64)
     if estimator == "length-equations" or estimator == "sphere-then-metric":
         _refuse_other_lengths(experiment, design)
-    else:
+    elif estimator != "reversal":
         _refuse_unknown_places(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
@@ -340,11 +352,13 @@ def compare_estimators(
     )
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
+    same, true = _same_pairs(design, on_truth, truth, seed, points)
+    errors: list[Array] = []
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
         try:
             both = _both_estimates(
-                design, on_truth, truth, chosen, estimator, across_probes, generator
+                experiment, design, on_truth, truth, chosen, estimator, across_probes, generator
             )
         except NoReadingError as error:
             raise ExperimentError(
@@ -359,6 +373,7 @@ def compare_estimators(
             difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
+            errors.append(np.stack([_distances(design, a, same) - true for a in both]))
         report(ProgressStep(f"data sets of {experiment.label}", trial + 1, trials))
     return EstimatorComparison(
         experiment.label,
@@ -373,15 +388,44 @@ def compare_estimators(
         np.array(maximum),
         tuple(failed),
         published or {},
+        _of_truth(design, estimator, errors),
     )
 
 
+def _same_pairs(
+    design: Design, on_truth: Design, truth: State, seed: int, points: int
+) -> tuple[Array, Array]:
+    """Pairs of points (2, p, d) that are the same in all data sets, and the true machine's
+    distances (p,) between them.
+    """
+    generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0)))
+    count = min(points, MOST_SAME_PAIRS)
+    volume = design.machine.volume
+    ends = volume.lower + volume.size * generator.random((2, count, design.dimension))
+    return ends, _distances(on_truth, truth.a, ends)
+
+
+def _of_truth(
+    design: Design, estimator: ComparedEstimator, errors: list[Array]
+) -> dict[str, TruthErrors]:
+    """What both estimators miss the truth by, from errors (2, p) of each data set."""
+    lengths = uncertainties(linearise(design), symbols=("U6",)).get("U6")
+    if lengths is None or lengths.undetermined or len(errors) < 2:
+        return {}
+    found: dict[str, TruthErrors] = {}
+    for name, own in zip(("full", estimator), np.stack(errors, axis=1), strict=True):
+        of_one = truth_errors(own)
+        found |= {} if of_one is None else {name: of_one}
+    return found
+
+
 def _both_estimates(
+    experiment: Experiment,
     design: Design,
     on_truth: Design,
     truth: State,
     chosen: Integers,
-    estimator: AlternativeName | LengthEstimator,
+    estimator: ComparedEstimator,
     across_probes: bool,
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
@@ -390,6 +434,8 @@ def _both_estimates(
     """
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
+    if estimator == "reversal":
+        return reversal_beside_full(experiment, observed)
     full = estimate(observed.design, observed.x, COMPARISON_TOLERANCE)
     if estimator == "length-equations" or estimator == "sphere-then-metric":
         try:
@@ -485,11 +531,12 @@ def _comparison_lines(comparison: EstimatorComparison) -> list[str]:
     """A comparison as lines of text: quantiles, and where published values stand in them."""
     published = comparison.published
     across = ", across probes" if comparison.across_probes else ""
-    used = _used(comparison.pairs, comparison.lengths)
+    used = f" ({_used(comparison.pairs, comparison.lengths)}{across})"
+    used = "" if comparison.estimator == "reversal" else used
     lines = [
         f"{comparison.label}: {comparison.title}",
         (
-            f"estimator {comparison.estimator} ({used}{across}) against the full one: corrected"
+            f"estimator {comparison.estimator}{used} against the full one: corrected"
             f" distances of {comparison.points} random pairs of points in each of"
             f" {comparison.trials} data sets, differences in µm"
         ),
@@ -524,7 +571,15 @@ def _comparison_lines(comparison: EstimatorComparison) -> list[str]:
         rows.append([words, *(number(1e6 * q) for q in np.quantile(values, QUANTILES)), *placed])
     if all(value is None for value in published.values()):
         rows = [row[:-2] for row in rows]
-    return lines + aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+    lines += aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+    if not comparison.of_truth:
+        return lines
+    rows = [["distances against the true machine's, µm", "bias", "by chance", "scatter", "rms", ""]]
+    for name, one in comparison.of_truth.items():
+        figures = (one.bias, one.chance, one.scatter, one.rms)
+        cells = [number(1e6 * value, 3) for value in figures]
+        rows.append([name, *cells, "<- biased" if one.is_biased else ""])
+    return [*lines, "", *aligned(rows, [False, *[True] * 4, False])]
 
 
 def _comparison_data(comparison: EstimatorComparison) -> dict[str, Any]:
@@ -544,4 +599,8 @@ def _comparison_data(comparison: EstimatorComparison) -> dict[str, Any]:
         value = comparison.published.get(key)
         if value is not None:
             data[key] |= {"published": value, "share_below_published": share_below(values, value)}
+    if comparison.of_truth:
+        data["against_truth"] = {
+            name: {**vars(one), "unit": "m"} for name, one in comparison.of_truth.items()
+        }
     return dict(as_data(data))

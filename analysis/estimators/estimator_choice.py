@@ -24,6 +24,8 @@ EstimatorName = Literal[
 ESTIMATORS: tuple[EstimatorName, ...] = get_args(EstimatorName)
 OF_DISTANCES = ("distances", "cresto", "kruth")
 OF_LENGTHS = ("length-equations", "sphere-then-metric")
+COMPARED = (*OF_DISTANCES, *OF_LENGTHS, "reversal")
+"""Those that are compared with the full one."""
 DRAWN = ("full", "reversal")
 """Those that draw their residuals."""
 
@@ -36,6 +38,7 @@ TAKE: dict[str, tuple[str, ...]] = {
     "monomials": ("full", *OF_DISTANCES),
     "components": ("full",),
     "reweight": ("full",),
+    "trials": ("full",),
 }
 
 

@@ -14,8 +14,9 @@ from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design, State, reading_noise
 from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.reversal import (
     Reversal,
     UndeterminedError,
@@ -28,7 +29,7 @@ from ballplate.simulator.geometry.motions import rotation_from_vector, vector_fr
 from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.metric import Scale
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.settings import MetricSettings, build_error_model
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ from ..results.estimates import ParameterEstimate
 from ..results.fit import Fit
 from ..results.plates import axes_of_plates
 from ..results.study import fit
-from .reversal_result import ReversalFit
+from .reversal_result import ReversalFit, of_all_balls
 
 INSTEAD = "or fit without --estimator, which takes any positions"
 
@@ -64,7 +65,8 @@ def fit_reversal(
     corners = experiment.machine.volume.corners
     design = replace(observed.design, model=build_error_model(experiment.error_model, *corners))
     observed = replace(observed, design=design)
-    seen = _mean_readings(observed)
+    both = _in_both(observed)
+    seen = _mean_readings(observed)[:, both]
     k, m = (0, 1) if turn_between(*seen) < 0.0 else (1, 0)
     try:
         found = reverse(seen[k], seen[m], scale, offsets)
@@ -77,6 +79,7 @@ def fit_reversal(
     axes = axes_of_plates(experiment)[design.artefacts.names[0]]
     full = fit(experiment, observed, sigma)
     values = [found.alpha, found.beta, found.gamma, *found.offset.tolist()][: 5 if offsets else 3]
+    uncertainties = found.spread * _of_difference(experiment, observed, found, sigma)
     return ReversalFit(
         experiment.label,
         experiment.title,
@@ -87,16 +90,41 @@ def fit_reversal(
         seen[k] + design.positions.origins[k],
         found,
         tuple(
-            ParameterEstimate(n, v, np.nan, u)
-            for (n, u), v in zip(PARAMETERS, values, strict=False)
+            ParameterEstimate(name, value, u, unit)
+            for (name, unit), value, u in zip(
+                PARAMETERS, values, uncertainties.tolist(), strict=False
+            )
         ),
         axes,
         design.balls.names,
-        in_plate_axes(found.coordinates, axes)[0],
+        both,
+        in_plate_axes(of_all_balls(found.coordinates, both, len(design.balls.names)), axes)[0],
         full,
         _redundant(design, full, k, m) if full.converged else (),
         chance,
     )
+
+
+def reversal_beside_full(
+    experiment: Experiment, observed: ObservedReadings
+) -> tuple[Array, Array] | None:
+    """The machine's parameters by the full estimator and by the reversal from the same readings;
+    None where either finds none.
+
+    :raises ExperimentError: the experiment is no reversal; every reason at once.
+    """
+    _refuse_others(experiment, observed, None)
+    full = estimate(observed.design, observed.x)
+    seen = _mean_readings(observed)[:, _in_both(observed)]
+    first, second = seen if turn_between(*seen) < 0.0 else seen[::-1]
+    scale = experiment.error_model.plane_scale
+    try:
+        found = reverse(first, second, scale)
+    except UndeterminedError:
+        return None
+    if full.status != "converged":
+        return None
+    return full.state.a, np.array([found.alpha, found.gamma][: 1 if scale == "none" else 2])
 
 
 PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
@@ -171,12 +199,14 @@ def _unusable_readings(experiment: Experiment, observed: ObservedReadings) -> li
         found.append(Message(file, 0, 0, "", text))
     count = np.zeros((2, len(design.balls.names)), np.int64)
     np.add.at(count, (design.readings.position, design.readings.ball), 1)
+    axes = axes_of_plates(experiment)[design.artefacts.names[0]]
     for k in range(2):
-        unread = [f'"{design.balls.names[ball]}"' for ball in np.flatnonzero(count[k] == 0)]
-        if unread:
+        of_axes = [ball for ball in (axes.origin, axes.ball) if count[k, ball] == 0]
+        if of_axes:
+            unread = [f'"{design.balls.names[ball]}"' for ball in of_axes]
             text = (
-                f'the reversal needs every ball in both positions; in "{design.positions.names[k]}"'
-                " the readings lack "
+                "the reversal needs the balls that define the plate's axes in both positions; in"
+                f' "{design.positions.names[k]}" the readings lack '
             )
             found.append(Message(file, 0, 0, "", f"{text}{listing(unread)}; read them, {INSTEAD}"))
     return found
@@ -186,7 +216,11 @@ def _refuse_turn(observed: ObservedReadings, say: Callable[[Steps, str], None]) 
     """Refuse positions between which no quarter turn lies."""
     if len(observed.design.balls.names) < 2:
         return
-    turn = np.degrees(turn_between(*_mean_readings(observed)))
+    both = _in_both(observed)
+    if len(both) < 2:
+        say(("positions",), "fewer than two balls are read in both positions; read more")
+        return
+    turn = np.degrees(turn_between(*_mean_readings(observed)[:, both]))
     if not 45.0 < abs(turn) < 135.0:
         names = " and ".join(f'"{name}"' for name in observed.design.positions.names)
         say(
@@ -195,9 +229,38 @@ def _refuse_turn(observed: ObservedReadings, say: Callable[[Steps, str], None]) 
         )
 
 
+def _in_both(observed: ObservedReadings) -> Integers:
+    """Balls that are read in both positions."""
+    readings = observed.design.readings
+    first, second = (readings.ball[readings.position == k] for k in range(2))
+    return np.intersect1d(first, second)
+
+
+def _of_difference(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    found: Reversal,
+    sigma: Literal["estimated", "given"] | None,
+) -> float:
+    """Standard deviation of the difference of a ball's two readings: that of the residuals, or as
+    stated, the root mean square over all.
+    """
+    if (sigma or experiment.sigma) == "estimated" and found.degrees_of_freedom > 0:
+        return found.sigma
+    design, readings = observed.design, observed.design.readings
+    both = np.isin(readings.ball, _in_both(observed))
+    variance = np.zeros((2, len(design.balls.names), 2))
+    count = np.zeros(variance.shape[:2])
+    place = readings.position[both], readings.ball[both]
+    np.add.at(variance, place, reading_noise(design, readings.select(both)) ** 2)
+    np.add.at(count, place, 1.0)
+    of_means = variance[count > 0] / count[count > 0][:, None] ** 2
+    return float(np.sqrt(2.0 * of_means.mean()))
+
+
 def _mean_readings(observed: ObservedReadings) -> Array:
     """Mean reading (2, n, 2) of each ball in each position, with its probe's offset, from the
-    nominal origin.
+    nominal origin; zero where there is none.
     """
     design, readings = observed.design, observed.design.readings
     places = (
@@ -209,7 +272,7 @@ def _mean_readings(observed: ObservedReadings) -> Array:
     count = np.zeros(total.shape[:2])
     np.add.at(total, (readings.position, readings.ball), places)
     np.add.at(count, (readings.position, readings.ball), 1.0)
-    return np.asarray(total / count[:, :, None])
+    return np.asarray(total / np.maximum(count, 1.0)[:, :, None])
 
 
 def _chance(three: Reversal, five: Reversal) -> float:

@@ -9,11 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.estimation.reversal import Reversal
 from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes
+from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.metric import Scale
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.formatting import SHOWN, aligned, as_data, number, picked, to_uncertainty
+from ..presentation.formatting import (
+    SHOWN,
+    aligned,
+    as_data,
+    finite,
+    number,
+    picked,
+    to_uncertainty,
+)
 from ..presentation.result import FitResult
 from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
@@ -33,13 +42,21 @@ USELESS = 5.0
 ERRS = 1e-3
 
 
+def of_all_balls(values: Array, both: Integers, count: int) -> Array:
+    """Values (k, 2) of some balls among all (count, 2), NaN of the others."""
+    found = np.full((count, 2), np.nan)
+    found[both] = values
+    return found
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ReversalFit(FitResult):
     """The reversal, and the full estimate of the same readings.
 
     `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
-    first; `places` (n, 2) are the readings in the first. `names` and `coordinates` (n, 2) are the
-    balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple redundancy
+    first; `places` (k, 2) are the readings in the first, of the balls that are read in `both` (k,),
+    which alone the reversal takes. `names` and `coordinates` (n, 2) are the balls by the reversal
+    in the plate's own `axes`, NaN of others. `full` is the estimate by multiple redundancy
     with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless
     `scale` is "none") and offsets as the reversal defines them, with standard uncertainties.
     `without_offsets` is the chance of a ratio of sums of squares such as found if there were none;
@@ -57,6 +74,7 @@ class ReversalFit(FitResult):
     estimates: tuple[ParameterEstimate, ...]
     axes: PlateAxes
     names: tuple[str, ...]
+    both: Integers
     coordinates: Array
     full: Fit
     redundant: tuple[ParameterEstimate, ...]
@@ -77,13 +95,19 @@ class ReversalFit(FitResult):
         """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's
         own axes.
         """
-        exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
-        return float(np.abs(self.coordinates - exact).max())
+        every = of_all_balls(self.found.exact_coordinates, self.both, len(self.names))
+        exact, _ = in_plate_axes(every, self.axes)
+        return float(np.abs(self.coordinates - exact)[self.both].max())
+
+    @property
+    def names_of_both(self) -> tuple[str, ...]:
+        """The balls that are read in both positions."""
+        return tuple(self.names[ball] for ball in self.both)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
         """Readings in the first position less what those in the second predict."""
         label = f"{self.first}, less what {self.second} predicts"
-        return (Vectors(label, self.places, self.found.residuals, self.names),)
+        return (Vectors(label, self.places, self.found.residuals, self.names_of_both),)
 
     @property
     def observed(self) -> ObservedReadings:
@@ -118,6 +142,7 @@ class ReversalFit(FitResult):
                 {
                     "parameter": one.name,
                     "reversal": one.value,
+                    "standard uncertainty": one.standard_uncertainty,
                     "multiple redundancy": np.nan if other is None else other.value,
                     "its standard uncertainty": (
                         np.nan if other is None else other.standard_uncertainty
@@ -147,6 +172,11 @@ class ReversalFit(FitResult):
     @property
     def cautions(self) -> tuple[str, ...]:
         told = []
+        left = [name for name in self.names if name not in self.names_of_both]
+        if left:
+            told.append(
+                f"the reversal leaves out what is not read in both positions: {listing(left)}"
+            )
         if NOTICEABLE < self.found.bias <= USELESS:
             told.append(self._neglected())
         if self.without_offsets < ERRS:
@@ -179,7 +209,7 @@ def _lines(fit: ReversalFit) -> list[str]:
         f"{fit.label}: {fit.title}",
         f"reversal, {count}, scale difference: {scale}",
         (
-            f'{len(fit.names)} balls; "{fit.second}" is turned by {turn} degrees, clockwise, from'
+            f'{len(fit.both)} balls; "{fit.second}" is turned by {turn} degrees, clockwise, from'
             f' "{fit.first}"'
         ),
         (
@@ -199,16 +229,16 @@ def _lines(fit: ReversalFit) -> list[str]:
         "",
     ]
     redundant = {e.name: e for e in fit.redundant}
-    rows = [["parameter", "reversal", "multiple redundancy", "its standard uncertainty", "unit"]]
+    rows = [["parameter", "reversal", "u", "multiple redundancy", "its u", "unit"]]
     for one in fit.estimates:
-        other = redundant.get(one.name)
+        other, own = redundant.get(one.name), 1e6 * one.standard_uncertainty
         u = np.nan if other is None else 1e6 * other.standard_uncertainty
-        digits = 1e6 * found.sigma if np.isnan(u) else u
         beside = (
             ["-", "-"] if other is None else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
         )
-        rows.append([one.name, to_uncertainty(1e6 * one.value, digits), *beside, SHOWN[one.unit]])
-    lines += aligned(rows, [False, True, True, True, False])
+        value = to_uncertainty(1e6 * one.value, own)
+        rows.append([one.name, value, number(own, 3), *beside, SHOWN[one.unit]])
+    lines += aligned(rows, [False, True, True, True, True, False])
     return [*lines, "", *_ball_lines(fit)]
 
 
@@ -259,13 +289,16 @@ def _data(fit: ReversalFit) -> dict[str, Any]:
         "neglected_standard_uncertainties": found.bias,
         "neglected_coordinates": fit.distortion,
         "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
-        "estimates": {e.name: picked(e, "value", "unit") for e in fit.estimates},
+        "estimates": {
+            e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
+            for e in fit.estimates
+        },
         "axes": {
             "origin": fit.names[fit.axes.origin],
             "xy"[fit.axes.axis]: fit.names[fit.axes.ball],
         },
         "balls": _by_ball(fit.names, fit.coordinates),
-        "residuals": _by_ball(fit.names, found.residuals),
+        "residuals": _by_ball(fit.names_of_both, found.residuals),
         "multiple_redundancy": {
             "relation": {
                 e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
@@ -279,7 +312,10 @@ def _data(fit: ReversalFit) -> dict[str, Any]:
 
 def _by_ball(names: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:
     return {
-        name: {axis: {"value": value, "unit": "m"} for axis, value in zip("xy", row, strict=True)}
+        name: {
+            axis: {"value": finite(value), "unit": "m"}
+            for axis, value in zip("xy", row, strict=True)
+        }
         for name, row in zip(names, values.tolist(), strict=True)
     }
 

@@ -11,7 +11,6 @@ from operator import add
 import numpy as np
 from ballplate.montecarlo.reference import (
     DivergedError,
-    RankDeficientError,
     Reference,
     Truth,
     reference,
@@ -134,12 +133,11 @@ def _shared(experiment: Experiment) -> Reference | str:
     """What all replicates share, or why there are none."""
     design, truth = true_experiment(experiment)
     try:
-        return reference(design, truth)
-    except RankDeficientError as error:
-        return str(error)
+        shared = reference(design, truth)
     except (NoReadingError, DivergedError) as error:
         text = f"{error}; state smaller errors"
         raise ExperimentError([experiment.message(("true_machine",), text)]) from None
+    return shared if targets(shared) else "the design determines nothing that could be compared"
 
 
 def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
@@ -152,7 +150,8 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     # together.
     joined = replace(design, model=JoinedModel(design.model, shared.truth.model))
     both = joined.observed(_widened(design, shared.truth))
-    more = both.parameter_count - linearise(both).deficiency - design.parameter_count
+    known = design.parameter_count - shared.spectrum.deficiency
+    more = both.parameter_count - linearise(both).deficiency - known
     if more == 0:
         return Optimism(power, None)
     return Optimism(power, OwnModel(more, misfit, power_of_difference(more, misfit)))

@@ -33,10 +33,6 @@ FAITHFUL = 1e-8
 EXACT_ENOUGH = 1e-4
 
 
-class RankDeficientError(ValueError):
-    """The design is rank deficient, so that replicates have no estimate to be compared."""
-
-
 class DivergedError(ValueError):
     """The true machine's errors are so large that not even readings without noise can be fitted."""
 
@@ -81,7 +77,8 @@ class Reference:
     so far as they are read, with `end_noise` (d, ends) and `end_difference` (m, d), their
     difference at the reference; `is_expanded` tells that models are expanded about readings,
     because that is faithful. `rows` are those of each kind of observations about the truth. `start`
-    is the estimate from readings without noise.
+    is the estimate from readings without noise. Directions that the design as `drawn` leaves open
+    are held; None where there are none.
     """
 
     design: Design
@@ -97,6 +94,7 @@ class Reference:
     is_expanded: bool
     rows: tuple[Rows, ...]
     exact: Array
+    drawn: Linearisation | None = None
 
     @property
     def sum_of_squares(self) -> float:
@@ -115,7 +113,7 @@ class Reference:
     def linearisation(self) -> Linearisation:
         """The linearisation at the reference."""
         return Linearisation(
-            self.design, self.factor.layout, self.start, self.factor, self.spectrum
+            self.design, self.factor.layout, self.start, self.factor, self.spectrum, self.drawn
         )
 
     def local_model(self, points: Array, probes: Integers) -> LocalModel:
@@ -125,7 +123,8 @@ class Reference:
 
     @property
     def degrees_of_freedom(self) -> int:
-        return self.design.observation_count - self.design.parameter_count
+        known = self.design.parameter_count - self.spectrum.deficiency
+        return self.design.observation_count - known
 
 
 # In one piece: everything that replicates share is made at one reference, each part from those
@@ -134,7 +133,6 @@ class Reference:
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.
 
-    :raises RankDeficientError: a rank deficient design.
     :raises DivergedError: readings without noise that cannot be fitted.
     :raises NoReadingError: errors of the true machine so large that no reading belongs to some
         location.
@@ -143,16 +141,15 @@ def reference(design: Design, truth: Truth) -> Reference:
     least = EXACT_ENOUGH * float(observed.machine.repeatability.min())
     observed = observed.observed(*(one.loosened(least) for one in observed.observations))
     # As drawn, because a small machine error makes a direction that is open merely all but open.
-    deficiency = linearise(observed).deficiency
-    if deficiency:
-        raise RankDeficientError(f"the design is rank deficient by {deficiency}")
+    drawn = linearise(observed)
     readings = observed.readings
     exact = true_readings(observed, truth.state, readings, truth.model)
     true = [one.true_values(observed, truth.state, truth.model) for one in observed.observations]
     observed = observed.observed(
         *(one.given(value=value) for one, value in zip(observed.observations, true, strict=True))
     )
-    solution = gauss_newton(observed, exact, initial_state(observed, exact))
+    held = drawn.spectrum if drawn.deficiency else None
+    solution = gauss_newton(observed, exact, initial_state(observed, exact), held=held)
     if solution.status != "converged":
         raise DivergedError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
@@ -223,6 +220,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         is_expanded,
         tuple(one.rows(observed, start, exact) for one in observed.observations),
         exact,
+        drawn if drawn.deficiency else None,
     )
 
 

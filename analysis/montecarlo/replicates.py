@@ -20,7 +20,6 @@ from ballplate.simulator.design.arrays import Replicates
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
 from ballplate.simulator.design.parameters import SharedLayout
-from ballplate.simulator.estimation.elimination import Factor
 from ballplate.simulator.estimation.substitution import solve_balls, solve_kept, solve_shared
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -151,7 +150,7 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
             now, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
-            balls, common = _step(shared.factor, by_ball, by_shared)
+            balls, common = _step(shared, by_ball, by_shared)
             # A replicate that has converged is left alone, so that its end does not depend on its
             # neighbours.
             active = ~converged[chosen]
@@ -402,10 +401,11 @@ def _lengths(
             )
 
 
-def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
+def _step(of_all: Reference, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
     """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared
-    parameters (b, s).
+    parameters (b, s), none along what is held.
     """
+    factor = of_all.factor
     b, d, n = by_ball.shape
     e, s = len(factor.eliminated), by_shared.shape[1]
     rows = factor.ball_shared.reshape(e * d, s)
@@ -417,7 +417,10 @@ def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Arra
     if len(factor.kept):
         kept = solve_kept(factor, kept, transposed=True)
         right = right - factor.kept_shared.T @ kept
-    shared = solve_shared(factor, solve_shared(factor, right, transposed=True))
+    if of_all.drawn is None:
+        shared = solve_shared(factor, solve_shared(factor, right, transposed=True))
+    else:
+        shared = of_all.spectrum.root @ (of_all.spectrum.root.T @ right)
     steps = np.zeros((n, d, b))
     carried = (rows @ shared).reshape(e, d, b)
     steps[factor.eliminated] = solve_balls(factor, single - carried)

@@ -142,13 +142,14 @@ def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations],
 
 
 def _uncertain(target: MonteCarloQuantity) -> MonteCarloQuantity | None:
-    """A target without the members that no observation could change, whose uncertainties are
-    rounding beside the others in their unit; None where nothing is left.
+    """A target without the members that the design leaves undetermined, and without those that no
+    observation could change, whose uncertainties are rounding beside the others in their unit; None
+    where nothing is left.
     """
     kept, units = np.zeros(len(target.uncertainty), bool), np.array(target.units)
     for unit in set(target.units):
-        size = target.uncertainty[units == unit]
-        kept[units == unit] = size > UNCHANGED * size.max()
+        size = np.nan_to_num(target.uncertainty[units == unit])
+        kept[units == unit] = size > UNCHANGED * size.max(initial=0.0)
     if not kept.any():
         return None
     if kept.all():
@@ -228,7 +229,8 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
     between = places[first] - places[second]
     length = np.linalg.norm(between, axis=1)
     true_length = np.linalg.norm(of.truly[first] - of.truly[second], axis=1)
-    uncertainty = pairs_of(of.moved, np.stack(ends, axis=1)).uncertainties
+    pairs = pairs_of(of.moved, np.stack(ends, axis=1))
+    uncertainty = np.where(pairs.is_open, np.nan, pairs.uncertainties)
 
     squared, double = length**2, 2.0 * between
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .certificates.plate_certificate import PlateCertificate
+    from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
 
 REWEIGHTED = (
@@ -109,6 +111,7 @@ class Fit(FitResult):
     variance_components: VarianceComponents | None = None
     is_reweighted: bool = False
     experiment: Experiment | None = None
+    bootstrap: Bootstrap | None = None
 
     @property
     def design(self) -> Design:
@@ -181,6 +184,8 @@ class Fit(FitResult):
             lines += ["", *adjustment_lines(self.adjustments)]
         for plate in self.plates:
             lines += ["", *plate_table(plate, named=len(self.plates) > 1)]
+        if self.bootstrap is not None:
+            lines += ["", *self.bootstrap.lines()]
         return lines
 
     def to_dict(self) -> dict[str, Any]:
@@ -231,6 +236,7 @@ class Fit(FitResult):
                 else {}
             ),
             **({"adjustments": adjustment_data(self.adjustments)} if self.adjustments else {}),
+            **({} if self.bootstrap is None else {"bootstrap": self.bootstrap.to_dict()}),
             **self.said(),
         }
 
@@ -303,6 +309,30 @@ class Fit(FitResult):
         ensure_one_of(GROUPINGS, by=by)
         at = self.functions.at
         return variance_components(self.label, self.title, at, self.observed.x, by)
+
+    def with_trials(
+        self, trials: int, seed: int, workers: int = 1, report: Report = unreported
+    ) -> Fit:
+        """The fit with its estimates over data sets of its own parameters, each fitted again, as
+        `bootstrap`.
+
+        :raises ValueError: an estimate that has not converged, or errors so large that there are
+            no readings of them.
+        """
+        from .validation.bootstrap import bootstrap
+
+        found = bootstrap(
+            self.label,
+            self.title,
+            self.functions,
+            self.sigma,
+            self.sigma_is_estimated,
+            trials,
+            seed,
+            workers,
+            report,
+        )
+        return replace(self, bootstrap=found)
 
     def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
         """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint

@@ -67,6 +67,7 @@ class Reversal:
     exact_offset: Array
     scatter: float
     bias: float
+    spread: Array
 
     @property
     def single(self) -> float:
@@ -155,6 +156,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
         exact_offset,
         exact_sigma / float(np.sqrt(2.0)),
         _bias(neglected, np.abs(found - exact)[3:] / lengths[3:], exact_sigma),
+        lengths,
     )
 
 

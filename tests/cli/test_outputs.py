@@ -106,6 +106,23 @@ WALK = {
         {"-o": "o.csv", "--covariance": "v.csv"},
         ("--probe", "probe"),
     ),
+    "ladder": Walk(
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
+        {},
+        ("--coefficients", "3"),
+        also=("balls.csv",),
+    ),
+    "validate": Walk(
+        EXPERIMENT
+        | {
+            "READINGS": "readings.csv",
+            "--certificate": "certificate.csv",
+            "--against": "again.csv",
+        },
+        {},
+        also=("balls.csv",),
+    ),
+    "convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
@@ -150,7 +167,8 @@ WALK = {
 }
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
-LEFT_OUT = ("--from", "--done", "--store", "--folder", "--results", "--designs", "--tasks")
+LEFT_OUT = ("--from", "--done", "--store", "--folder", "--results", "--designs")
+LEFT_OUT += ("--tasks", "--against")
 
 
 @pytest.fixture(scope="module")

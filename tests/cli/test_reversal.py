@@ -6,14 +6,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.estimators.reversal_fits import _mean_readings
 
 FOLDER = Path("designs/hocken_borchardt")
 ANGLES = str(FOLDER / "angles.yaml")
 DUMMY = [str(FOLDER / "dummy.yaml"), str(FOLDER / "dummy-readings.csv"), "--variant", "with scale"]
 REVERSAL = ["--estimator", "reversal"]
+AS_REVERSAL: Any = {"estimator": "reversal"}
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> tuple[str, str]:
@@ -30,7 +33,7 @@ def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
     out, err = told(capsys, "fit", *DUMMY, *REVERSAL)
     lines = [line.split() for line in out.splitlines()]
     assert err == ""
-    assert ["alpha", "4.8079", "4.8062", "0.0252", "µrad"] in lines
+    assert ["alpha", "4.8079", "0.0255", "4.8062", "0.0252", "µrad"] in lines
     assert ["2", "318.1723719", "0", "318.1723704", "0", "0.0103", "0"] in lines
     assert '"turned" is turned by 89.992480 degrees, clockwise, from "first"' in out
     assert "(origin: ball 1, x axis through ball 2)" in out
@@ -220,6 +223,47 @@ def test_rank_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
     assert small * np.sin(np.radians(5)) == pytest.approx(quarter, rel=1e-6)
 
 
+def test_balls_read_in_one_position_are_left_out(tmp_path: Path) -> None:
+    """As if they had been read in neither, and what is left is a regression like any other."""
+    experiment = bp.load(ANGLES, "quarter turn")
+    readings = bp.simulate(experiment)
+    away = readings.ball.isin(["r2c2", "r3c1"])
+    one = bp.fit(experiment, readings[~away | (readings.position == "straight")], **AS_REVERSAL)
+    whole = bp.fit(experiment, readings, **AS_REVERSAL)
+    kept = np.flatnonzero(~np.isin(whole.names, ["r2c2", "r3c1"]))
+    assert one.found.residuals.shape == (len(kept), 2)
+    assert one.found.degrees_of_freedom == 2 * len(kept) - 5
+    seen = _mean_readings(whole.observed)[:, kept]
+    k, m = (0, 1) if whole.first == whole.observed.design.positions.names[0] else (1, 0)
+    x1, (x2, y2) = seen[k], seen[m].T
+    zero, unit = np.zeros(len(kept)), np.ones(len(kept))
+    rows = np.concatenate(
+        [
+            np.stack([-x2, -x2, -y2, unit, zero], axis=1),
+            np.stack([y2, -y2, -x2, zero, unit], axis=1),
+        ]
+    )
+    wanted = np.concatenate([x1[:, 0] + y2, x1[:, 1] - x2])
+    values = np.linalg.solve(rows.T @ rows, rows.T @ wanted)
+    sigma = np.sqrt(((wanted - rows @ values) ** 2).sum() / (len(rows) - 5))
+    u = sigma * np.sqrt(np.diagonal(np.linalg.inv(rows.T @ rows)))
+    np.testing.assert_allclose([e.value for e in one.estimates], values, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose([e.standard_uncertainty for e in one.estimates], u, rtol=1e-6)
+    assert np.isnan(one.coordinates).any(axis=1).sum() == 2
+    assert "leaves out what is not read in both positions: r2c2, r3c1" in one.cautions[0]
+
+
+def test_the_reversals_uncertainties_are_those_of_multiple_redundancy() -> None:
+    """Where nothing is neglected and all is read alike, both are the same estimate."""
+    experiment = bp.load(ANGLES, "quarter turn")
+    for sigma in ("given", "estimated"):
+        found = bp.fit(experiment, bp.simulate(experiment), sigma, **AS_REVERSAL)
+        for one, other in zip(found.estimates, found.redundant, strict=True):
+            np.testing.assert_allclose(
+                one.standard_uncertainty, other.standard_uncertainty, rtol=1e-3
+            )
+
+
 def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Everything that is not as it should be is named at once, at its place, with nothing on
     standard output.
@@ -228,15 +272,15 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     told(capsys, "simulate", ANGLES, "-o", str(readings), "--variant", "quarter turn")
     lines = readings.read_text().splitlines()
     readings.write_text(
-        "\n".join(line for line in lines if ",r2c2," not in line or "straight" in line) + "\n"
+        "\n".join(line for line in lines if ",r1c4," not in line or "straight" in line) + "\n"
     )
     out, err = told(
         capsys, "fit", ANGLES, str(readings), "--variant", "quarter turn", *REVERSAL, status=3
     )
     assert out == ""
     assert (
-        f'{readings}: the reversal needs every ball in both positions; in "turned by 90" the'
-        ' readings lack "r2c2"; ' in err
+        f"{readings}: the reversal needs the balls that define the plate's axes in both positions;"
+        ' in "turned by 90" the readings lack "r1c4"; ' in err
     )
     out, err = told(
         capsys, "simulate", ANGLES, "-o", str(tmp_path / "h.csv"), "--variant", "half a turn"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.estimators import distances
 from ballplate.estimators.distances import (
     MOST_DERIVATIVES,
     ball_pairs,
@@ -15,11 +17,14 @@ from ballplate.estimators.distances import (
     count_terms,
 )
 from ballplate.simulator.estimation.alternative_estimators import AlternativeName
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.uncertainty.summaries import uncertainties
 
 QUICKSTART = "designs/quickstart.yaml"
 COMPARED = ["compare", "designs/npl/6.2.7.yaml", "--variant", "5 x 5", "--trials", "4"]
@@ -199,3 +204,53 @@ def test_pairs_of_very_many_balls_are_refused_before_they_are_made(
         f"has {count} terms; at most {MOST_DERIVATIVES // 69} are possible"
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize(
+    ("file", "variant", "estimator"),
+    [
+        (QUICKSTART, None, "distances"),
+        ("designs/hocken_borchardt/dummy.yaml", "with scale", "reversal"),
+    ],
+)
+def test_errors_against_the_true_machine_are_those_of_the_distances(
+    file: str, variant: str | None, estimator: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bias and scatter over data sets, from the parameters that both estimators find."""
+    (experiment,) = [one for one in load(Path(file)) if one.name == variant]
+    design = lay_out(experiment)
+    found: list[Any] = []
+    original = distances._both_estimates
+
+    def kept(*given: Any) -> Any:
+        found.append(original(*given))
+        return found[-1]
+
+    monkeypatch.setattr(distances, "_both_estimates", kept)
+    result = compare_estimators(experiment, 4, estimator, points=7)
+    generator = np.random.default_rng(np.random.SeedSequence(experiment.seed, spawn_key=(0, 0)))
+    volume, p = design.machine.volume, design.probes.offsets[design.evaluation.probe]
+    ends = volume.lower + volume.size * generator.random((2, 7, design.dimension))
+    machine = true_machine(experiment.true_machine, design.model, *volume.corners)
+
+    def lengths(model: Any, a: Any) -> Any:
+        places = [x + model.error(x, a, np.broadcast_to(p, x.shape)) for x in ends]
+        return np.linalg.norm(places[0] - places[1], axis=1)
+
+    true = lengths(machine.model, machine.a)
+    for place, name in enumerate(("full", estimator)):
+        errors = np.array([lengths(design.model, both[place]) - true for both in found])
+        one = result.of_truth[name]
+        np.testing.assert_allclose(one.bias, np.sqrt((errors.mean(axis=0) ** 2).mean()))
+        scatter = np.sqrt(errors.var(axis=0, ddof=1).mean())
+        np.testing.assert_allclose([one.scatter, one.chance], [scatter, scatter / 2.0])
+        np.testing.assert_allclose(one.rms, np.sqrt((errors**2).mean()))
+    assert result.to_dict()["against_truth"]["full"]["rms"] == result.of_truth["full"].rms
+    assert "distances against the true machine's" in "\n".join(result.lines())
+
+
+def test_where_distances_are_undetermined_there_is_no_truth_to_miss() -> None:
+    (experiment,) = load(Path("designs/certified/deficient.yaml"))
+    quantities = uncertainties(linearise(lay_out(experiment)))
+    found = compare_estimators(experiment, 2, points=3)
+    assert (found.of_truth == {}) == (quantities["U6"].undetermined > 0)

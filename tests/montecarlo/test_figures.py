@@ -30,8 +30,11 @@ from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import expected_readings, reading_blocks
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.uncertainty.summaries import uncertainties
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:
@@ -297,11 +300,29 @@ def test_a_model_that_holds_the_true_one_is_not_blamed() -> None:
     assert done.outcome is not None and done.outcome.comparisons["U6"].flags == ()
 
 
-def test_a_deficient_design_says_why_there_is_nothing() -> None:
-    done = trials(shipped("npl/6.1.1.yaml", "B"), 64)
-    assert done.outcome is None
-    assert trials_lines(done) == ["no Monte Carlo: the design is rank deficient by 2"]
-    assert trials_data(done) == {"reason": "the design is rank deficient by 2"}
+@pytest.mark.parametrize(
+    ("file", "variant"), [("npl/6.1.1.yaml", "B"), ("hurt_foss/bryan-gauge.yaml", "one height")]
+)
+def test_of_a_deficient_design_what_is_determined_is_replicated(file: str, variant: str) -> None:
+    """S^2 has the degrees of freedom of the rank, and nothing undetermined is among the figures."""
+    experiment = shipped(file, variant)
+    done = trials(experiment, 256)
+    assert done.outcome is not None and not done.outcome.failed
+    at = linearise(lay_out(experiment))
+    assert at.deficiency > 0
+    rank = at.design.parameter_count - at.deficiency
+    misfit = done.outcome.misfit
+    assert misfit.degrees_of_freedom == at.design.observation_count - rank
+    assert not misfit.mean.differs_from(misfit.degrees_of_freedom)
+    quantities = uncertainties(at)
+    for symbol, one in done.outcome.comparisons.items():
+        assert not one.spread.differs_from(1.0) and not one.flags
+        if not one.sampled and ", " not in one.unit and symbol in quantities:
+            known = quantities[symbol].count - quantities[symbol].undetermined
+            assert one.count <= known
+    if variant == "one height":
+        # Scales of x and y are known together only: but for the squareness of both all is open.
+        assert set(done.outcome.comparisons) == {"U3"}
 
 
 def test_what_cannot_be_wrong_is_not_counted() -> None:

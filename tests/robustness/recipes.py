@@ -77,6 +77,19 @@ RECIPES = (
     "diff map.yaml map.npz --grid 2 --csv out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
     "diff map.yaml map.npz --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
+    "fit small.yaml small-readings.csv --trials 2 --seed 3 --workers 1",
+    "ladder small.yaml small-readings.csv --coefficients 3",
+    (
+        "ladder tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma given"
+        " --coefficients 3 --json"
+    ),
+    "validate small.yaml small-readings.csv --sigma estimated",
+    (
+        "validate tables.yaml tables-readings.csv --certificate tables-certificate.csv --against"
+        " tables-readings.csv --other-plate --json"
+    ),
+    "convert map.yaml --to empirical -o out.yaml",
+    "convert map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"

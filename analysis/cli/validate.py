@@ -1,0 +1,67 @@
+"""`ballplate validate`: what is left out is predicted from the rest; two campaigns are compared."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from .common import add_json
+from .outputs import UsageError
+from .reading_options import add_readings, observed_readings, tables
+
+HELP = "leave out positions, plates and directions in turn and predict them; compare two campaigns"
+DESCRIPTION = (
+    "Leave out each position, plate and direction in turn, predict its readings from all others,"
+    " and compare the errors with their uncertainties. With --against, compare what the readings of"
+    " two campaigns find throughout the volume. The exit status is 0 if no prediction fails, or the"
+    " campaigns agree, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_readings(parser)
+    parser.add_argument(
+        "--against",
+        metavar="READINGS",
+        type=Path,
+        action="append",
+        default=[],
+        help="readings of a second campaign by the same file; may be repeated for several tables",
+    )
+    parser.add_argument(
+        "--other-plate",
+        action="store_true",
+        help=(
+            "with --against: the second campaign read another plate, or one that was certified"
+            " anew, so that errors of certificates are not the same in both"
+        ),
+    )
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
+    """Validate a fit; 1 if a prediction fails, or two campaigns differ."""
+    from ..presentation.result import FitResult
+    from .common import show
+    from .progress import progress
+    from .telling import complain
+
+    if options.other_plate and not options.against:
+        raise UsageError("--other-plate goes with --against only; leave it out")
+    experiment, observed = observed_readings(options)
+    result: FitResult
+    if options.against:
+        from ..results.validation.cross_validation import cross_validate
+
+        other = tables(options, experiment, options.against)
+        common = not options.other_plate
+        result = cross_validate(experiment, observed, other, options.sigma, common)
+    else:
+        from ..results.validation.left_out import validate
+
+        with progress(options) as shown:
+            result = validate(experiment, observed, options.sigma, shown.show)
+    show(options, result)
+    if result.complaint:
+        complain(result.complaint)
+    return 1 if result.complaint else 0

@@ -1,0 +1,48 @@
+"""Bias and scatter of estimators against the true machine, over synthetic data sets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.machines.protocol import Array
+
+
+@dataclass(frozen=True)
+class TruthErrors:
+    """Errors of the distances that an estimator corrects, over data sets, in metres.
+
+    `bias` is the root mean square over pairs of points of the mean error, `scatter` that of the
+    standard deviation, `rms` that of all errors. Without any bias the scatter alone would give a
+    bias of `chance`. `rms_error` is the standard error of `rms`.
+    """
+
+    bias: float
+    scatter: float
+    rms: float
+    chance: float
+    rms_error: float
+
+    @property
+    def is_biased(self) -> bool:
+        """Whether the bias is more than scatter explains: beyond three times its chance level."""
+        return self.bias > 3.0 * self.chance
+
+
+def truth_errors(errors: Array) -> TruthErrors | None:
+    """Errors (t, p) of the distances between p pairs of points in t data sets; None of fewer than
+    two.
+    """
+    count = len(errors)
+    if count < 2:
+        return None
+    squares = (errors**2).mean(axis=1)
+    rms = float(np.sqrt(squares.mean()))
+    scatter = float(np.sqrt(errors.var(axis=0, ddof=1).mean()))
+    return TruthErrors(
+        float(np.sqrt((errors.mean(axis=0) ** 2).mean())),
+        scatter,
+        rms,
+        scatter / float(np.sqrt(count)),
+        float(squares.std(ddof=1) / np.sqrt(count) / (2.0 * rms)) if rms > 0.0 else 0.0,
+    )

@@ -1,0 +1,81 @@
+"""Sums of squares of all models that a rich one contains, from its linearisation alone.
+
+The readings are linear in the parameters of the machine to a millionth of the errors. With balls,
+poses and all others eliminated, S^2 is b + |t + X a|^2 in the machine's parameters a; a poorer one
+has some of the columns of X only. NPL Report CISE 15/98, section 5.3, compares models by the same
+sums of squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.objects import Flags
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.estimation.substitution import in_order
+from ballplate.simulator.machines.protocol import Array, Integers
+
+# Share of the largest singular value below which a direction of scaled columns counts as none.
+NOTHING = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class NestedSums:
+    """Columns X (r, n) of the machine's scaled parameters and the target t (r,); S^2 of the model
+    with some of the columns is `base` plus what they leave of the target.
+    """
+
+    columns: Array
+    target: Array
+    base: float
+
+    def basis(self, kept: Flags) -> Array:
+        """Orthonormal directions (r, q) that some columns (n,) span."""
+        return span(self.columns[:, kept], float(np.abs(self.columns).max(initial=0.0)))
+
+    def left(self, basis: Array) -> Array:
+        """What an orthonormal basis (r, q) leaves of the target (r,)."""
+        return np.asarray(self.target - basis @ (basis.T @ self.target))
+
+    def sum_of_squares(self, kept: Flags) -> float:
+        """S^2 of the model with some of the columns (n,)."""
+        left = self.left(self.basis(kept))
+        return self.base + float(left @ left)
+
+    def gain(self, basis: Array, left: Array, more: Integers) -> tuple[float, int]:
+        """How much further columns bring S^2 down beside a basis that leaves `left` (r,), and in
+        how many dimensions.
+        """
+        added = self.columns[:, more]
+        added = span(added - basis @ (basis.T @ added), float(np.abs(added).max(initial=0.0)))
+        return float(((added.T @ left) ** 2).sum()), added.shape[1]
+
+
+def span(columns: Array, size: float) -> Array:
+    """Orthonormal directions of columns, of a given size before anything was taken out."""
+    if not columns.shape[1]:
+        return np.zeros((len(columns), 0))
+    u, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, values > NOTHING * max(size, float(values[0]))])
+
+
+@single_threaded
+def nested_sums(at: Linearisation) -> NestedSums:
+    """Sums of squares of the models that the one of a fit contains, what the design leaves open
+    held.
+    """
+    layout, factor = at.layout, at.factor
+    scale = at.spectrum.scale
+    root = in_order(factor) * scale
+    null = np.linalg.qr(at.shared_null / scale[:, None])[0]
+    root -= (root @ null) @ null.T
+    of_model = np.zeros(len(layout), bool)
+    of_model[layout.model] = True
+    others = span(root[:, ~of_model], float(np.abs(root).max(initial=0.0)))
+    machine = root[:, of_model]
+    target = factor.side - machine @ (at.state.a / scale[of_model])
+    machine, target = (one - others @ (others.T @ one) for one in (machine, target))
+    base = factor.sum_of_squares - float(factor.side @ factor.side)
+    return NestedSums(machine, target, base)

@@ -1,0 +1,106 @@
+"""Error models that are stated apart from an experiment: in a few words, or by a file's section."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..design.objects import Volume
+from ..inputs.messages import ExperimentError, refused
+from ..inputs.problems import Problems
+from ..inputs.wording import explain
+from ..inputs.yamltree import Mapping as MappingNode
+from ..inputs.yamltree import Mark, Node, parse_tree, read_tree, to_python
+from ..machines.custom import CustomModelError
+from ..machines.protocol import ErrorModel
+from ..machines.settings import (
+    ErrorModelSettings,
+    MachineFileSettings,
+    PythonSettings,
+    build_error_model,
+    kind_of,
+    with_defaults,
+)
+from .changes import node_of
+from .machine_file import load_machine
+from .model_files import absolute
+
+
+@dataclass(frozen=True, eq=False)
+class StatedModel:
+    """An error model with its `settings` as a file states them, paths in them absolute."""
+
+    settings: dict[str, Any]
+    model: ErrorModel
+
+    @property
+    def kind(self) -> str:
+        return str(self.settings["kind"])
+
+
+def stated_model(text: str, volume: Volume, source: str) -> StatedModel:
+    """The error model of a text for a volume: a kind such as "kinematic", settings such as "{kind:
+    kinematic, position_coefficients: 3}", or the path of a file with a section `error_model`.
+
+    :raises ExperimentError: it is none, named by its file or as the `source`.
+
+    >>> import numpy as np
+    >>> volume = Volume(np.zeros(3), np.ones(3))
+    >>> len(stated_model("kinematic", volume, "--to").model.parameters)
+    69
+    """
+    is_file = Path(text).suffix.lower() in (".yaml", ".yml")
+    name, folder = (text, Path(text).parent) if is_file else (source, Path())
+    root = _section(read_tree(Path(text)), text) if is_file else parse_tree(text, source)
+    if not isinstance(root, MappingNode):
+        root = node_of({"kind": to_python(root)}, Mark(name, 0, 0))
+    problems = Problems(root)
+    try:
+        settings = _adapter().validate_python(to_python(root))
+    except ValidationError as error:
+        for one in explain(error.errors(include_url=False), root, _adapter().json_schema()):
+            problems.add(one.steps, one.text, one.of_key)
+        raise ExperimentError(problems.messages) from None
+    model = _built(settings, volume, folder, problems)
+    if model is None:
+        raise ExperimentError(problems.messages)
+    return StatedModel(absolute(to_python(root), folder), model)
+
+
+def _section(root: Node, source: str) -> Node:
+    found = root.items.get("error_model") if isinstance(root, MappingNode) else None
+    if found is None:
+        raise refused(source, "has no error_model; name a file that has, or state a kind")
+    return found
+
+
+def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> ErrorModel | None:
+    """The model, or None after saying what is wrong."""
+    kind, d = kind_of(settings), len(volume.lower)
+    if d not in kind.dimensions:
+        problems.add(("kind",), f"{settings.kind} models have {kind.dimensions[0]} axes, not {d}")
+        return None
+    try:
+        if isinstance(settings, MachineFileSettings):
+            settings.of(load_machine(folder / settings.file))
+        elif isinstance(settings, PythonSettings):
+            settings.beside(folder)
+        for steps, text in kind.wrong(settings, d):
+            problems.add(steps, text)
+        if not problems.messages:
+            return build_error_model(with_defaults(settings, d), *volume.corners)
+    except CustomModelError as error:
+        problems.add((error.key,), str(error))
+    except ExperimentError as error:
+        problems.take(error, ("file",))
+    return None
+
+
+@cache
+def _adapter() -> TypeAdapter[Any]:
+    kinds: Any = ErrorModelSettings
+    return TypeAdapter(kinds)

@@ -1,0 +1,113 @@
+"""Conversion of a fitted map to another error model, with its covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..computing.threads import single_threaded
+from ..design.observations.readings import rotation_sensitivity
+from ..machines.empirical import USUAL_OFFSET
+from ..machines.protocol import Array, ErrorModel
+from .fitted_map import FittedMap, determined_only
+
+# Random places for each parameter of the richer model, and the least number of them.
+PLACES_EACH, LEAST_PLACES = 2, 200
+
+# Part of a motion that the target model can do by itself, to rounding, and singular values below
+# which its parameters have no effect.
+OWN_MOTION, NOTHING = 1e-9, 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class MapConversion:
+    """A map in another error model, the nearest to it by least squares.
+
+    At `places` (n, d), scale readings with probe offsets (n, d), `residuals` (n, d) are what the
+    corrections of the new map exceed those of the old one by, in metres, after a rigid `motion`
+    (d shifts and turns) between the frames of the two models, which changes no length.
+    """
+
+    converted: FittedMap
+    places: Array
+    offsets: Array
+    residuals: Array
+    motion: Array
+
+
+@single_threaded
+def converted(
+    fitted: FittedMap, model: ErrorModel, settings: Mapping[str, Any], frame: str
+) -> MapConversion:
+    """The map in an error `model` of the same volume, whose `settings` are those of a file.
+
+    Corrections are compared at random places throughout the volume and at its corners, with the
+    probes of the map and with tips along each axis. To first order parameters of the new model are
+    linear in those of the old one, and so the covariance and the undetermined directions follow;
+    what the new model cannot do is no part of them.
+    """
+    x, p = _places(fitted, model)
+    zero, d = np.zeros(len(model.parameters)), fitted.dimension
+    own = model.jacobian(x, zero, p).reshape(x.size, -1)
+    wanted = (fitted.model.error(x, fitted.values, p) - p).ravel()
+    by_old = fitted.model.jacobian(x, fitted.values, p).reshape(x.size, -1)
+    size = np.array([1.0 / one.effect for one in model.parameters])
+    inverse = np.linalg.pinv(own * size, rcond=NOTHING)
+    arm = x + p - (x + p).mean(axis=0)
+    shifts = np.broadcast_to(np.eye(d), (len(x), d, d))
+    motions = np.concatenate([shifts, rotation_sensitivity(arm)], axis=2).reshape(x.size, -1)
+
+    def left(columns: Array) -> Array:
+        return np.asarray(columns - own @ (size[:, None] * (inverse @ columns)))
+
+    # What the model can move by itself is no motion between frames.
+    beyond = left(motions)
+    used = np.linalg.norm(beyond, axis=0) > OWN_MOTION * np.linalg.norm(motions, axis=0)
+    moving = np.linalg.pinv(beyond[:, used], rcond=OWN_MOTION)
+    sides = np.column_stack([wanted, by_old])
+    moved = moving @ left(sides)
+    by_both = size[:, None] * (inverse @ (sides - motions[:, used] @ moved))
+    values, matrix = by_both[:, 0], by_both[:, 1:]
+    motion = np.zeros(motions.shape[1])
+    motion[used] = moved[:, 0]
+    found = model.error(x, values, p) - p
+    residuals = found.ravel() + motions @ motion - wanted
+    offsets = len(fitted.scale) - len(fitted.values)
+    whole = np.zeros((len(values) + offsets, len(fitted.scale)))
+    whole[: len(values), : len(fitted.values)] = matrix
+    whole[len(values) :, len(fitted.values) :] = np.eye(offsets)
+    scale = np.concatenate([size, fitted.scale[len(fitted.values) :]])
+    root = whole @ fitted.root
+    new = replace(
+        fitted,
+        model=model,
+        settings=settings,
+        values=values,
+        covariance=np.asarray(root @ root.T),
+        undetermined=determined_only(whole @ fitted.undetermined, scale),
+        frame=frame,
+    )
+    return MapConversion(new, x, p, residuals.reshape(x.shape), motion)
+
+
+def _places(fitted: FittedMap, model: ErrorModel) -> tuple[Array, Array]:
+    """Scale readings (n, d) and probe offsets (n, d) at which corrections are compared."""
+    volume, d = fitted.volume, fitted.dimension
+    generator = np.random.default_rng(np.random.SeedSequence(1))
+    richer = max(len(model.parameters), len(fitted.values))
+    count = max(PLACES_EACH * richer, LEAST_PLACES)
+    corners = np.array(list(product((0.0, 1.0), repeat=d)))
+    fractions = np.concatenate([corners, generator.random((count, d))])
+    x = volume.lower + volume.size * fractions
+    arms = USUAL_OFFSET * float(volume.size.max()) * np.eye(d)
+    tips = np.concatenate([fitted.probes.offsets, arms])
+    of = np.arange(len(x)) % len(tips)
+    x, of = (
+        np.concatenate([x, np.repeat(x[: len(corners)], len(tips), axis=0)]),
+        np.append(of, np.tile(np.arange(len(tips)), len(corners))),
+    )
+    return x, tips[of]

@@ -1,0 +1,268 @@
+"""What is left out and predicted, against fits without it and dense linear algebra; two campaigns
+against their joint covariance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import ballplate as bp
+import numpy as np
+import pytest
+import scipy.stats
+from ballplate.results.validation.cross_validation import cross_validate
+from ballplate.results.validation.left_out import (
+    LeftGroup,
+    groups_to_leave,
+    rest_of,
+    validate,
+)
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
+from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from numpy.typing import NDArray
+
+from tests.reference import dense
+
+Real = NDArray[np.float64]
+
+
+@cache
+def small() -> Experiment:
+    """Sixteen balls in six positions."""
+    plate = {"plate": {"kind": "grid", "balls": [4, 4], "size": ["750 mm", "750 mm"]}}
+    model = {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2}
+    points = {"points": {"random": 12, "seed": 3}, "probe": "down"}
+    return bp.quickstart().with_({"artefacts": plate, "error_model": model, "evaluation": points})
+
+
+def campaign(design: Design, seed: int, certificate: int | None = None) -> ObservedReadings:
+    truth = replace(
+        nominal_state(design),
+        a=1e-6 * np.random.default_rng(1).standard_normal(len(design.model.parameters)),
+    )
+    of_values = np.random.default_rng([9, seed if certificate is None else certificate])
+    drawn = noisy_certificate(design, truth, of_values)
+    return observe(drawn, *noisy_readings(design, truth, np.random.default_rng([8, seed])))
+
+
+def fitted_without(design: Design, x: Real, positions: list[int]) -> tuple[float, int]:
+    kept = ~np.isin(design.readings.position, positions)
+    rest = replace(design, readings=design.readings.select(kept))
+    solution = estimate(rest, x[kept])
+    at = linearised_fit(rest, solution)
+    freedom = rest.observation_count - rest.parameter_count + at.deficiency
+    return solution.factor.sum_of_squares, freedom
+
+
+def test_the_rest_is_fitted_as_if_the_others_had_not_been_read() -> None:
+    design = lay_out(small())
+    observed = campaign(design, 1)
+    for group in groups_to_leave(design)[::2]:
+        found = rest_of(observed.design, observed.x, group)
+        square, freedom = fitted_without(observed.design, observed.x, group.positions.tolist())
+        assert found is not None and found.degrees_of_freedom == freedom
+        np.testing.assert_allclose(found.sum_of_squares, square, rtol=1e-5)
+
+
+@pytest.mark.parametrize("position", [0, 3])
+def test_prediction_errors_and_their_variances_are_those_of_dense_algebra(position: int) -> None:
+    design = lay_out(small())
+    observed = campaign(design, 2)
+    x, design = observed.x, observed.design
+    functions = dense.error_functions(3, 2)
+    problem = dense.Problem(
+        design,
+        functions,
+        x,
+        design.positions.rotations,
+        design.positions.origins,
+        design.balls.places,
+        np.zeros(sum(one.free for one in functions)),
+    )
+    zero = np.zeros(problem.parameters)
+    whole = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
+    now = dense.residuals(problem, zero)
+    left = np.zeros(len(now), bool)
+    left[: x.size] = np.repeat(design.readings.position == position, 3)
+    scale = 1.0 / np.sqrt((whole**2).sum(axis=0))
+    rest, own = whole[~left] * scale, whole[left] * scale
+    # What the rest says nothing of are the pose left out and, of the first, the frame.
+    _, values, directions = np.linalg.svd(rest)
+    known = np.zeros(len(directions), bool)
+    known[: len(values)] = values > 1e-9 * values[0]
+    step = directions[known].T @ (directions[known] @ -np.linalg.pinv(rest, 1e-9) @ now[~left])
+    errors = now[left] + own @ step
+    root = own @ (directions[known] / values[known[: len(values)], None]).T
+    free = own @ directions[~known].T
+    basis = np.linalg.svd(free, full_matrices=False)
+    used = basis[0][:, basis[1] > 1e-9 * basis[1][0]]
+    complement = np.eye(len(errors)) - used @ used.T
+    covariance = complement @ (np.eye(len(errors)) + root @ root.T) @ complement
+    found = rest_of(design, x, LeftGroup("position", "", np.array([position])))
+    assert found is not None
+    np.testing.assert_allclose(found.errors, complement @ errors, atol=2e-3)
+    np.testing.assert_allclose(found.variances, np.diagonal(covariance), rtol=1e-3, atol=1e-4)
+    # S^2 falls by the errors in their own covariance.
+    solution = estimate(design, x)
+    fallen = solution.factor.sum_of_squares - found.sum_of_squares
+    mine = complement @ errors
+    np.testing.assert_allclose(mine @ np.linalg.pinv(covariance, 1e-9) @ mine, fallen, rtol=1e-3)
+
+
+def test_tests_and_changes_of_lengths_are_as_defined() -> None:
+    design = lay_out(small())
+    observed = campaign(design, 3)
+    found = validate(small(), observed, "estimated")
+    whole = fitted_without(observed.design, observed.x, [])
+    for one in found.left_out:
+        group = next(g for g in groups_to_leave(design) if (g.kind, g.name) == (one.kind, one.name))
+        square, freedom = fitted_without(observed.design, observed.x, group.positions.tolist())
+        assert one.predicted == whole[1] - freedom
+        ratio = (whole[0] - square) / one.predicted / (square / freedom)
+        np.testing.assert_allclose(
+            one.chance, scipy.stats.f.sf(ratio, one.predicted, freedom), rtol=1e-3
+        )
+    assert not found.failed
+    assert {one.kind for one in found.left_out} == {"position", "direction"}
+
+
+def test_the_change_of_a_length_scatters_as_it_says() -> None:
+    """Over campaigns: the standardised change of the length that changes most, of all campaigns
+    together, against the normal distribution of the largest of many.
+    """
+    design = lay_out(small())
+    group = groups_to_leave(design)[1]
+    standardised = []
+    for seed in range(10):
+        observed = campaign(design, 100 + seed)
+        found = validate_one(observed, group)
+        standardised.append(found)
+    rms = np.sqrt(np.mean(np.square(standardised)))
+    # Changes of different lengths are close to one another in their standard uncertainties.
+    assert 0.7 < rms < 2.2
+
+
+def validate_one(observed: ObservedReadings, group: LeftGroup) -> float:
+    from ballplate.results.validation.left_out import _length_difference
+
+    solution = estimate(observed.design, observed.x)
+    at = linearised_fit(observed.design, solution)
+    rest = rest_of(observed.design, observed.x, group)
+    assert rest is not None
+    found = _length_difference(at, rest, 1.0)
+    assert found is not None
+    return found.standardised
+
+
+def test_a_shifted_reading_is_found_where_it_is() -> None:
+    observed = campaign(lay_out(small()), 4)
+    x = observed.x.copy()
+    wrong = int(np.flatnonzero(observed.design.readings.position == 2)[5])
+    x[wrong, 1] += 5e-6
+    found = validate(small(), replace(observed, x=x), "given")
+    failed = {(one.kind, one.name) for one in found.failed}
+    design = observed.design
+    assert ("position", design.positions.names[2]) in failed
+    one = next(one for one in found.left_out if one.name == design.positions.names[2])
+    assert one.worst is not None and one.worst.axis == "y"
+    assert one.worst.ball == design.ball_label(int(design.readings.ball[wrong]))
+    np.testing.assert_allclose(one.worst.error, 5e-6, atol=1.5e-6)
+
+
+def test_a_plate_is_left_out_with_its_certificate() -> None:
+    """Two plates: without the second, what is left is the experiment of the first."""
+    base = small()
+    text = {"kind": "grid", "balls": [4, 4], "size": ["750 mm", "750 mm"]}
+    stated = [dict(one) for one in positions_of(base)]
+    for k, one in enumerate(stated):
+        one["artefact"] = "second" if k in (1, 3, 5) else "first"
+    sides = {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}
+    both = base.with_(
+        {
+            "artefacts": {"first": text, "second": text},
+            "positions": stated,
+            "calibration": [{**sides, "artefact": name} for name in ("first", "second")],
+            "error_model": {"kind": "metric"},
+        }
+    )
+    design = lay_out(both)
+    observed = campaign(design, 5)
+    group = next(
+        one for one in groups_to_leave(design) if (one.kind, one.name) == ("plate", "second")
+    )
+    found = rest_of(observed.design, observed.x, group)
+    alone = both.with_(
+        {
+            "artefacts": {"first": text},
+            "positions": [one for one in stated if one["artefact"] == "first"],
+            "calibration": [{**sides, "artefact": "first"}],
+        }
+    )
+    one = lay_out(alone)
+    mine = design.balls.artefact[observed.design.readings.ball] == 0
+    given = next(o for o in observed.design.observations if o.word == "distance")
+    single = next(o for o in one.observations if o.word == "distance")
+    one = one.observed(replace(single, value=given.value[: len(single)]))
+    solution = estimate(one, observed.x[mine])
+    assert found is not None
+    np.testing.assert_allclose(found.sum_of_squares, solution.factor.sum_of_squares, rtol=1e-5)
+    at = linearised_fit(one, solution)
+    assert found.degrees_of_freedom == (one.observation_count - one.parameter_count + at.deficiency)
+
+
+def positions_of(experiment: Experiment) -> list[dict[str, object]]:
+    from ballplate.simulator.inputs.yamltree import to_python, written
+
+    return to_python(written(experiment.tree, "positions"))  # type: ignore[arg-type,return-value]
+
+
+def test_a_campaign_does_not_differ_from_itself() -> None:
+    observed = campaign(lay_out(small()), 6)
+    found = cross_validate(small(), observed, observed)
+    assert np.abs(found.differences).max() < 1e-15 and found.chance > 0.999
+
+
+def differences(count: int, common: bool = True) -> Real:
+    """Sums of squares, over their dimensions, of pairs of campaigns with the same certificate, or
+    each with its own.
+    """
+    design, found = lay_out(small()), []
+    for k in range(count):
+        seeds = [1000 + 2 * k + j for j in range(2)]
+        pair = [campaign(design, seed, k if common else seed) for seed in seeds]
+        one = cross_validate(small(), *pair, "given", common)
+        found.append(one.sum_of_squares / one.dimensions)
+        dimensions = one.dimensions
+    return np.array([*found, dimensions])
+
+
+@pytest.mark.parametrize("common", [True, False])
+def test_two_campaigns_differ_by_what_their_covariance_says(common: bool) -> None:
+    *ratios, dimensions = differences(10, common)
+    error = np.sqrt(2.0 / dimensions / len(ratios))
+    assert abs(np.mean(ratios) - 1.0) < 4.0 * error
+
+
+@pytest.mark.long
+def test_many_pairs_of_campaigns_differ_by_what_their_covariance_says() -> None:
+    *ratios, dimensions = differences(1000)
+    error = np.sqrt(2.0 / dimensions / len(ratios))
+    assert abs(np.mean(ratios) - 1.0) < 4.0 * error
+    beyond = np.mean(np.array(ratios) * dimensions > scipy.stats.chi2.isf(0.05, dimensions))
+    assert abs(beyond - 0.05) < 4.0 * np.sqrt(0.05 * 0.95 / len(ratios))
+
+
+def test_a_changed_machine_is_found() -> None:
+    design = lay_out(small())
+    first, second = campaign(design, 7), campaign(design, 8, 7)
+    x = second.x.copy()
+    x[:, 0] *= 1.0 + 4e-6
+    found = cross_validate(small(), first, replace(second, x=x), "given")
+    assert found.chance < 1e-6 and found.complaint
+    # An expansion of 4 ppm, of a length along x.
+    assert abs(found.lengths[0]) > 1e-6

@@ -1,0 +1,147 @@
+"""Maps in other error models: nothing is lost where the new one can do all, and what is lost is
+told where it cannot.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.cli import main
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.conversion import linear_map
+from ballplate.simulator.maps.corrected_points import corrected, corrected_with_root
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+
+@cache
+def fitted(model: str = "kinematic", deficient: bool = False) -> FittedMap:
+    plate = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
+    model_ = {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2}
+    changes: dict[str, object] = {"artefacts": plate, "error_model": model_}
+    if deficient:
+        changes |= {"calibration": [], "probes": {"down": ["0 mm", "0 mm", "0 mm"]}}
+        changes |= {"positions": [positions("z", 250), positions("z", 750), positions("x", 250)]}
+    experiment = bp.quickstart().with_(changes)
+    return bp.fit(experiment, bp.simulate(experiment)).to_map()
+
+
+def positions(plane: str, level: int) -> dict[str, object]:
+    others = [axis for axis in "xyz" if axis != plane]
+    corner = dict.fromkeys(others, "0 mm")
+    name = f"{plane} {level}"
+    return {"name": name, "plane": plane, "level": f"{level} mm", "corner": corner} | {
+        "probes": ["down"]
+    }
+
+
+def test_a_model_that_contains_the_other_takes_values_and_covariance() -> None:
+    old = fitted()
+    found = bp.convert(old, "{kind: empirical, coefficients: 4}")
+    assert found.is_exact and found.lengths[0] < 1e-14
+    matrix = linear_map(old.model, found.map.model)
+    np.testing.assert_allclose(found.map.values, matrix @ old.values, atol=1e-14)
+    covariance = matrix @ old.covariance @ matrix.T
+    size = np.sqrt(np.diagonal(covariance).max())
+    np.testing.assert_allclose(found.map.covariance, covariance, rtol=0, atol=1e-8 * size**2)
+    points = np.random.default_rng(2).random((5, 3))
+    for one, other in zip(
+        corrected_with_root(old, points), corrected_with_root(found.map, points), strict=True
+    ):
+        if one.ndim == 2:
+            np.testing.assert_allclose(one, other, atol=1e-14)
+        else:
+            spread = np.einsum("ndr,mer->ndme", one, one), np.einsum("ndr,mer->ndme", other, other)
+            np.testing.assert_allclose(*spread, atol=1e-7 * np.abs(spread[0]).max())
+
+
+def test_there_and_back() -> None:
+    old = fitted()
+    rich = bp.convert(old, "{kind: kinematic, position_coefficients: 5}").map
+    back = bp.convert(rich, "{kind: kinematic, position_coefficients: 3, rotation_coefficients: 2}")
+    assert back.is_exact
+    np.testing.assert_allclose(back.map.values, old.values, atol=1e-15)
+    np.testing.assert_allclose(
+        back.map.covariance, old.covariance, atol=1e-9 * np.abs(old.covariance).max()
+    )
+
+
+def test_what_a_poorer_model_loses_is_told() -> None:
+    """Least squares over the places, motions between frames beside the parameters."""
+    old = fitted()
+    found = bp.convert(old, "{kind: kinematic, position_coefficients: 2, rotation_coefficients: 1}")
+    assert not found.is_exact
+    x, p = found.conversion.places, found.conversion.offsets
+    new = found.map.model
+    own = new.jacobian(x, np.zeros(6), p).reshape(x.size, -1)
+    tip = x + p
+    motion = np.zeros((len(x), 3, 6))
+    motion[:, :, :3] = np.eye(3)
+    for axis in range(3):
+        motion[:, :, 3 + axis] = np.cross(np.eye(3)[axis], tip)
+    columns = np.concatenate([own, motion.reshape(x.size, 6)], axis=1)
+    wanted = (old.model.error(x, old.values, p) - p).ravel()
+    solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    left = columns @ solution - wanted
+    np.testing.assert_allclose(found.conversion.residuals.ravel(), left, atol=1e-13)
+    np.testing.assert_allclose(found.map.values, solution[:6], atol=1e-13)
+    size = np.linalg.norm(left.reshape(-1, 3), axis=1)
+    np.testing.assert_allclose(found.residual, (size.max(), np.sqrt((size**2).mean())), rtol=1e-6)
+    assert "cannot follow the old one exactly" in found.lines()[2]
+
+
+def test_what_is_undetermined_stays_so() -> None:
+    old = fitted(deficient=True)
+    assert old.undetermined.shape[1] > 0
+    found = bp.convert(old, "{kind: empirical, coefficients: 4}")
+    assert found.map.undetermined.shape == (len(found.map.scale), old.undetermined.shape[1])
+    points = np.random.default_rng(2).random((30, 3))
+    _, one = corrected_with_root(old, points)
+    _, other = corrected_with_root(found.map, points)
+    np.testing.assert_array_equal(np.isnan(one).any(axis=2), np.isnan(other).any(axis=2))
+    assert found.length_uncertainty is None
+
+
+def test_two_dimensions(tmp_path: Path) -> None:
+    folder = "designs/hocken_borchardt"
+    experiment = bp.load(f"{folder}/dummy.yaml", "with scale")
+    old = bp.fit(experiment, f"{folder}/dummy-readings.csv").to_map()
+    found = bp.convert(old, "{kind: kinematic, position_coefficients: 2, rotation_coefficients: 1}")
+    points = np.random.default_rng(2).random((9, 2)) * old.volume.size
+    before, after = corrected(old, points)[0], corrected(found.map, points)[0]
+    pairs = np.triu_indices(9, 1)
+    lengths = [np.linalg.norm(one[pairs[0]] - one[pairs[1]], axis=1) for one in (before, after)]
+    np.testing.assert_allclose(*lengths, atol=1e-10)
+
+
+def test_the_command_writes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bp.write_map(fitted(), tmp_path / "map.yaml")
+    arguments = [
+        "convert",
+        str(tmp_path / "map.yaml"),
+        "--to",
+        "{kind: empirical, coefficients: 4}",
+    ]
+    assert main([*arguments, "-o", str(tmp_path / "new.yaml")]) == 0
+    assert "the new error model does all that the old one did" in capsys.readouterr().out
+    again = bp.load_map(tmp_path / "new.yaml")
+    np.testing.assert_array_equal(again.values, bp.convert(fitted(), arguments[-1]).map.values)
+    assert main(["convert", str(tmp_path / "map.yaml"), "--to", "metric"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("to", "told"),
+    [
+        ("wrong", 'unknown kind "wrong"'),
+        ("{kind: kinematic, colour: red}", "colour: unknown key"),
+        ("missing.yaml", "there is no such file"),
+        ("[1, 2]", "kind"),
+        ("{kind: python, object: 'nothing:here'}", "nothing"),
+    ],
+)
+def test_what_is_no_error_model_is_told(to: str, told: str) -> None:
+    with pytest.raises(ExperimentError, match=told):
+        bp.convert(fitted(), to)
