@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from .api import (
+        budget,
         certificate,
         check,
         compare,
@@ -47,6 +48,7 @@ __all__ = [
     "GROUPINGS",
     "OtherSweepError",
     "StoreError",
+    "budget",
     "certificate",
     "check",
     "compare",

@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
+    from .results.budget import UncertaintyBudget
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
@@ -454,6 +455,26 @@ def fit(
         components,
         reweight,
     )
+
+
+def budget(
+    experiment: Experiment | PathLike, fit: Fit | None = None, by: Grouping = "calibration"
+) -> UncertaintyBudget:
+    """What each source contributes to U4, U6, the body diagonals and the measuring tasks of a
+    design or, with its `fit`, of that.
+
+    `by` splits the readings by axis, probe, position or artefact; as they are by default, they are
+    one source. Contributions add in squares.
+
+    >>> budget(quickstart())
+    <UncertaintyBudget of quickstart: readings 75 % of the variance of U6>
+    """
+    from .results.budget import budget as budget_of
+    from .results.fit import Fit
+
+    ensure_type(Fit, "the result of fit() by the full estimator", fit=fit)
+    ensure_one_of(GROUPINGS, by=by)
+    return budget_of(_experiment(experiment), fit, by)
 
 
 def compare(

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.machines.arrangement import AXES
 from ballplate.simulator.machines.curves import Points
 from ballplate.simulator.machines.description import (
@@ -32,16 +33,6 @@ MOST_POINTS = 200_000
 
 # Points along an axis at which a parametric error is told.
 ALONG = 101
-
-DIAGONALS: tuple[tuple[tuple[int, int, int], tuple[int, int, int]], ...] = (
-    ((0, 0, 0), (1, 1, 1)),
-    ((1, 0, 0), (0, 1, 1)),
-    ((0, 1, 0), (1, 0, 1)),
-    ((0, 0, 1), (1, 1, 0)),
-)
-"""The four body diagonals as the document numbers them: lower (0) or upper (1) end of each axis,
-from and to.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,13 +175,9 @@ class Volumetric:
         return LengthErrors(starts, ends, nominal, error, np.asarray(deviation))
 
     def diagonals(self) -> LengthErrors:
-        """Length errors of the four body diagonals."""
-        ends = np.array([self.machine.lower, self.machine.upper])
-        starts, stops = (
-            np.array([[ends[one[way][k], k] for k in range(3)] for one in DIAGONALS])
-            for way in (0, 1)
-        )
-        return self.lengths(starts, stops)
+        """Length errors of the four body diagonals, as the document numbers them."""
+        volume = Volume(np.array(self.machine.lower), np.array(self.machine.upper))
+        return self.lengths(*volume.diagonals)
 
     def grid(self, counts: tuple[int, int, int]) -> Array:
         """Points (m, 3) of a grid over the volume, z changing fastest."""

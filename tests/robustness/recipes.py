@@ -99,6 +99,8 @@ RECIPES = (
     "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
     "schema sweep",
+    "budget small.yaml --by position",
+    "budget tables.yaml tables-readings.csv --certificate tables-certificate.csv --json",
     "init out.yaml",
     "init --machine out.yaml",
 )
