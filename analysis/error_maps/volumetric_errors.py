@@ -157,14 +157,9 @@ class Volumetric:
         the two, also of a function that has the same position at both. Squareness and temperature
         are wrong alike at both.
         """
-        difference = ends - starts
-        nominal = np.linalg.norm(difference, axis=1)
-        moved = self.systematic(ends) - self.systematic(starts)
-        direction = difference / nominal[:, None]
-        # |d + m| - |d| without the difference of two long lengths.
-        error = (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1)) / (
-            np.linalg.norm(difference + moved, axis=1) + nominal
-        )
+        nominal = np.linalg.norm(ends - starts, axis=1)
+        direction = (ends - starts) / nominal[:, None]
+        error = length_errors(starts, ends, self.systematic(ends) - self.systematic(starts))
         drawn_first, lasting_first = self.random_roots(starts)
         drawn_last, lasting_last = self.random_roots(ends)
         along = [
@@ -191,6 +186,18 @@ class Volumetric:
         for name, value in at.items():
             ends[:, AXES.index(name)] = value
         return ends[0], ends[1]
+
+
+def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
+    """What distances (m,) between points (m, d) are longer where the ends have `moved` (m, d)
+    against the starts.
+    """
+    difference = ends - starts
+    # |d + m| - |d| without the difference of two long lengths.
+    return np.asarray(
+        (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1))
+        / (np.linalg.norm(difference + moved, axis=1) + np.linalg.norm(difference, axis=1))
+    )
 
 
 def between(start: Array, end: Array, count: int) -> Array:

@@ -1,0 +1,219 @@
+"""What each parametric error contributes to the errors of a machine and to their uncertainties.
+
+The error of a point, and of a length to first order, is a sum over the parametric errors. Of a mean
+square the share of a part is its mean product with the whole, of a variance its covariance with the
+whole: such shares add to one. Estimates are correlated, so that a share may be negative, and a part
+alone less certain than the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.maps.corrected_points import probe_indices
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+from .fitted_errors import length_rows, rows_of_errors
+from .volumetric_errors import Volumetric, length_errors
+
+# A rest of errors below this, in metres, is what rounding and second order leave.
+NO_REST = 1e-12
+
+REST = "together", "what the parts do together beyond the sum of each alone"
+OFFSETS = "offsets", "estimated offsets of probes, which rotations turn"
+PROBING = "probing", "what probing adds to each co-ordinate"
+
+
+@dataclass(frozen=True, eq=False)
+class PartBudget:
+    """Contributions of `parts` (k), names and meanings, to one figure; in metres.
+
+    Of a length `errors` (k,) add to its error `total`. Of the errors at points, whose root mean
+    square `total` is, they are those of the parts alone. `shares` (k,) of the total, or of its
+    square, add to one. `uncertainties` (k,) are standard ones of the parts alone, and `uncertainty`
+    that of the whole, of points the root of the mean sum of squares; `variance_shares` (k,) add to
+    one. All are NaN where undetermined.
+    """
+
+    figure: str
+    is_length: bool
+    parts: tuple[tuple[str, str], ...]
+    errors: Array
+    shares: Array
+    total: float
+    uncertainties: Array
+    variance_shares: Array
+    uncertainty: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Split:
+    """An error model at parameters `a` (n,), whose parts are those that `masks` (k, n) choose."""
+
+    model: ErrorModel
+    a: Array
+    masks: Array
+    probe: Array
+
+    def errors(self, points: Array) -> Array:
+        """Errors (k + 1, m, d) of each part alone, and of what is left of the whole."""
+        probe = np.broadcast_to(self.probe, points.shape)
+        found = [self.model.error(points, self.a * mask, probe) - probe for mask in self.masks]
+        whole = self.model.error(points, self.a, probe) - probe
+        return np.stack([*found, whole - np.sum(found, axis=0)])
+
+
+def _figures(
+    split: _Split, points: Array, place: str, starts: Array, ends: Array, names: Sequence[str]
+) -> Iterator[tuple[str, bool, Array, Array, float]]:
+    """Figures without uncertainties: the errors at points, then those of lengths."""
+    at_points = split.errors(points)
+    whole = at_points.sum(axis=0)
+    square = float((whole**2).sum()) / len(points)
+    own = np.sqrt((at_points**2).sum(axis=(1, 2)) / len(points))
+    products = (at_points * whole).sum(axis=(1, 2)) / len(points)
+    yield place, False, own, _ratio(products, square), float(np.sqrt(square))
+    moved = split.errors(ends) - split.errors(starts)
+    totals = length_errors(starts, ends, moved.sum(axis=0))
+    along = np.einsum("md,kmd->km", _directions(starts, ends), moved)
+    # What is of second order belongs to no part alone.
+    along[-1] += totals - along.sum(axis=0)
+    for k, name in enumerate(names):
+        yield name, True, along[:, k], _ratio(along[:, k], float(totals[k])), float(totals[k])
+
+
+def _directions(starts: Array, ends: Array) -> Array:
+    return np.asarray((ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None])
+
+
+def _ratio(parts: Array, whole: float) -> Array:
+    return parts / whole if whole else np.zeros(len(parts))
+
+
+def _without_rest(one: PartBudget) -> PartBudget:
+    """The budget without a last part that is nothing."""
+    if abs(one.errors[-1]) > NO_REST:
+        return one
+    return PartBudget(
+        one.figure,
+        one.is_length,
+        one.parts[:-1],
+        one.errors[:-1],
+        one.shares[:-1],
+        one.total,
+        one.uncertainties[:-1],
+        one.variance_shares[:-1],
+        one.uncertainty,
+    )
+
+
+@single_threaded
+def fitted_budget(
+    fitted: FittedMap,
+    points: Array,
+    place: str,
+    starts: Array,
+    ends: Array,
+    names: Sequence[str],
+    probe: int | None = None,
+) -> tuple[PartBudget, ...]:
+    """Budgets of the errors of a fitted machine at points (m, d), which `place` names, and of the
+    lengths between others, by their names.
+    """
+    functions = {one.function: one.meaning for one in reversed(fitted.parameters)}
+    of = list(dict.fromkeys(one.function for one in fitted.parameters))
+    masks = np.array([[one.function == name for one in fitted.parameters] for name in of])
+    parts = [OFFSETS if name == "offset" else (name, functions[name]) for name in of]
+    offset = fitted.probes.offsets[probe_indices(fitted, 1, probe)]
+    split = _Split(fitted.model, fitted.values, masks[:, : len(fitted.values)], offset)
+    at_points = rows_of_errors(fitted, points, probe).reshape(points.size, -1)
+    of_lengths = length_rows(fitted, starts, ends, probe)
+    rows = [at_points / np.sqrt(len(points)), *of_lengths[:, None]]
+    found = []
+    for (name, is_length, errors, shares, total), own in zip(
+        _figures(split, points, place, starts, ends, names), rows, strict=True
+    ):
+        is_open = np.array(
+            [np.isnan(fitted.standard_uncertainties(own * mask)).any() for mask in masks]
+        )
+        is_open = np.append(is_open, is_open.any())
+        undetermined = bool(np.isnan(fitted.standard_uncertainties(own)).any())
+        squares = own.T @ own
+        alone = np.array([np.sum(fitted.covariance[m][:, m] * squares[m][:, m]) for m in masks])
+        with_whole = masks @ np.einsum("ij,ji->i", fitted.covariance, squares)
+        variance = float(with_whole.sum())
+        both = is_open | undetermined
+        budget = PartBudget(
+            name,
+            is_length,
+            (*parts, REST),
+            np.where(is_open, np.nan, errors),
+            np.where(both, np.nan, shares),
+            np.nan if undetermined else total,
+            np.where(is_open, np.nan, np.sqrt(np.append(alone, 0.0))),
+            np.where(both, np.nan, _ratio(np.append(with_whole, 0.0), variance)),
+            np.nan if undetermined else float(np.sqrt(variance)),
+        )
+        found.append(_without_rest(budget))
+    return tuple(found)
+
+
+@single_threaded
+def machine_budget(
+    built: Volumetric,
+    points: Array,
+    place: str,
+    starts: Array,
+    ends: Array,
+    names: Sequence[str],
+) -> tuple[PartBudget, ...]:
+    """Budgets of the errors that a machine file states, whose random parts are independent: their
+    contributions add in squares.
+    """
+    truth, machine = built.truth, built.machine
+    functions = {one.function: one.meaning for one in truth.model.parameters}
+    random = [one.function for one in built.approach[0].parameters]
+    random += [PROBING[0]] * 3 + [one.function for one in built.lasting[0].parameters]
+    meanings = {
+        one.function: one.meaning
+        for model in (built.approach[0], built.lasting[0])
+        for one in model.parameters
+    }
+    every = list(dict.fromkeys([*functions, *random]))
+    parts = [
+        PROBING if name == PROBING[0] else (name, (functions | meanings)[name]) for name in every
+    ]
+    masks = np.array([[one.function == name for one in truth.model.parameters] for name in every])
+    split = _Split(truth.model, truth.a, masks.reshape(len(every), -1), np.array(machine.probe))
+    drawn, lasting = built.random_roots(points)
+    at_points = np.concatenate([drawn, lasting], axis=2)
+    variances = [(at_points**2).sum(axis=(0, 1)) / len(points)]
+    (first, steady), (last, moved) = built.random_roots(starts), built.random_roots(ends)
+    along = [
+        np.einsum("md,mdk->mk", _directions(starts, ends), one)
+        for one in (first, last, moved - steady)
+    ]
+    variances += list(np.concatenate([along[0] ** 2 + along[1] ** 2, along[2] ** 2], axis=1))
+    found = []
+    for (name, is_length, errors, shares, total), own in zip(
+        _figures(split, points, place, starts, ends, names), variances, strict=True
+    ):
+        by_part = np.array([own[[one == part for one in random]].sum() for part in every] + [0.0])
+        variance = float(by_part.sum())
+        budget = PartBudget(
+            name,
+            is_length,
+            (*parts, REST),
+            errors,
+            shares,
+            total,
+            np.sqrt(by_part),
+            _ratio(by_part, variance),
+            float(np.sqrt(variance)),
+        )
+        found.append(_without_rest(budget))
+    return tuple(found)
