@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         lengths,
         load,
         load_all,
+        load_map,
         map,
         plan,
         quickstart,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
         sheet,
         simulate,
         spline,
+        write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
     from .results.variance_components.groupings import GROUPINGS
@@ -57,6 +59,7 @@ __all__ = [
     "lengths",
     "load",
     "load_all",
+    "load_map",
     "map",
     "plan",
     "quickstart",
@@ -72,6 +75,7 @@ __all__ = [
     "stored",
     "sweep",
     "sweep_report",
+    "write_map",
 ]
 
 _PLACES = {
