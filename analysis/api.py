@@ -9,6 +9,7 @@ argument that is, and TypeError for one of another kind.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -46,8 +47,11 @@ if TYPE_CHECKING:
     import pandas
 
     from .error_maps.curve_result import FittedCurve
+    from .error_maps.fitted_results import FittedErrorMap
+    from .error_maps.function_curves import ErrorCurves
     from .error_maps.length_tables import LengthMap
-    from .error_maps.volumetric_results import Line, MachineErrors
+    from .error_maps.map_places import Line
+    from .error_maps.volumetric_results import MachineErrors
     from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
     from .planning.criteria import CriterionName
@@ -63,6 +67,7 @@ if TYPE_CHECKING:
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
+    from .simulator.machines.protocol import Array
     from .simulator.maps.fitted_map import FittedMap
 
     # A table of readings, or several; None for those that the experiment names.
@@ -710,37 +715,104 @@ def lengths(
 
 
 def map(
-    machine: PathLike,
+    machine: PathLike | FittedMap,
     grid: Sequence[int] | None = None,
     line: str | Line | None = None,
     error: str | None = None,
-    points: int | None = None,
-) -> MachineErrors:
-    """Volumetric errors of a machine file: on a grid over the volume, along a line of so many
+    points: int | PathLike | pandas.DataFrame | Sequence[Sequence[float]] | None = None,
+    *,
+    plane: str | Mapping[str, float] | None = None,
+    probe: str | None = None,
+    draw: int | None = None,
+    seed: int = 1,
+    budget: bool = False,
+) -> MachineErrors | FittedErrorMap | ErrorCurves:
+    """Volumetric errors of a machine file, or of the map that a fit left behind, with expanded
+    uncertainties: on a grid over the volume, in a plane, along a line of so many points, at given
     points, or one parametric error along its axis.
 
     `line` is a text as in `ballplate map --line`, the places in metres of the two fixed
-    axes, or two points.
+    axes, or two points; `plane` the place of the axis across it. `points` is their number along a
+    line; or a table of points, as for the command; or their co-ordinates (m, d) in metres. Of a map
+    `probe` is the name of the probe. With `draw`, so many realisations of the random part, or of
+    what the covariance of a map leaves open, are drawn from a `seed`. With `budget` the result
+    shows what each parametric error contributes, which its `budget` has in any case.
 
     >>> map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
     <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
+    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
+    array([[2.1e-07, 1.7e-07, 1.5e-07]])
     """
-    from .error_maps.volumetric_errors import MOST_POINTS
-    from .error_maps.volumetric_results import machine_errors, parse_places
+    import numpy as np
 
-    ensure_path("machine", machine)
+    from .error_maps.any_map import map_errors
+    from .error_maps.map_places import PlacesAsked, parse_places, parse_plane
+    from .error_maps.realisations import MOST_DRAWS, Draws
+    from .error_maps.volumetric_errors import MOST_POINTS
+    from .simulator.maps.fitted_map import FittedMap
+
+    if not isinstance(machine, FittedMap):
+        ensure_path("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
-    ensure_whole(2, MOST_POINTS, points=points)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(bool, "True or False", budget=budget)
+    ensure_whole(1, MOST_DRAWS, draw=draw)
+    ensure_whole(0, seed=seed)
     counts = None
     if grid is not None:
-        if len(several := _several("grid", grid)) != 3:
+        counts = _several("grid", grid)
+        if len(counts) not in (2, 3):
             raise ValueError(f"grid={grid!r}; give three numbers of points, such as (5, 5, 5)")
-        ensure_whole(2, MOST_POINTS, **{f"grid[{k}]": count for k, count in enumerate(several)})
-        if (count := several[0] * several[1] * several[2]) > MOST_POINTS:
+        ensure_whole(2, MOST_POINTS, **{f"grid[{k}]": count for k, count in enumerate(counts)})
+        if (count := math.prod(counts)) > MOST_POINTS:
             raise ValueError(f"{count} points are too many; at most {MOST_POINTS} are possible")
-        counts = several[0], several[1], several[2]
-    places = parse_places(line) if isinstance(line, str) else line
-    return machine_errors(Path(machine), counts, places, error, points)
+    number: int | None = None
+    at: Path | GivenText | Array | None = None
+    if isinstance(points, int) or points is None:
+        ensure_whole(2, MOST_POINTS, points=points)
+        number = points
+    elif isinstance(points, str | os.PathLike) or hasattr(points, "to_csv"):
+        at = _table("points", points)
+    else:
+        at = given = np.asarray(points, float)
+        if given.ndim != 2 or not np.isfinite(given).all():
+            raise ValueError(f"points of shape {given.shape}; give finite numbers in metres (m, d)")
+    asked = PlacesAsked(
+        counts,
+        parse_places(line) if isinstance(line, str) else line,
+        parse_plane(plane) if isinstance(plane, str) else plane,
+        number,
+        at,
+    )
+    source = machine if isinstance(machine, FittedMap) else Path(machine)
+    draws = None if draw is None else Draws(draw, seed)
+    return map_errors(source, asked, error, probe, draws, budget)
+
+
+def curves(
+    fitted: FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
+) -> ErrorCurves:
+    """The error functions of a map at so many positions along each line, or some of them, with
+    their expanded uncertainties; squareness errors as angles, and other numbers of its model.
+
+    `fitted` is what `to_map()` of a fit gives, or the path of a map file.
+
+    >>> curves(fit(quickstart(), simulate(quickstart())).to_map())
+    <ErrorCurves of map: 18 error functions, 3 squareness errors>
+    """
+    from .error_maps.any_map import map_of_source
+    from .error_maps.function_curves import error_curves
+    from .simulator.maps.fitted_map import FittedMap
+
+    if not isinstance(fitted, FittedMap):
+        ensure_path("fitted", fitted)
+        fitted = Path(fitted)
+    ensure_whole(2, 10_000, points=points)
+    names = (errors,) if isinstance(errors, str) else tuple(errors)
+    for name in names:
+        ensure_type(str, "the name of a parametric error, such as EXX", errors=name)
+    return error_curves(*map_of_source(fitted), names, points)
 
 
 def load_map(path: PathLike) -> FittedMap:

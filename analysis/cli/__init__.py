@@ -24,7 +24,7 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 COMMANDS = (
     *("check", "run", "plan", "sheet", "reach", "lengths", "reliability", "simulate", "import"),
     *("fit", "compare", "sweep", "export", "report", "map", "spline", "reproduce", "schema"),
-    *("init", "budget"),
+    *("init", "budget", "curves"),
 )
 
 

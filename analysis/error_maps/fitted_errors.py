@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.corrected_points import POINTS_AT_ONCE, corrected, probe_indices
 from ballplate.simulator.maps.fitted_map import FittedMap
 
+from .map_places import MapPlaces
 from .realisations import Draws, Realisations, symmetric_root
 from .volumetric_errors import length_errors
 
@@ -100,31 +100,21 @@ def length_rows(fitted: FittedMap, starts: Array, ends: Array, probe: int | None
 
 @single_threaded
 def drawn_errors(
-    fitted: FittedMap,
-    points: Array,
-    lengths: FittedLengths,
-    draws: Draws,
-    probe: int | None = None,
+    fitted: FittedMap, places: MapPlaces, draws: Draws, probe: int | None = None
 ) -> Realisations:
-    """Errors at points (m, d) and of lengths of machines that the readings may come from: what the
+    """Errors at points and of lengths of machines that the readings may come from: what the
     covariance leaves open is drawn, once for all points of a machine.
     """
+    draws.ensure_possible(places.points)
     (normal,) = draws.normal((len(fitted.scale),))
     deviations = normal @ symmetric_root(fitted.covariance, fitted.scale).T
+    points = places.points
     errors = np.zeros((draws.count, *points.shape))
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
         rows = rows_of_errors(fitted, points[some], probe)
         errors[:, some] = np.tensordot(deviations, rows, axes=(1, 2))
-    of_lengths = deviations @ length_rows(fitted, lengths.starts, lengths.ends, probe).T
     errors += fitted_errors(fitted, points, probe).errors
-    return Realisations(draws, errors, lengths.errors + of_lengths)
-
-
-def grid_points(volume: Volume, counts: tuple[int, ...]) -> Array:
-    """Points (m, d) of a grid over the volume, the last axis changing fastest."""
-    sides = [
-        np.linspace(low, high, count)
-        for low, high, count in zip(volume.lower, volume.upper, counts, strict=True)
-    ]
-    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(counts))
+    lengths = fitted_lengths(fitted, places.starts, places.ends, probe).errors
+    rows = length_rows(fitted, places.starts, places.ends, probe)
+    return Realisations(draws, errors, lengths + deviations @ rows.T)

@@ -8,7 +8,7 @@ alone less certain than the whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,8 @@ from ballplate.simulator.maps.corrected_points import probe_indices
 from ballplate.simulator.maps.fitted_map import FittedMap
 
 from .fitted_errors import length_rows, rows_of_errors
+from .map_places import MapPlaces
 from .volumetric_errors import Volumetric, length_errors
-
-# A rest of errors below this, in metres, is what rounding and second order leave.
-NO_REST = 1e-12
 
 REST = "together", "what the parts do together beyond the sum of each alone"
 OFFSETS = "offsets", "estimated offsets of probes, which rotations turn"
@@ -67,22 +65,21 @@ class _Split:
         return np.stack([*found, whole - np.sum(found, axis=0)])
 
 
-def _figures(
-    split: _Split, points: Array, place: str, starts: Array, ends: Array, names: Sequence[str]
-) -> Iterator[tuple[str, bool, Array, Array, float]]:
+def _figures(split: _Split, places: MapPlaces) -> Iterator[tuple[str, bool, Array, Array, float]]:
     """Figures without uncertainties: the errors at points, then those of lengths."""
+    points, starts, ends = places.points, places.starts, places.ends
     at_points = split.errors(points)
     whole = at_points.sum(axis=0)
     square = float((whole**2).sum()) / len(points)
     own = np.sqrt((at_points**2).sum(axis=(1, 2)) / len(points))
     products = (at_points * whole).sum(axis=(1, 2)) / len(points)
-    yield place, False, own, _ratio(products, square), float(np.sqrt(square))
+    yield places.kind, False, own, _ratio(products, square), float(np.sqrt(square))
     moved = split.errors(ends) - split.errors(starts)
     totals = length_errors(starts, ends, moved.sum(axis=0))
     along = np.einsum("md,kmd->km", _directions(starts, ends), moved)
     # What is of second order belongs to no part alone.
     along[-1] += totals - along.sum(axis=0)
-    for k, name in enumerate(names):
+    for k, name in enumerate(places.names):
         yield name, True, along[:, k], _ratio(along[:, k], float(totals[k])), float(totals[k])
 
 
@@ -94,36 +91,12 @@ def _ratio(parts: Array, whole: float) -> Array:
     return parts / whole if whole else np.zeros(len(parts))
 
 
-def _without_rest(one: PartBudget) -> PartBudget:
-    """The budget without a last part that is nothing."""
-    if abs(one.errors[-1]) > NO_REST:
-        return one
-    return PartBudget(
-        one.figure,
-        one.is_length,
-        one.parts[:-1],
-        one.errors[:-1],
-        one.shares[:-1],
-        one.total,
-        one.uncertainties[:-1],
-        one.variance_shares[:-1],
-        one.uncertainty,
-    )
-
-
 @single_threaded
 def fitted_budget(
-    fitted: FittedMap,
-    points: Array,
-    place: str,
-    starts: Array,
-    ends: Array,
-    names: Sequence[str],
-    probe: int | None = None,
+    fitted: FittedMap, places: MapPlaces, probe: int | None = None
 ) -> tuple[PartBudget, ...]:
-    """Budgets of the errors of a fitted machine at points (m, d), which `place` names, and of the
-    lengths between others, by their names.
-    """
+    """Budgets of the errors of a fitted machine at points, and of the lengths beside them."""
+    points, starts, ends = places.points, places.starts, places.ends
     functions = {one.function: one.meaning for one in reversed(fitted.parameters)}
     of = list(dict.fromkeys(one.function for one in fitted.parameters))
     masks = np.array([[one.function == name for one in fitted.parameters] for name in of])
@@ -135,7 +108,7 @@ def fitted_budget(
     rows = [at_points / np.sqrt(len(points)), *of_lengths[:, None]]
     found = []
     for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, points, place, starts, ends, names), rows, strict=True
+        _figures(split, places), rows, strict=True
     ):
         is_open = np.array(
             [np.isnan(fitted.standard_uncertainties(own * mask)).any() for mask in masks]
@@ -147,7 +120,7 @@ def fitted_budget(
         with_whole = masks @ np.einsum("ij,ji->i", fitted.covariance, squares)
         variance = float(with_whole.sum())
         both = is_open | undetermined
-        budget = PartBudget(
+        one = PartBudget(
             name,
             is_length,
             (*parts, REST),
@@ -158,22 +131,16 @@ def fitted_budget(
             np.where(both, np.nan, _ratio(np.append(with_whole, 0.0), variance)),
             np.nan if undetermined else float(np.sqrt(variance)),
         )
-        found.append(_without_rest(budget))
+        found.append(one)
     return tuple(found)
 
 
 @single_threaded
-def machine_budget(
-    built: Volumetric,
-    points: Array,
-    place: str,
-    starts: Array,
-    ends: Array,
-    names: Sequence[str],
-) -> tuple[PartBudget, ...]:
+def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ...]:
     """Budgets of the errors that a machine file states, whose random parts are independent: their
     contributions add in squares.
     """
+    points, starts, ends = places.points, places.starts, places.ends
     truth, machine = built.truth, built.machine
     functions = {one.function: one.meaning for one in truth.model.parameters}
     random = [one.function for one in built.approach[0].parameters]
@@ -200,11 +167,11 @@ def machine_budget(
     variances += list(np.concatenate([along[0] ** 2 + along[1] ** 2, along[2] ** 2], axis=1))
     found = []
     for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, points, place, starts, ends, names), variances, strict=True
+        _figures(split, places), variances, strict=True
     ):
         by_part = np.array([own[[one == part for one in random]].sum() for part in every] + [0.0])
         variance = float(by_part.sum())
-        budget = PartBudget(
+        one = PartBudget(
             name,
             is_length,
             (*parts, REST),
@@ -215,5 +182,5 @@ def machine_budget(
             _ratio(by_part, variance),
             float(np.sqrt(variance)),
         )
-        found.append(_without_rest(budget))
+        found.append(one)
     return tuple(found)

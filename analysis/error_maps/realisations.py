@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.machines.protocol import Array
 
-# Numbers of realisations that are held at once, times the points of each.
-MOST_NUMBERS = 5_000_000
+from ..presentation.formatting import as_data
+
+# Realisations that are drawn at most, and co-ordinates of all of them, of eight bytes each.
+MOST_DRAWS, MOST_NUMBERS = 1000, 20_000_000
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,15 @@ class Draws:
 
     count: int = 0
     seed: int = 1
+
+    def ensure_possible(self, points: Array) -> None:
+        """Refuse more numbers than there is memory for.
+
+        :raises ValueError: there are more.
+        """
+        if self.count * points.size > MOST_NUMBERS:
+            most = MOST_NUMBERS // points.size
+            raise ValueError(f"{self.count} realisations are too many; {most} are possible here")
 
     def normal(self, *shapes: tuple[int, ...]) -> list[Array]:
         """Standard normal numbers (count, ...) of several shapes."""
@@ -33,6 +45,14 @@ class Realisations:
     draws: Draws
     errors: Array
     lengths: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain data, None where undetermined."""
+        return {
+            "seed": self.draws.seed,
+            "errors": as_data(self.errors),
+            "lengths": as_data(self.lengths),
+        }
 
 
 def symmetric_root(covariance: Array, scale: Array) -> Array:

@@ -28,6 +28,9 @@ from ballplate.simulator.machines.kinematic import KinematicModel, error_functio
 from ballplate.simulator.machines.protocol import Array, TrueMachine
 from ballplate.simulator.machines.volumetric import VolumetricModel, squareness_field, thermal_field
 
+from .map_places import MapPlaces
+from .realisations import Draws, Realisations
+
 # Points of a grid or a line: each takes half a kilobyte.
 MOST_POINTS = 200_000
 
@@ -69,6 +72,11 @@ class Volumetric:
     """A machine with what its errors are computed by, made once."""
 
     machine: MachineDescription
+
+    @property
+    def volume(self) -> Volume:
+        """The measuring volume."""
+        return Volume(np.array(self.machine.lower), np.array(self.machine.upper))
 
     @cached_property
     def truth(self) -> TrueMachine:
@@ -169,24 +177,6 @@ class Volumetric:
         deviation = np.sqrt(sum((one**2).sum(axis=1) for one in along))
         return LengthErrors(starts, ends, nominal, error, np.asarray(deviation))
 
-    def diagonals(self) -> LengthErrors:
-        """Length errors of the four body diagonals, as the document numbers them."""
-        volume = Volume(np.array(self.machine.lower), np.array(self.machine.upper))
-        return self.lengths(*volume.diagonals)
-
-    def grid(self, counts: tuple[int, int, int]) -> Array:
-        """Points (m, 3) of a grid over the volume, z changing fastest."""
-        ends = zip(self.machine.lower, self.machine.upper, counts, strict=True)
-        sides = [np.linspace(low, high, count) for low, high, count in ends]
-        return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-
-    def parallel(self, at: dict[str, float]) -> tuple[Array, Array]:
-        """Ends (3,) of the line along the axis that has no position in `at`."""
-        ends = np.array([self.machine.lower, self.machine.upper])
-        for name, value in at.items():
-            ends[:, AXES.index(name)] = value
-        return ends[0], ends[1]
-
 
 def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
     """What distances (m,) between points (m, d) are longer where the ends have `moved` (m, d)
@@ -200,9 +190,28 @@ def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
     )
 
 
-def between(start: Array, end: Array, count: int) -> Array:
-    """Points (count, 3), evenly spaced from start to end."""
-    return np.asarray(np.linspace(start, end, count))
+def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> Realisations:
+    """Errors with a random part that is drawn: of what lasts once for all points, of what each
+    approach draws at each point, and at both ends of a length, anew.
+    """
+    draws.ensure_possible(places.points)
+    (drawn, lasting), (first, at_start), (last, at_end) = (
+        built.random_roots(one) for one in (places.points, places.starts, places.ends)
+    )
+    (steady, *anew) = draws.normal(
+        lasting.shape[2:], *((len(one), one.shape[2]) for one in (drawn, first, last))
+    )
+
+    def moved(approach: Array, constant: Array, normal: Array) -> Array:
+        return np.einsum("mik,nmk->nmi", approach, normal) + np.einsum(
+            "mik,nk->nmi", constant, steady
+        )
+
+    errors = built.systematic(places.points) + moved(drawn, lasting, anew[0])
+    starts = built.systematic(places.starts) + moved(first, at_start, anew[1])
+    ends = built.systematic(places.ends) + moved(last, at_end, anew[2])
+    lengths = [length_errors(places.starts, places.ends, one) for one in ends - starts]
+    return Realisations(draws, errors, np.array(lengths).reshape(draws.count, -1))
 
 
 def _at(deviation: float | Points, positions: Array) -> Array:

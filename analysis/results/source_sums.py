@@ -134,7 +134,7 @@ def _names(design: Design, one: Observations, experiment: Experiment) -> list[st
 
 def _of_priors(design: Design, priors: Priors, experiment: Experiment) -> list[str]:
     of_influences = [
-        f"influences[{k}]: {settings.kind}"
+        f"influences[{k}]: {vars(settings)['kind']}"
         for k, (settings, one) in enumerate(
             zip(experiment.influences, design.influences, strict=True)
         )

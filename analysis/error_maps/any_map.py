@@ -1,0 +1,65 @@
+"""Errors of a machine, whether a file describes it or a fit has left a map of it behind."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ballplate.simulator.experiment.map_files import BINARY, read_map
+from ballplate.simulator.inputs.yamltree import read_bytes
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+from .fitted_results import FittedErrorMap, fitted_map_errors
+from .function_curves import ErrorCurves, error_curves
+from .map_places import PlacesAsked
+from .realisations import Draws
+from .volumetric_results import MachineErrors, machine_errors
+
+# A map file says at its beginning that it is one.
+OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
+
+
+def is_map_file(path: Path) -> bool:
+    """Whether a file is a map, by its name or by what it says.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    return path.suffix.lower() == BINARY or bool(OF_MAPS.search(read_bytes(path)))
+
+
+def map_of_source(source: Path | FittedMap) -> tuple[FittedMap, str]:
+    """A map as it is given, or of a file, with its label.
+
+    :raises ExperimentError: the file is wrong.
+    """
+    return (read_map(source), source.stem) if isinstance(source, Path) else (source, "map")
+
+
+def map_errors(
+    source: Path | FittedMap,
+    asked: PlacesAsked,
+    error: str | None = None,
+    probe: str | None = None,
+    draws: Draws | None = None,
+    with_budget: bool = False,
+) -> MachineErrors | FittedErrorMap | ErrorCurves:
+    """Errors of a machine file or of a map at the places asked for, or one of its error functions.
+
+    :raises ExperimentError: the file is wrong.
+    :raises ValueError: what does not go together, or is not in the machine.
+    """
+    if error is not None:
+        others = [draws is not None, with_budget, probe is not None]
+        others += [value is not None for value in vars(asked).values()]
+        if any(others):
+            raise ValueError(
+                "a parametric error along its axis goes with nothing else; leave it out"
+            )
+    if isinstance(source, Path) and not is_map_file(source):
+        if probe is not None:
+            raise ValueError("a machine file states its own probe; leave the probe out")
+        return machine_errors(source, asked, error, draws, with_budget)
+    fitted, label = (read_map(source), source.stem) if isinstance(source, Path) else (source, "map")
+    if error is not None:
+        return error_curves(fitted, label, (error,))
+    return fitted_map_errors(fitted, label, asked, probe, draws, with_budget)
