@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from ..geometry.ball_layouts import Name
-from ..inputs.days import stated_day
+from ..inputs.days import Day
 from ..inputs.quantities import Length
 from ..inputs.settings import NonEmpty, Settings, Text
 from ..machines.protocol import Unit
@@ -15,7 +15,6 @@ from ..machines.settings import ErrorModelSettings
 from .sections import Line, VolumeSettings
 
 Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
-Day = Annotated[str, AfterValidator(stated_day)]
 PerAxis = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 ROW = "a text of numbers separated by blanks"
 

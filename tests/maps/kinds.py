@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,13 @@ CORNERS = ({"x": "50 mm", "y": "50 mm"}, {"y": "50 mm", "z": "50 mm"}, {"z": "50
 PLACES = [
     {"plane": "z", "level": "100 mm", "corner": CORNERS[0], "probes": ["down"]},
     {"plane": "z", "level": "400 mm", "corner": CORNERS[0], "probes": ["down"]},
-    {"plane": "z", "level": "250 mm", "corner": CORNERS[0], "quarter_turns": 1, "probes": ["down"]},
+    {
+        "plane": "z",
+        "level": "250 mm",
+        "corner": CORNERS[0],
+        "quarter_turns": 1,
+        "probes": ["down", "right"],
+    },
     {"plane": "x", "level": "150 mm", "corner": CORNERS[1], "probes": ["right"]},
     {
         "plane": "x",
@@ -72,7 +79,7 @@ MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "empirical": (IN_SPACE, {"kind": "empirical", "terms": "quadratic"}),
     "estimated probe": (IN_SPACE | {"probes": FREE}, {"kind": "metric"}),
     "machine file": (IN_SPACE, {"kind": "machine", "file": "machine.yaml"}),
-    "python": (IN_SPACE, {"kind": "python", "object": "own_model_of_maps:build"}),
+    "python": (IN_SPACE, {"kind": "python", "object": "MODULE:build"}),
 }
 MACHINE = """\
 title: a machine with one table and one polynomial
@@ -89,13 +96,26 @@ def write_files(folder: Path) -> None:
     """The files that some of the models rest on."""
     (folder / "machine.yaml").write_text(MACHINE)
     (folder / "exx.csv").write_text(TABLE)
-    (folder / "own_model_of_maps.py").write_text(GOOD)
+    (folder / f"{module_of(folder)}.py").write_text(GOOD)
+
+
+def module_of(folder: Path) -> str:
+    """A name that no module in another folder has."""
+    return f"own_model_{hashlib.sha256(str(folder).encode()).hexdigest()[:12]}"
+
+
+def model_of(kind: str, folder: Path) -> dict[str, Any]:
+    """Settings of a kind of model."""
+    settings = dict(MODELS[kind][1])
+    if kind == "python":
+        settings["object"] = f"{module_of(folder)}:build"
+    return settings
 
 
 def experiment_of(kind: str, folder: Path, **more: Any) -> bp.Experiment:
     """The experiment for a kind of model; `folder` is where its files are."""
-    base, model = MODELS[kind]
-    return bp.experiment({**base, "error_model": model, **more}, folder)
+    sections = {**MODELS[kind][0], "error_model": model_of(kind, folder)}
+    return bp.experiment({**sections, **more}, folder)
 
 
 @cache
