@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     import pandas
 
     from .error_maps.curve_result import FittedCurve
-    from .error_maps.fitted_results import FittedErrorMap
-    from .error_maps.function_curves import ErrorCurves
     from .error_maps.length_tables import LengthMap
     from .error_maps.map_places import Line
     from .error_maps.volumetric_results import MachineErrors
@@ -65,7 +63,9 @@ if TYPE_CHECKING:
     from .reproduction.score_result import CertifiedScores
     from .results.budget import UncertaintyBudget
     from .results.correction import Correction
+    from .results.error_curves_result import ErrorCurves
     from .results.fit import Fit
+    from .results.fitted_errors_result import FittedErrorMap
     from .results.imported import ReadReport
     from .results.prediction import Prediction
     from .simulator.machines.protocol import Array
@@ -743,14 +743,14 @@ def map(
     <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
     >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
     >>> map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
-    array([[2.1e-07, 1.7e-07, 1.5e-07]])
+    array([[2.2e-07, 1.9e-07, 1.7e-07]])
     """
     import numpy as np
 
-    from .error_maps.any_map import map_errors
     from .error_maps.map_places import PlacesAsked, parse_places, parse_plane
     from .error_maps.realisations import MOST_DRAWS, Draws
     from .error_maps.volumetric_errors import MOST_POINTS
+    from .results.any_map import map_errors
     from .simulator.maps.fitted_map import FittedMap
 
     if not isinstance(machine, FittedMap):
@@ -802,8 +802,8 @@ def curves(
     >>> curves(fit(quickstart(), simulate(quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
-    from .error_maps.any_map import map_of_source
-    from .error_maps.function_curves import error_curves
+    from .results.any_map import map_of_source
+    from .results.error_curves_result import error_curves
     from .simulator.maps.fitted_map import FittedMap
 
     if not isinstance(fitted, FittedMap):

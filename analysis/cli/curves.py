@@ -52,7 +52,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.experiment.map_files import read_map
 
     from ..error_maps.error_functions import POSITIONS
-    from ..error_maps.function_curves import error_curves
+    from ..results.error_curves_result import error_curves
 
     fitted = read_map(options.file)
     try:

@@ -37,37 +37,7 @@ DESCRIPTION = (
 
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="machine file (YAML) or map file")
-    parser.add_argument(
-        "--grid",
-        metavar="N,N,N",
-        type=_grid,
-        help="points along x, y and z, default 5,5,5; of a plane, along its two axes",
-    )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--line",
-        metavar="LINE",
-        type=_line,
-        help=(
-            'errors along a line instead, parallel to an axis as in "y = 600 mm, z = 600 mm", or'
-            ' between two points as in "0 mm, 0 mm, 0 mm to 1.8 m, 1.2 m, 1.2 m"'
-        ),
-    )
-    where.add_argument(
-        "--plane", metavar="PLANE", type=_plane, help='errors in a plane, as in "z = 200 mm"'
-    )
-    where.add_argument(
-        "--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX"
-    )
-    parser.add_argument(
-        "--points",
-        metavar="N|CSV",
-        type=_points,
-        help=(
-            "points along the line, at least 2, default 21; or a table of points, with the columns"
-            " x_mm, y_mm and z_mm (or another unit), where errors are told"
-        ),
-    )
+    _add_places(parser)
     parser.add_argument(
         "--probe", metavar="NAME", help="of a map file: the probe, default that of the map"
     )
@@ -99,6 +69,40 @@ def add_options(parser: ArgumentParser) -> None:
         help="magnification of the errors in the drawing of the grid; default: one that fits",
     )
     add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")
+
+
+def _add_places(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--grid",
+        metavar="N,N,N",
+        type=_grid,
+        help="points along x, y and z, default 5,5,5; of a plane, along its two axes",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--line",
+        metavar="LINE",
+        type=_line,
+        help=(
+            'errors along a line instead, parallel to an axis as in "y = 600 mm, z = 600 mm", or'
+            ' between two points as in "0 mm, 0 mm, 0 mm to 1.8 m, 1.2 m, 1.2 m"'
+        ),
+    )
+    where.add_argument(
+        "--plane", metavar="PLANE", type=_plane, help='errors in a plane, as in "z = 200 mm"'
+    )
+    where.add_argument(
+        "--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX"
+    )
+    parser.add_argument(
+        "--points",
+        metavar="N|CSV",
+        type=_points,
+        help=(
+            "points along the line, at least 2, default 21; or a table of points, with the columns"
+            " x_mm, y_mm and z_mm (or another unit), where errors are told"
+        ),
+    )
 
 
 def _grid(text: str) -> tuple[int, ...]:
@@ -150,11 +154,11 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
-    from ..error_maps.any_map import map_errors
-    from ..error_maps.fitted_results import FittedErrorMap
     from ..error_maps.map_places import PlacesAsked
     from ..error_maps.realisations import Draws
     from ..error_maps.volumetric_results import VolumetricMap
+    from ..results.any_map import map_errors
+    from ..results.fitted_errors_result import FittedErrorMap
 
     others = (options.line, options.plane, options.error)
     table = options.points if isinstance(options.points, Path) else None

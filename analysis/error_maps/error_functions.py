@@ -146,11 +146,12 @@ def _by_ends(fitted: FittedMap) -> Iterator[EstimatedNumber]:
         points = np.tile(volume.lower, (3, 1))
         points[1, one.axis], points[2, one.to] = volume.upper[one.axis], volume.upper[one.to]
         none = np.zeros_like(points)
-        errors = fitted.model.error(points, fitted.values, none)
-        rows = np.zeros((3, d, len(fitted.scale)))
-        rows[:, :, : len(fitted.values)] = fitted.model.jacobian(points, fitted.values, none)
-        value, row = _angle(one, errors, volume.size), _angle(one, rows, volume.size)
-        u = float(fitted.standard_uncertainties(row))
+        value = _angle(one, fitted.model.error(points, fitted.values, none), volume.size)
+        rows = np.zeros((2, len(fitted.scale)))
+        for row, a in zip(rows, (fitted.values, np.zeros_like(fitted.values)), strict=True):
+            slopes = fitted.model.jacobian(points, a, none)
+            row[: len(a)] = _angle(one, slopes, volume.size)
+        u = float(fitted.standard_uncertainties(*rows))
         if np.isnan(u):
             yield EstimatedNumber(one.name, one.meaning, "rad", np.nan, np.nan, OF_ENDS)
         elif u > 0.0 or value:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import FittedMap
 
@@ -67,21 +70,22 @@ def length_lines(lengths: FittedLengths, names: Sequence[str], factor: float) ->
     return aligned(rows, [False, False, False, True, True, True])
 
 
-def error_lines(found: FittedErrors, factor: float) -> list[str]:
-    """Errors point by point with their uncertainties, and the largest."""
+def error_lines(found: FittedErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
+    """Errors point by point with their uncertainties, and the largest; points may have names."""
     letters = "xyz"[: found.points.shape[1]]
     heads = [f"{letter}, mm" for letter in letters]
     heads += [cell for letter in letters.upper() for cell in (f"{letter}, µm", "U")]
-    rows = [[*heads, "resultant"]]
-    for point, error, u, resultant in zip(
-        found.points, found.errors, found.uncertainties, found.resultant, strict=True
+    rows = [[*(["point"] if names else []), *heads, "resultant"]]
+    for i, (point, error, u, resultant) in enumerate(
+        zip(found.points, found.errors, found.uncertainties, found.resultant, strict=True)
     ):
-        cells = [_millimetres(value) for value in point]
+        cells = [*([names[i]] if names else []), *(_millimetres(value) for value in point)]
         for value, own in zip(error.tolist(), u.tolist(), strict=True):
             cells += with_uncertainty(value, own, factor)
         is_open = bool(np.isnan(resultant))
         rows.append([*cells, UNDETERMINED if is_open else number(1e6 * float(resultant))])
-    return [*aligned(rows, [True] * len(rows[0])), *_largest(found, factor)]
+    right = [not (names and k == 0) for k in range(len(rows[0]))]
+    return [*aligned(rows, right), *_largest(found, factor)]
 
 
 def _largest(found: FittedErrors, factor: float) -> list[str]:
@@ -112,31 +116,31 @@ def realisation_lines(found: Realisations, names: Sequence[str]) -> list[str]:
 
 
 def point_csv(
-    found: FittedErrors, factor: float, realisations: Realisations | None
+    found: FittedErrors,
+    factor: float,
+    realisations: Realisations | None,
+    names: Sequence[str] = (),
 ) -> Iterator[str]:
     """Errors as lines of a CSV file; with realisations, a column tells which one, 0 the estimate,
     and only that has uncertainties.
     """
     letters = "xyz"[: found.points.shape[1]]
-    heads = [f"{letter}_mm" for letter in letters]
+    heads = [*(["point"] if names else []), *(f"{letter}_mm" for letter in letters)]
     heads += [f"error_{letter}_um" for letter in letters]
     heads += [f"U_{letter}_um" for letter in letters]
-    heads += ["resultant_um", "k"]
-
-    def lines(heads: Sequence[str], errors: Array, u: Array, *more: Array) -> Iterator[str]:
-        resultant = 1e6 * np.linalg.norm(errors, axis=1)
-        k = np.full(len(errors), factor)
-        columns = [1e3 * found.points, 1e6 * errors, 1e6 * factor * u, resultant, k]
-        return csv_lines(heads, *more, *columns)
-
-    if realisations is None:
-        yield from lines(heads, found.errors, found.uncertainties)
-        return
-    zero = np.zeros(len(found.points))
-    yield from lines(["realisation", *heads], found.errors, found.uncertainties, zero)
+    yield ",".join([*(["realisation"] if realisations else []), *heads, "resultant_um", "k"])
     none = np.full_like(found.uncertainties, np.nan)
-    for i, errors in enumerate(realisations.errors, start=1):
-        yield from list(lines([], errors, none, zero + i))[1:]
+    drawn = [] if realisations is None else [(one, none) for one in realisations.errors]
+    labels = io.StringIO()
+    writer = CsvWriter(labels)
+    writer.writerows([name] for name in names)
+    quoted = labels.getvalue().splitlines() if names else [""] * len(found.points)
+    for i, (errors, u) in enumerate([(found.errors, found.uncertainties), *drawn]):
+        resultant, k = 1e6 * np.linalg.norm(errors, axis=1), np.full(len(errors), factor)
+        columns = [1e3 * found.points, 1e6 * errors, 1e6 * factor * u, resultant, k]
+        numbers = islice(csv_lines([], *columns), 1, None)
+        for name, line in zip(quoted, numbers, strict=True):
+            yield ",".join([*([str(i)] if realisations else []), *([name] if names else []), line])
 
 
 def _point(point: Array) -> str:

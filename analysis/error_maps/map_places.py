@@ -12,9 +12,9 @@ from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.experiment.error_tables import parse_line, parse_point
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import parse_length
-from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.readings.point_files import ensure_points, read_points
 
 # Points along each axis of the volume, and along a line, unless told.
 GRID, POINTS = (5, 5, 5), 21
@@ -27,22 +27,23 @@ Line = Mapping[str, float] | Sequence[Sequence[float]]
 
 @dataclass(frozen=True, eq=False)
 class PlacesAsked:
-    """Where errors are asked for: a `grid` of so many points along the axes, a `line` of `count`
-    points, a `plane` by the place of the axis across it, with the grid's points along its axes, or
-    points `at` (m, d), in metres, or in a table. Without any, it is a grid.
+    """Where errors are asked for: a `grid` of so many points along the axes; a `line` of so many
+    `points`; a `plane` by the place of the axis across it, with the grid's points along its axes;
+    points `at` (m, d), in metres or in a table. Without any, it is a grid.
     """
 
     grid: tuple[int, ...] | None = None
     line: Line | None = None
     plane: Mapping[str, float] | None = None
-    count: int | None = None
+    points: int | None = None
     at: Array | Path | GivenText | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class MapPlaces:
     """Points (m, d), with the number of them along the axes of a grid, and the `starts` and `ends`
-    (k, d) of lengths with `names`: the body diagonals, or the line's; metres.
+    (k, d) of lengths with `names`: the body diagonals, or the line's; metres. Points of a table may
+    have `names_of_points`, and `probes` (m,) by index.
     """
 
     kind: PlaceKind
@@ -51,6 +52,8 @@ class MapPlaces:
     starts: Array
     ends: Array
     names: tuple[str, ...]
+    names_of_points: tuple[str, ...] = ()
+    probes: Integers | None = None
 
 
 def parse_places(text: str) -> Line:
@@ -92,17 +95,11 @@ def parse_plane(text: str) -> dict[str, float]:
     return found
 
 
-def read_points(path: Path | GivenText, dimension: int) -> Array:
-    """Points (m, d) of a table with columns such as x_mm, y_mm and z_mm.
-
-    :raises ExperimentError: the table is wrong.
-    """
-    rows = read_table(path, (), AXIS_NAMES[:dimension])
-    return np.array([row.lengths for row in rows], float).reshape(-1, dimension)
-
-
-def map_places(volume: Volume, asked: PlacesAsked) -> MapPlaces:
-    """The places that are asked for in a volume.
+def map_places(
+    volume: Volume, asked: PlacesAsked, probes: tuple[str, ...] = ("",), probe: str = ""
+) -> MapPlaces:
+    """The places that are asked for in a volume; a table of points may name one of the `probes` for
+    each, without that it is `probe`.
 
     :raises ExperimentError: a table of points that is wrong.
     :raises ValueError: what does not go together, or is not in the volume.
@@ -116,16 +113,19 @@ def map_places(volume: Volume, asked: PlacesAsked) -> MapPlaces:
     several = [name for name, value in given.items() if value is not None]
     if len(several) > 1:
         raise ValueError(f"{' and '.join(several)} do not go together; give one of them")
-    if asked.count is not None and asked.line is None:
+    if asked.points is not None and asked.line is None:
         raise ValueError("points go with a line; leave them out")
     d, ends = len(volume.lower), volume.diagonals
     names = tuple(f"diagonal {k + 1}" for k in range(len(ends[0])))
     if asked.at is not None:
-        at = asked.at if isinstance(asked.at, np.ndarray) else read_points(asked.at, d)
-        return MapPlaces("points", at, (), *ends, names)
+        if isinstance(asked.at, np.ndarray):
+            return MapPlaces("points", ensure_points(asked.at, volume), (), *ends, names)
+        found = read_points(asked.at, probes, probe, volume)
+        of_points = found.names if any(found.names) else ()
+        return MapPlaces("points", found.points, (), *ends, names, of_points, found.probes)
     if asked.line is not None:
         start, end = _ends(volume, asked.line)
-        points = np.linspace(start, end, asked.count or POINTS)
+        points = np.linspace(start, end, asked.points or POINTS)
         return MapPlaces("line", points, (), start[None], end[None], ("length",))
     lower, upper = volume.lower.copy(), volume.upper.copy()
     counts = list(asked.grid or GRID[:d] if asked.plane is None else asked.grid or GRID[: d - 1])

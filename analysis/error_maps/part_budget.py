@@ -13,11 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.machines.protocol import Array, ErrorModel
-from ballplate.simulator.maps.corrected_points import probe_indices
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from .fitted_errors import length_rows, rows_of_errors
+from .fitted_errors import ErrorRows, length_rows, rows_of_errors
 from .map_places import MapPlaces
 from .volumetric_errors import Volumetric, length_errors
 
@@ -55,32 +54,52 @@ class _Split:
     model: ErrorModel
     a: Array
     masks: Array
-    probe: Array
 
-    def errors(self, points: Array) -> Array:
-        """Errors (k + 1, m, d) of each part alone, and of what is left of the whole."""
-        probe = np.broadcast_to(self.probe, points.shape)
+    def errors(self, points: Array, offset: Array) -> Array:
+        """Errors (k + 1, m, d) of each part alone, and of what is left of the whole, with offsets
+        of probes (m, d), or the same (d,) everywhere.
+        """
+        probe = np.broadcast_to(offset, points.shape)
         found = [self.model.error(points, self.a * mask, probe) - probe for mask in self.masks]
         whole = self.model.error(points, self.a, probe) - probe
         return np.stack([*found, whole - np.sum(found, axis=0)])
 
 
-def _figures(split: _Split, places: MapPlaces) -> Iterator[tuple[str, bool, Array, Array, float]]:
-    """Figures without uncertainties: the errors at points, then those of lengths."""
+def _figures(
+    split: _Split, places: MapPlaces, of_points: Array, of_lengths: Array
+) -> Iterator[tuple[str, bool, Array, Array, float]]:
+    """Figures without uncertainties: the errors at points, with offsets of probes (m, d) or (d,),
+    then those of lengths.
+    """
     points, starts, ends = places.points, places.starts, places.ends
-    at_points = split.errors(points)
+    at_points = split.errors(points, of_points)
     whole = at_points.sum(axis=0)
     square = float((whole**2).sum()) / len(points)
     own = np.sqrt((at_points**2).sum(axis=(1, 2)) / len(points))
     products = (at_points * whole).sum(axis=(1, 2)) / len(points)
     yield places.kind, False, own, _ratio(products, square), float(np.sqrt(square))
-    moved = split.errors(ends) - split.errors(starts)
+    moved = split.errors(ends, of_lengths) - split.errors(starts, of_lengths)
     totals = length_errors(starts, ends, moved.sum(axis=0))
     along = np.einsum("md,kmd->km", _directions(starts, ends), moved)
     # What is of second order belongs to no part alone.
     along[-1] += totals - along.sum(axis=0)
     for k, name in enumerate(places.names):
         yield name, True, along[:, k], _ratio(along[:, k], float(totals[k])), float(totals[k])
+
+
+def _flat(one: ErrorRows, count: int) -> ErrorRows:
+    """The rows of all co-ordinates, whose squares add to the mean over points."""
+    parts = (one.rows, one.rows if one.drawn is None else one.drawn)
+    rows, drawn = (part.reshape(-1, part.shape[-1]) / np.sqrt(count) for part in parts)
+    return ErrorRows(rows, None if one.drawn is None else drawn)
+
+
+def _one(rows: ErrorRows, k: int) -> ErrorRows:
+    return ErrorRows(rows.rows[k : k + 1], None if rows.drawn is None else rows.drawn[k : k + 1])
+
+
+def _masked(rows: ErrorRows, mask: Array) -> ErrorRows:
+    return ErrorRows(rows.rows * mask, None if rows.drawn is None else rows.drawn * mask)
 
 
 def _directions(starts: Array, ends: Array) -> Array:
@@ -93,7 +112,7 @@ def _ratio(parts: Array, whole: float) -> Array:
 
 @single_threaded
 def fitted_budget(
-    fitted: FittedMap, places: MapPlaces, probe: int | None = None
+    fitted: FittedMap, places: MapPlaces, probes: Integers, probe: int
 ) -> tuple[PartBudget, ...]:
     """Budgets of the errors of a fitted machine at points, and of the lengths beside them."""
     points, starts, ends = places.points, places.starts, places.ends
@@ -101,21 +120,21 @@ def fitted_budget(
     of = list(dict.fromkeys(one.function for one in fitted.parameters))
     masks = np.array([[one.function == name for one in fitted.parameters] for name in of])
     parts = [OFFSETS if name == "offset" else (name, functions[name]) for name in of]
-    offset = fitted.probes.offsets[probe_indices(fitted, 1, probe)]
-    split = _Split(fitted.model, fitted.values, masks[:, : len(fitted.values)], offset)
-    at_points = rows_of_errors(fitted, points, probe).reshape(points.size, -1)
+    offsets = fitted.probes.offsets
+    split = _Split(fitted.model, fitted.values, masks[:, : len(fitted.values)])
+    at_points = rows_of_errors(fitted, points, probes)
     of_lengths = length_rows(fitted, starts, ends, probe)
-    rows = [at_points / np.sqrt(len(points)), *of_lengths[:, None]]
+    rows = [_flat(at_points, len(points)), *(_one(of_lengths, k) for k in range(len(starts)))]
     found = []
     for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, places), rows, strict=True
+        _figures(split, places, offsets[probes], offsets[probe]), rows, strict=True
     ):
         is_open = np.array(
-            [np.isnan(fitted.standard_uncertainties(own * mask)).any() for mask in masks]
+            [np.isnan(_masked(own, mask).uncertainties(fitted)).any() for mask in masks]
         )
         is_open = np.append(is_open, is_open.any())
-        undetermined = bool(np.isnan(fitted.standard_uncertainties(own)).any())
-        squares = own.T @ own
+        undetermined = bool(np.isnan(own.uncertainties(fitted)).any())
+        squares = own.rows.T @ own.rows
         alone = np.array([np.sum(fitted.covariance[m][:, m] * squares[m][:, m]) for m in masks])
         with_whole = masks @ np.einsum("ij,ji->i", fitted.covariance, squares)
         variance = float(with_whole.sum())
@@ -155,7 +174,8 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
         PROBING if name == PROBING[0] else (name, (functions | meanings)[name]) for name in every
     ]
     masks = np.array([[one.function == name for one in truth.model.parameters] for name in every])
-    split = _Split(truth.model, truth.a, masks.reshape(len(every), -1), np.array(machine.probe))
+    split = _Split(truth.model, truth.a, masks.reshape(len(every), -1))
+    offset = np.array(machine.probe)
     drawn, lasting = built.random_roots(points)
     at_points = np.concatenate([drawn, lasting], axis=2)
     variances = [(at_points**2).sum(axis=(0, 1)) / len(points)]
@@ -167,7 +187,7 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
     variances += list(np.concatenate([along[0] ** 2 + along[1] ** 2, along[2] ** 2], axis=1))
     found = []
     for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, places), variances, strict=True
+        _figures(split, places, offset, offset), variances, strict=True
     ):
         by_part = np.array([own[[one == part for one in random]].sum() for part in every] + [0.0])
         variance = float(by_part.sum())

@@ -98,7 +98,7 @@ def test_errors_along_a_line_have_their_closed_form() -> None:
         ParametricError("EZX", PowerSeries((1e-6, 9e-6, -8e-6))),
     )
     built = Volumetric(machine(errors=errors, probe=(0.05, 0.0, -0.2)))
-    points = map_places(built.volume, PlacesAsked(line={"y": 0.4, "z": 0.7}, count=9)).points
+    points = map_places(built.volume, PlacesAsked(line={"y": 0.4, "z": 0.7}, points=9)).points
     t = np.linspace(0.0, 1.0, 9)
     pitch = 40e-6 * t**2
     expected = np.stack(

@@ -9,11 +9,11 @@ from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.inputs.yamltree import read_bytes
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from .fitted_results import FittedErrorMap, fitted_map_errors
-from .function_curves import ErrorCurves, error_curves
-from .map_places import PlacesAsked
-from .realisations import Draws
-from .volumetric_results import MachineErrors, machine_errors
+from ..error_maps.map_places import PlacesAsked
+from ..error_maps.realisations import Draws
+from ..error_maps.volumetric_results import MachineErrors, machine_errors
+from .error_curves_result import ErrorCurves, error_curves
+from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 
 # A map file says at its beginning that it is one.
 OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
@@ -49,17 +49,15 @@ def map_errors(
     :raises ValueError: what does not go together, or is not in the machine.
     """
     if error is not None:
-        others = [draws is not None, with_budget, probe is not None]
-        others += [value is not None for value in vars(asked).values()]
-        if any(others):
-            raise ValueError(
-                "a parametric error along its axis goes with nothing else; leave it out"
-            )
+        given = {**vars(asked), "probe": probe, "draw": draws, "budget": with_budget or None}
+        others = [name for name, value in given.items() if value is not None]
+        if others:
+            raise ValueError(f"{others[0]} and error do not go together; give one of them")
     if isinstance(source, Path) and not is_map_file(source):
         if probe is not None:
             raise ValueError("a machine file states its own probe; leave the probe out")
         return machine_errors(source, asked, error, draws, with_budget)
-    fitted, label = (read_map(source), source.stem) if isinstance(source, Path) else (source, "map")
+    fitted, label = map_of_source(source)
     if error is not None:
         return error_curves(fitted, label, (error,))
     return fitted_map_errors(fitted, label, asked, probe, draws, with_budget)

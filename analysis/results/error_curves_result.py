@@ -13,18 +13,18 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from ..presentation.formatting import SHOWN, aligned, as_data, ascii_units, number
-from ..presentation.result import Result
-from .error_functions import (
+from ..error_maps.error_functions import (
     POSITIONS,
     ErrorFunctions,
     EstimatedNumber,
     FunctionCurve,
     error_functions,
 )
-from .fitted_results import map_cautions
-from .fitted_tables import UNDETERMINED, head_lines, map_data, with_uncertainty
-from .function_plots import draw_functions
+from ..error_maps.fitted_tables import UNDETERMINED, head_lines, map_data, with_uncertainty
+from ..error_maps.function_plots import draw_functions
+from ..presentation.formatting import SHOWN, aligned, as_data, ascii_units, number
+from ..presentation.result import Result
+from .fitted_errors_result import map_cautions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,22 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from ..presentation.formatting import as_data
-from ..presentation.result import Result
-from ..presentation.scene import box_edges, projection
-from ..presentation.vectors import Vectors, draw_vectors
-from ..results.adjustments import few_degrees_of_freedom
-from .fitted_errors import (
+from ..error_maps.fitted_errors import (
     FittedErrors,
     FittedLengths,
     drawn_errors,
     fitted_errors,
     fitted_lengths,
 )
-from .fitted_tables import (
+from ..error_maps.fitted_tables import (
     error_lines,
     head_lines,
     length_lines,
@@ -35,12 +30,17 @@ from .fitted_tables import (
     point_csv,
     realisation_lines,
 )
-from .map_places import MapPlaces, PlacesAsked, map_places
-from .part_budget import PartBudget, fitted_budget
-from .part_tables import budget_data, budget_lines
-from .realisations import Draws, Realisations
-from .volumetric_errors import LengthErrors, VolumetricErrors
-from .volumetric_plots import draw_grid, draw_line
+from ..error_maps.map_places import MapPlaces, PlacesAsked, map_places
+from ..error_maps.part_budget import PartBudget, fitted_budget
+from ..error_maps.part_tables import budget_data, budget_lines
+from ..error_maps.realisations import Draws, Realisations
+from ..error_maps.volumetric_errors import LengthErrors, VolumetricErrors
+from ..error_maps.volumetric_plots import draw_grid, draw_line
+from ..presentation.formatting import as_data
+from ..presentation.result import Result
+from ..presentation.scene import box_edges, projection
+from ..presentation.vectors import Vectors, draw_vectors
+from .adjustments import few_degrees_of_freedom
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,7 +64,8 @@ class FittedErrorMap(Result):
     """Errors of a fitted machine at points: `errors`, and those of `lengths`: the body diagonals
     or, along a line, the line's.
 
-    `places` say where, and `probe` is the index of the probe. `realisations` are drawn where they
+    `places` say where, `probes` (m,) are the indices of the points' probes, and `probe` that of the
+    lengths'. `realisations` are drawn where they
     were asked for, and `with_budget` says whether the contributions of the parametric errors are
     shown.
     """
@@ -72,6 +73,7 @@ class FittedErrorMap(Result):
     label: str
     fitted: FittedMap
     places: MapPlaces
+    probes: Integers
     probe: int
     errors: FittedErrors
     lengths: FittedLengths
@@ -95,13 +97,16 @@ class FittedErrorMap(Result):
         """What each parametric error contributes: to the errors at the points, and to each of the
         lengths.
         """
-        return fitted_budget(self.fitted, self.places, self.probe)
+        return fitted_budget(self.fitted, self.places, self.probes, self.probe)
 
     def lines(self) -> list[str]:
         fitted = self.fitted
         lines = head_lines(self.label, fitted, self.probe)
         lines += ["", *length_lines(self.lengths, self.places.names, fitted.coverage_factor)]
-        lines += ["", *error_lines(self.errors, fitted.coverage_factor)]
+        lines += [
+            "",
+            *error_lines(self.errors, fitted.coverage_factor, self.places.names_of_points),
+        ]
         if self.realisations is not None:
             lines += ["", *realisation_lines(self.realisations, self.places.names)]
         if self.with_budget:
@@ -123,11 +128,16 @@ class FittedErrorMap(Result):
             for i, name in enumerate(self.places.names)
         ]
         one = self.errors
+        names = self.places.names_of_points
         found[self.places.kind] = [
-            {"position": p, "error": e, "expanded_uncertainty": u, "resultant": r}
-            for p, e, u, r in zip(
-                one.points, one.errors, k * one.uncertainties, one.resultant, strict=True
-            )
+            {
+                **({"point": names[i]} if names else {}),
+                "position": one.points[i],
+                "error": one.errors[i],
+                "expanded_uncertainty": k * one.uncertainties[i],
+                "resultant": one.resultant[i],
+            }
+            for i in range(len(one.points))
         ]
         if self.realisations is not None:
             found["realisations"] = self.realisations.to_dict()
@@ -146,11 +156,18 @@ class FittedErrorMap(Result):
             "resultant": found.resultant,
         }
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
-        return [dict(zip(columns, row, strict=True)) | {"k": k, "unit": "m"} for row in values]
+        names = self.places.names_of_points
+        return [
+            ({"point": names[i]} if names else {})
+            | dict(zip(columns, row, strict=True))
+            | {"k": k, "unit": "m"}
+            for i, row in enumerate(values)
+        ]
 
     def point_lines(self) -> Iterator[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""
-        return point_csv(self.errors, self.fitted.coverage_factor, self.realisations)
+        k, names = self.fitted.coverage_factor, self.places.names_of_points
+        return point_csv(self.errors, k, self.realisations, names)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -218,14 +235,16 @@ def fitted_map_errors(
     if chosen not in names:
         raise ValueError(f'no probe "{chosen}"; {hint(chosen, names)}')
     index = names.index(chosen)
-    places = map_places(fitted.volume, asked)
+    places = map_places(fitted.volume, asked, names, chosen)
+    probes = np.full(len(places.points), index) if places.probes is None else places.probes
     return FittedErrorMap(
         label,
         fitted,
         places,
+        probes,
         index,
-        fitted_errors(fitted, places.points, index),
+        fitted_errors(fitted, places.points, probes),
         fitted_lengths(fitted, places.starts, places.ends, index),
-        None if draws is None else drawn_errors(fitted, places, draws, index),
+        None if draws is None else drawn_errors(fitted, places, draws, probes, index),
         with_budget,
     )
