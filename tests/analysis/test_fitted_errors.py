@@ -21,6 +21,8 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.readings.simulated import simulated_readings
+from numpy.polynomial.chebyshev import cheb2poly, chebvander
+from numpy.polynomial.legendre import poly2leg
 from numpy.typing import NDArray
 
 from tests.reference import dense
@@ -56,11 +58,19 @@ def fitted(fit: Fit) -> FittedMap:
 
 
 def by_hand(fitted: FittedMap, x: Real, a: Real, p: Real) -> Real:
-    """The errors at x (m, 3), by the formulas of the dense reference."""
-    functions = dense.error_functions(4, 3)
+    """The errors at x (m, 3), by the formulas of the dense reference, whose polynomials are
+    Legendre's.
+    """
+    functions, start, legendre = dense.error_functions(4, 3), 0, []
+    for function in functions:
+        own = a[start : start + function.free]
+        found = poly2leg(cheb2poly(own))
+        legendre.append(np.append(found, np.zeros(len(own) - len(found))))
+        start += function.free
     probes = np.tile(p, (len(x), 1))
     lower, upper = fitted.volume.lower, fitted.volume.upper
-    return np.asarray(dense.machine_error(functions, lower, upper, x, a, probes) - probes)
+    own = np.concatenate(legendre)
+    return np.asarray(dense.machine_error(functions, lower, upper, x, own, probes) - probes)
 
 
 def slopes(fitted: FittedMap, function: Any) -> Real:
@@ -90,19 +100,21 @@ def test_errors_and_lengths_are_those_of_the_formulas(fitted: FittedMap) -> None
     ):
         ends = np.array([start, end])
 
-        def length(a: Real, ends: Real = ends) -> Real:
-            moved = ends + by_hand(fitted, ends, 1e3 * a, p)
-            return np.asarray(np.linalg.norm(moved[1] - moved[0]) - np.linalg.norm(np.ptp(ends, 0)))
+        def length(a: Real, ends: Real = ends) -> float:
+            moved = ends + by_hand(fitted, ends, a, p)
+            return float(np.linalg.norm(moved[1] - moved[0]) - np.linalg.norm(np.ptp(ends, axis=0)))
 
-        row = slopes(fitted, lambda a: length(1e-6 * a)) / 1e-3
+        steps = 1e-6 * np.eye(len(fitted.values))
+        row = np.array([(length(one) - length(-one)) / 2e-6 for one in steps])
         u_length = np.sqrt(row @ fitted.covariance @ row)
-        assert found.lengths.errors[k] == pytest.approx(length(1e-3 * fitted.values), abs=2e-15)
-        assert found.lengths.uncertainties[k] == pytest.approx(u_length, rel=1e-5)
+        assert found.lengths.errors[k] == pytest.approx(length(fitted.values), abs=2e-15)
+        assert found.lengths.uncertainties[k] == pytest.approx(u_length, rel=1e-6)
 
 
 def test_a_line_a_plane_and_points_are_places_of_the_same_map(fitted: FittedMap) -> None:
     line = bp.map(fitted, line="y = 300 mm, z = 200 mm", points=3)
-    assert line.errors.points.tolist() == [[-0.1, 0.3, 0.2], [0.45, 0.3, 0.2], [1.0, 0.3, 0.2]]
+    expected = np.array([[-0.1, 0.3, 0.2], [0.45, 0.3, 0.2], [1.0, 0.3, 0.2]])
+    assert line.errors.points == pytest.approx(expected)
     plane = bp.map(fitted, plane="y = 300 mm", grid=(3, 6))
     assert plane.errors.points.shape == (18, 3) and set(plane.errors.points[:, 1]) == {0.3}
     table = pd.DataFrame(line.errors.points, columns=["x_m", "y_m", "z_m"])
@@ -116,9 +128,7 @@ def test_a_line_a_plane_and_points_are_places_of_the_same_map(fitted: FittedMap)
     assert (given.errors.uncertainties[1] == down.errors.uncertainties[1]).all()
     assert (down.errors.errors[1] != right.errors.errors[1]).any()
     assert (line.errors.errors == right.errors.errors).all()
-    inside = [
-        k for k, point in enumerate(plane.errors.points) if point.tolist() == [0.45, 0.3, 0.2]
-    ]
+    inside = np.flatnonzero(np.isclose(plane.errors.points, [0.45, 0.3, 0.2]).all(axis=1))
     assert plane.errors.errors[inside[0]] == pytest.approx(line.errors.errors[1], abs=1e-20)
     csv = list(given.point_lines())
     assert csv[0].startswith("point,x_mm") and csv[2].startswith('"middle, low",450,300,200,')
@@ -190,7 +200,7 @@ def test_parts_add_up_to_the_whole(fitted: FittedMap) -> None:
 
 def test_random_parts_of_a_machine_file_add_in_squares() -> None:
     file = TOP / "designs/park/machines/measured-errors.yaml"
-    found = bp.map(file, grid=(3, 3, 3), budget=True, draw=4000, seed=3)
+    found = bp.map(file, grid=(3, 3, 3), budget=True, draw=1000, seed=3)
     assert found.realisations is not None
     for k, one in enumerate(found.budget[1:]):
         squares = float((one.uncertainties**2).sum())
@@ -199,8 +209,8 @@ def test_random_parts_of_a_machine_file_add_in_squares() -> None:
         assert one.total == pytest.approx(found.lengths.error[k], abs=1e-15)
     spread = found.realisations.errors.std(axis=0)
     known = found.errors.deviation > 0.0
-    # 4000 draws know a standard deviation to 1.1 %.
-    assert known.any() and np.abs(spread[known] / found.errors.deviation[known] - 1.0).max() < 0.06
+    # 1000 draws know a standard deviation to 2.2 %.
+    assert known.any() and np.abs(spread[known] / found.errors.deviation[known] - 1.0).max() < 0.12
     assert found.realisations.lengths.std(axis=0) == pytest.approx(
         found.lengths.deviation, rel=0.05
     )
@@ -234,7 +244,7 @@ def test_realisations_scatter_as_stated(fitted: FittedMap) -> None:
 
 def test_curves_are_the_functions_with_their_bands(fit: Fit, fitted: FittedMap) -> None:
     """Each function from the estimates that the fit reports and their covariance, in the basis as
-    it is documented: t P(2t - 1), or t (1 - t) P(2t - 1) where both ends are held.
+    it is documented: t T(2t - 1), or t (1 - t) T(2t - 1) where both ends are held.
     """
     found = bp.curves(fitted, points=9)
     covariance = fit.covariance("machine")
@@ -244,7 +254,7 @@ def test_curves_are_the_functions_with_their_bands(fit: Fit, fitted: FittedMap) 
     t = np.linspace(0.0, 1.0, 9)
     for function in dense.error_functions(4, 3):
         one = curves[function.name]
-        basis = t[:, None] * dense.legendre(t, function.free)
+        basis = t[:, None] * chebvander(2.0 * t - 1.0, function.free - 1)
         if function.zero_at_one:
             basis *= 1.0 - t[:, None]
         names = [f"{function.name}[{k + 1}]" for k in range(function.free)]
@@ -300,7 +310,7 @@ def test_other_models_have_maps_and_angles(name: str, capsys: pytest.CaptureFixt
 def undetermined() -> FittedMap:
     """A plate in two positions, which leave most rotations open."""
     told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    experiment = small(positions=told["positions"][:3], expected_rank_deficiency=None)
+    experiment = small(positions=told["positions"][:3])
     return bp.fit(experiment, bp.simulate(experiment)).to_map()
 
 
@@ -385,7 +395,8 @@ def test_a_machine_file_has_no_map_and_no_probe(capsys: pytest.CaptureFixture[st
     machine = str(TOP / "designs/park/machines/npl-like.yaml")
     assert main(["map", machine, "--probe", "down"]) == 2
     assert "a machine file states its own probe" in capsys.readouterr().err
-    assert main(["map", machine, "--draw", "2"]) == 2
+    gantry = str(TOP / "designs/park/machines/gec-like.yaml")
+    assert main(["map", gantry, "--draw", "2"]) == 2
     assert "no random part" in capsys.readouterr().err
     assert main(["curves", machine]) == 3
     assert "is no map file" in capsys.readouterr().err
