@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.error_names import AXIS_ERRORS
 
 from ..presentation.formatting import SHOWN, number, to_uncertainty
-from ..presentation.svg import DASHES, MUTED, SERIES, drawing, placed_axes, save
+from ..presentation.svg import DASHES, MUTED, PAPER, SERIES, drawing, placed_axes, save
 from .error_functions import ErrorFunctions, EstimatedNumber, FunctionCurve
 from .volumetric_tables import CONVENTION
 
@@ -120,10 +120,12 @@ def _limits(curves: Sequence[FunctionCurve], k: float) -> dict[str, float]:
 
 
 def _draw_panel(axes: Axes, curves: Sequence[FunctionCurve], k: float, limit: float) -> None:
-    first = curves[0]
-    axes.set_title(f"{first.name} {first.meaning}", loc="left", fontsize=9.0, pad=4.0)
-    axes.axhline(0.0, color=MUTED, linewidth=0.6)
-    axes.grid(True)
+    first, is_open = curves[0], all(one.is_undetermined for one in curves)
+    along = f", along {AXIS_NAMES[first.axis]}" if first.line and first.axis is not None else ""
+    axes.set_title(f"{first.name} {first.meaning}{along}", loc="left", fontsize=9.0, pad=4.0)
+    if not is_open:
+        axes.axhline(0.0, color=MUTED, linewidth=0.6)
+        axes.grid(True)
     axes.margins(x=0.0)
     axes.set_ylim(-MARGIN * limit, MARGIN * limit)
     axes.tick_params(labelsize=8.5)
@@ -136,13 +138,14 @@ def _draw_panel(axes: Axes, curves: Sequence[FunctionCurve], k: float, limit: fl
         axes.plot(x, values, color=colour, linestyle=DASHES[i % len(DASHES)], linewidth=1.3)
         for edge in (values - half, values + half):
             axes.plot(x, edge, color=colour, linewidth=0.5)
-    is_open = [np.isnan(one.uncertainties).any() for one in curves]
-    if any(is_open):
-        is_whole = all(one.is_undetermined for one in curves)
-        text = "undetermined" if is_whole else "undetermined in part"
-        place = (0.5, 0.5) if is_whole else (0.5, 0.08)
-        axes.text(*place, text, transform=axes.transAxes, ha="center", va="center", fontsize=9.0)
-    if all(one.is_undetermined for one in curves):
+    if any(np.isnan(one.uncertainties).any() for one in curves):
+        place, text = (
+            ((0.5, 0.5), "undetermined") if is_open else ((0.5, 0.08), "undetermined in part")
+        )
+        label: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9.0}
+        label["bbox"] = {"facecolor": PAPER, "edgecolor": "none", "pad": 2.0}
+        axes.text(*place, text, transform=axes.transAxes, **label)
+    if is_open:
         axes.patch.set_hatch("///")
         axes.patch.set_edgecolor(MUTED)
         axes.patch.set_alpha(0.4)

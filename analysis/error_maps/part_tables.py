@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..presentation.formatting import aligned, number
-from .part_budget import PartBudget
+from .part_budget import REST, PartBudget
 
 # A part that contributes less to all figures, in metres, is left out of tables.
 NOTHING = 1e-9
@@ -60,13 +60,15 @@ def budget_lines(
     rows.append([whole, *(_shown(factor * one.uncertainty) for one in lengths)])
     lines += [*aligned(rows, right), ""]
     left = len(figures[0].parts) - len(shown)
-    told = [f"({left} parts contribute nothing and are left out)"] if left else []
+    told = [f"(parts that contribute nothing, {left} of them, are left out)"] if left else []
     return [*lines, *told, OF_POINTS, OF_LENGTHS, OF_ESTIMATES if correlated else OF_SOURCES]
 
 
 def _is_shown(one: PartBudget, k: int) -> bool:
     sizes = np.array([abs(one.errors[k]), one.uncertainties[k]])
-    return bool(np.isnan(sizes).any() or sizes.max() > NOTHING)
+    if np.isnan(sizes).any():
+        return one.parts[k] != REST
+    return bool(sizes.max() > NOTHING)
 
 
 def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict[str, Any]]:

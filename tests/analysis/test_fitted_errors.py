@@ -340,7 +340,8 @@ def test_what_is_undetermined_is_said_everywhere(
     assert {tuple(row.split(",")[3:5]) for row in rows} <= {("", ""), ("0", "0")} and len(
         rows
     ) == 41
-    assert found.plot(tmp_path / "curves.svg") is not None
+    picture = bp.curves(fitted, [name, "EXX"]).plot()
+    assert "undetermined" in [text.get_text() for axes in picture.axes for text in axes.texts]
     whole = bp.map(fitted, budget=True)
     assert np.isnan(whole.errors.errors).any() and "undetermined" in str(whole)
     assert (np.isnan(whole.errors.errors) == np.isnan(whole.errors.uncertainties)).all()
@@ -361,8 +362,8 @@ def test_commands_print_what_results_say(
     assert printed == found.to_dict()
     assert "correction" in printed["convention"] and printed["coverage_factor"] == 2.0
     picture = tmp_path / "curves.png"
-    assert main(["curves", str(path), "--plot", str(picture)]) == 0
-    assert capsys.readouterr().out == "\n".join([*bp.curves(path).lines(), ""])
+    assert main(["curves", str(path), "--plot", str(picture), "--error", "EXX"]) == 0
+    assert capsys.readouterr().out == "\n".join([*bp.curves(path, "EXX").lines(), ""])
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "<table" in bp.curves(path)._repr_html_() and "<table" in found._repr_html_()
 
@@ -435,7 +436,7 @@ def covered(fitted: FittedMap, experiment: Experiment, campaigns: int) -> list[R
 
 
 def test_bands_cover_the_truth_in_a_few_campaigns(fitted: FittedMap) -> None:
-    count = 40
+    count = 12
     for found in covered(fitted, small(), count):
         of_campaigns = found.reshape(count, -1).mean(axis=1)
         error = of_campaigns.std(ddof=1) / np.sqrt(count)
