@@ -13,7 +13,7 @@ from tests.machines.test_custom_model import GOOD
 
 PROBES = {"down": ["0 mm", "0 mm", "-50 mm"], "right": ["50 mm", "0 mm", "0 mm"]}
 CORNERS = ({"x": "50 mm", "y": "50 mm"}, {"y": "50 mm", "z": "50 mm"}, {"z": "50 mm", "x": "50 mm"})
-PLACES = [
+PLACES: list[dict[str, Any]] = [
     {"plane": "z", "level": "100 mm", "corner": CORNERS[0], "probes": ["down"]},
     {"plane": "z", "level": "400 mm", "corner": CORNERS[0], "probes": ["down"]},
     {
@@ -40,12 +40,13 @@ PLACES = [
         "probes": ["right"],
     },
 ]
+POSITIONS: list[dict[str, Any]] = [{"name": f"P{k}", **one} for k, one in enumerate(PLACES)]
 IN_SPACE: dict[str, Any] = {
     "title": "a plate in space",
     "machine": {"volume": ["500 mm", "500 mm", "500 mm"], "repeatability": "0.3 um"},
     "probes": PROBES,
     "artefacts": {"plate": {"kind": "square", "balls": 5, "size": "400 mm"}},
-    "positions": [{"name": f"P{k}", **place} for k, place in enumerate(PLACES)],
+    "positions": POSITIONS,
     "calibration": [{"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"}],
 }
 CORNER = {"x": "50 mm", "y": "60 mm"}
@@ -66,6 +67,10 @@ MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "spatial metric": (IN_SPACE, {"kind": "metric"}),
     "kinematic": (IN_SPACE, {"kind": "kinematic", **SMALL}),
     "table": (IN_SPACE, {"kind": "kinematic", "arrangement": "FB1", "rotations": "full", **SMALL}),
+    "deficient": (
+        IN_SPACE | {"positions": [{**one, "probes": one["probes"][:1]} for one in POSITIONS]},
+        {"kind": "kinematic", "arrangement": "FB1", "rotations": "full", **SMALL},
+    ),
     "listed axes": (
         IN_SPACE,
         {
