@@ -173,6 +173,7 @@ def _words(one: BudgetFigure) -> str:
     return f"{one.description}; {one.undetermined} of {one.count} are undetermined and left out"
 
 
+@single_threaded
 def budget(
     experiment: Experiment, fit: Fit | None = None, by: Grouping = "calibration"
 ) -> UncertaintyBudget:
@@ -205,7 +206,6 @@ def budget(
     )
 
 
-@single_threaded
 def _figures(at: Linearisation, sums: SourceSums, sigma: float) -> Iterator[BudgetFigure]:
     design, places = at.design, evaluation_points(at.design)
     every = [linear_functions(at, Coordinates(places))]

@@ -102,6 +102,10 @@ class FittedErrorMap(Result):
     def lines(self) -> list[str]:
         fitted = self.fitted
         lines = head_lines(self.label, fitted, self.probe)
+        others = np.unique(self.probes[self.probes != self.probe])
+        if len(others):
+            told = ", ".join(fitted.probes.names[k] for k in others)
+            lines.append(f"points that the table has with other probes: {told}")
         lines += ["", *length_lines(self.lengths, self.places.names, fitted.coverage_factor)]
         lines += [
             "",
@@ -128,16 +132,15 @@ class FittedErrorMap(Result):
             for i, name in enumerate(self.places.names)
         ]
         one = self.errors
-        names = self.places.names_of_points
         found[self.places.kind] = [
             {
-                **({"point": names[i]} if names else {}),
+                **told,
                 "position": one.points[i],
                 "error": one.errors[i],
                 "expanded_uncertainty": k * one.uncertainties[i],
                 "resultant": one.resultant[i],
             }
-            for i in range(len(one.points))
+            for i, told in enumerate(self._of_table())
         ]
         if self.realisations is not None:
             found["realisations"] = self.realisations.to_dict()
@@ -156,13 +159,19 @@ class FittedErrorMap(Result):
             "resultant": found.resultant,
         }
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
-        names = self.places.names_of_points
         return [
-            ({"point": names[i]} if names else {})
-            | dict(zip(columns, row, strict=True))
-            | {"k": k, "unit": "m"}
-            for i, row in enumerate(values)
+            told | dict(zip(columns, row, strict=True)) | {"k": k, "unit": "m"}
+            for told, row in zip(self._of_table(), values, strict=True)
         ]
+
+    def _of_table(self) -> list[dict[str, Any]]:
+        """What a table of points says of each: its name and probe."""
+        names, probes = self.places.names_of_points, self.fitted.probes.names
+        found: list[dict[str, Any]] = [{} for _ in self.errors.points]
+        for i, told in enumerate(found):
+            told |= {"point": names[i]} if names else {}
+            told |= {} if self.places.probes is None else {"probe": probes[self.probes[i]]}
+        return found
 
     def point_lines(self) -> Iterator[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""

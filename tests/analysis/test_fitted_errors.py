@@ -25,6 +25,7 @@ from numpy.polynomial.chebyshev import cheb2poly, chebvander
 from numpy.polynomial.legendre import poly2leg
 from numpy.typing import NDArray
 
+from tests.maps import kinds
 from tests.reference import dense
 
 TOP = Path(__file__).parents[2]
@@ -124,6 +125,8 @@ def test_a_line_a_plane_and_points_are_places_of_the_same_map(fitted: FittedMap)
     right, down = (
         bp.map(fitted, points=line.errors.points, probe=name) for name in ("right", "down")
     )
+    assert [row["probe"] for row in given.rows()] == ["right", "down", "right"]
+    assert [one["probe"] for one in given.to_dict()["points"]] == ["right", "down", "right"]
     assert (given.errors.errors[::2] == right.errors.errors[::2]).all()
     assert (given.errors.uncertainties[1] == down.errors.uncertainties[1]).all()
     assert (down.errors.errors[1] != right.errors.errors[1]).any()
@@ -288,23 +291,53 @@ def test_squareness_is_the_same_angle_in_both_forms_of_the_model() -> None:
     assert np.abs(angles[0][:, 0]).min() > 1e-8
 
 
-@pytest.mark.parametrize("name", ["two-dimensions", "unknown-offsets", "ball-bar"])
-def test_other_models_have_maps_and_angles(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The squareness of a plane's metric is -alpha, that of the spatial metric its parameter."""
-    experiment = bp.load_all(TOP / f"designs/certified/{name}.yaml")[0]
-    fitted = bp.fit(experiment, bp.simulate(experiment)).to_map()
-    found = bp.curves(fitted)
-    angles = {one.name: one.value for one in found.functions.squareness}
+QUICK = ("metric", "table", "deficient", "estimated probe", "plane")
+KINDS = [
+    pytest.param(kind, marks=[] if kind in QUICK else [pytest.mark.long]) for kind in kinds.MODELS
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_model_has_errors_parts_and_curves(kind: str, tmp_path: Path) -> None:
+    """Errors are what `Fit.correct` adds to readings, but for the offset of the probe. The
+    squareness of a plane's metric is -alpha, that of the spatial metric its parameter.
+    """
+    kinds.write_files(tmp_path)
+    fit = kinds.fit_of(kind, tmp_path)
+    fitted = fit.to_map()
+    volume = fitted.volume
+    draw = np.random.default_rng(5).random((6, fitted.dimension))
+    points = volume.lower + volume.size * draw
+    found, given = bp.map(fitted, points=points, budget=True, draw=2), fit.correct(points)
+    offset = fitted.probes.offsets[found.probe]
+    u = given.standard_uncertainties
+    if not fitted.probes.free.any():
+        assert found.errors.uncertainties == pytest.approx(u, rel=1e-6, nan_ok=True)
+    expected = np.where(np.isnan(u), np.nan, given.points - points - offset)
+    assert found.errors.errors == pytest.approx(expected, abs=1e-15, nan_ok=True)
+    for one, total in zip(found.budget[1:], found.lengths.errors, strict=True):
+        assert np.isnan(one.total) == np.isnan(total)
+        if not np.isnan([*one.errors, total]).any():
+            assert one.errors.sum() == pytest.approx(total, abs=1e-15)
+            assert one.variance_shares.sum() == pytest.approx(1.0)
+    curves = bp.curves(fitted, points=5)
     own = dict(zip([one.name for one in fitted.model.parameters], fitted.values, strict=True))
-    if "alpha" in own:
-        assert angles["EC0Y"] == pytest.approx(-own["alpha"], rel=1e-4)
-    if "C0Y" in own:
-        assert [angles[f"E{key}"] for key in ("C0Y", "B0Z", "A0Z")] == pytest.approx(
-            [own[key] for key in ("C0Y", "B0Z", "A0Z")], rel=1e-4
-        )
-    whole = bp.map(fitted, budget=True, draw=2)
-    assert str(found) and str(whole) and json.dumps(whole.to_dict()) and json.dumps(found.to_dict())
-    assert whole.plot() is not None
+    angles = {one.name: one.value for one in curves.functions.squareness}
+    for name, value in own.items():
+        if name == "alpha":
+            assert angles["EC0Y"] == pytest.approx(-value, rel=1e-4)
+        if name in ("C0Y", "B0Z", "A0Z") and not np.isnan(angles[f"E{name}"]):
+            assert angles[f"E{name}"] == pytest.approx(value, rel=1e-4)
+    reported = {one.function for one in fitted.model.parameters}
+    functions = curves.functions
+    told = {one.name for one in (*functions.curves, *functions.squareness, *functions.numbers)}
+    assert reported <= told | {one.function for one in fitted.model.parameters if one.name in told}
+    for result in (found, curves):
+        assert "NaN" not in json.dumps(result.to_dict()) and str(result) and result.rows()
+    if kind in ("empirical", "plane"):
+        assert curves.plot() is not None
+    if not np.isnan(found.errors.resultant).all():
+        assert found.plot() is not None
 
 
 def undetermined() -> FittedMap:
