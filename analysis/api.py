@@ -838,8 +838,9 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), f"{folder}/map.npz")
-    ...     load_map(f"{folder}/map.npz").degrees_of_freedom
+    ...     path = f"{folder}/map.npz"
+    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
+    ...     load_map(path).degrees_of_freedom
     580
     """
     from .simulator.experiment import map_files
@@ -868,9 +869,10 @@ def correct(
     given; `with_repeatability` the scatter of the readings that are corrected counts, too.
 
     >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
-    >>> found = correct(fitted, [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], lengths=[(0, 1)])
-    >>> found
-    <Correction of quickstart: 2 points; U = 2 u = 0.433 µm at most>
+    >>> ends = [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]
+    >>> correct(fitted, ends)
+    <Correction of quickstart: 2 points; U = 2 u = 0.4325 µm at most>
+    >>> found = correct(fitted, ends, lengths=[(0, 1)])
     >>> found.points.shape, found.blocks.shape, found.covariance().shape
     ((2, 3), (2, 3, 3), (6, 6))
     >>> f"{1e6 * found.lengths[0].standard_uncertainty:.3f} µm"

@@ -153,6 +153,11 @@ class Correction(Result):
                 f"{len(outside)} of {len(self.points)} points lie outside the volume of the map,"
                 f" where it is extrapolated and its uncertainty need not hold: {words}"
             )
+        if fitted.without_scatter:
+            found.append(
+                "the readings of the map agree with its model but for rounding, as computed ones"
+                " do: its uncertainties are zero, too, and cannot be relied on"
+            )
         if fitted.sigma_is_estimated:
             remedy = f"expanded uncertainties with k = {self.coverage_factor:g} may be too small"
             freedom = fitted.degrees_of_freedom
@@ -372,11 +377,16 @@ def correction(
         pairs = np.arange(len(ends)).reshape(-1, 2)
         mapped = mapped_lengths(fitted, ends, lengths.probes.ravel(), pairs, scatter)
         values = np.where(np.isnan(mapped.standard_uncertainties), np.nan, mapped.values)
-        columns = mapped.read, values, mapped.standard_uncertainties
+        uncertainties = mapped.standard_uncertainties.tolist()
         found = tuple(
-            CorrectedLength(name, *amounts, target)
-            for name, *amounts, target in zip(
-                lengths.names, *(one.tolist() for one in columns), lengths.targets, strict=True
+            CorrectedLength(*one)
+            for one in zip(
+                lengths.names,
+                mapped.read.tolist(),
+                values.tolist(),
+                uncertainties,
+                lengths.targets,
+                strict=True,
             )
         )
     factor = coverage_factor or fitted.coverage_factor
