@@ -5,8 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
-from .common import add_formats, add_picture, count, print_json, print_lines
-from .outputs import UsageError, add_force, write
+from .common import (
+    add_formats,
+    add_picture,
+    count,
+    print_json,
+    print_lines,
+    write_picture,
+)
+from .outputs import UsageError, add_force
 from .telling import complain
 
 HELP = "tell the parametric errors of a map that a fit left behind, with their uncertainties"
@@ -63,10 +70,7 @@ def run(options: Namespace) -> int:
         complain(note)
     # Before anything is printed that nobody may read to its end.
     if options.plot is not None:
-        try:
-            write(options, {options.plot: found.plot})
-        except ValueError as error:
-            raise UsageError(f"--plot: {error}") from None
+        write_picture(options, found.plot)
     if options.format == "json":
         print_json([found.to_dict()])
     else:

@@ -17,8 +17,9 @@ from .common import (
     print_json,
     print_lines,
     whole,
+    write_picture,
 )
-from .outputs import UsageError, add_force, write
+from .outputs import UsageError, add_force
 from .telling import complain
 
 if TYPE_CHECKING:
@@ -182,7 +183,7 @@ def run(options: Namespace) -> int:
         draw = partial(found.plot, magnification=options.magnification)
     # Before anything is printed that nobody may read to its end.
     if options.plot is not None:
-        write(options, {options.plot: draw})
+        write_picture(options, draw)
     if options.format == "json":
         print_json([found.to_dict()])
     else:

@@ -20,6 +20,9 @@ from .volumetric_tables import CONVENTION
 
 UNDETERMINED = "undetermined"
 
+# Errors and uncertainties below this, in metres and radians, are rounding.
+ROUNDING = 1e-15
+
 
 def head_lines(label: str, fitted: FittedMap, probe: int | None = None) -> list[str]:
     """What the map is, and what its figures state."""
@@ -56,6 +59,7 @@ def with_uncertainty(value: float, uncertainty: float, factor: float) -> list[st
     """A value and its expanded uncertainty in millionths of their unit, as two cells."""
     if np.isnan(value) or np.isnan(uncertainty):
         return [UNDETERMINED, "-"]
+    value, uncertainty = (0.0 if abs(one) < ROUNDING else one for one in (value, uncertainty))
     shown = to_uncertainty(1e6 * value, 1e6 * uncertainty)
     return [shown, number(1e6 * factor * uncertainty, 3)]
 

@@ -11,10 +11,12 @@ import numpy as np
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.experiment.error_tables import parse_line, parse_point
 from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.quantities import parse_length
+from ballplate.simulator.inputs.tables import header_names
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.point_files import ensure_points, read_points
+from ballplate.simulator.readings.point_files import PROBE, ensure_points, read_points
 
 # Points along each axis of the volume, and along a line, unless told.
 GRID, POINTS = (5, 5, 5), 21
@@ -120,6 +122,9 @@ def map_places(
     if asked.at is not None:
         if isinstance(asked.at, np.ndarray):
             return MapPlaces("points", ensure_points(asked.at, volume), (), *ends, names)
+        if not probe and PROBE in header_names(asked.at):
+            text = "a machine file states its own probe; remove the column probe"
+            raise refused(str(asked.at), text)
         found = read_points(asked.at, probes, probe, volume)
         of_points = found.names if any(found.names) else ()
         return MapPlaces("points", found.points, (), *ends, names, of_points, found.probes)

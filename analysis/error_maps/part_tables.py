@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..presentation.formatting import aligned, number
+from .fitted_tables import ROUNDING, UNDETERMINED
 from .part_budget import REST, PartBudget
 
 # A part that contributes less to all figures, in metres, is left out of tables.
@@ -97,7 +98,9 @@ def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict
 
 
 def _shown(value: float) -> str:
-    return "undetermined" if np.isnan(value) else number(1e6 * float(value), 4)
+    if np.isnan(value):
+        return UNDETERMINED
+    return number(0.0 if abs(value) < ROUNDING else 1e6 * float(value))
 
 
 def _percent(share: float) -> str:

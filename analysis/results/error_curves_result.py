@@ -152,7 +152,9 @@ class ErrorCurves(Result):
         :raises ValueError: the path ends in something else, or there is no curve.
         """
         if not self.functions.curves:
-            raise ValueError("there are no curves to draw: all errors of this map are numbers")
+            raise ValueError(
+                "there are no curves to draw, only single numbers; leave the picture out"
+            )
         return draw_functions(self.functions, self.title, self.k, path)
 
 

@@ -207,7 +207,7 @@ class FittedErrorMap(Result):
         """
         k, given = self.fitted.coverage_factor, self.errors
         if np.isnan(given.resultant).all():
-            raise ValueError("there are no errors to draw: all are undetermined")
+            raise ValueError("all errors are undetermined; leave the picture out")
         found = VolumetricErrors(given.points, given.errors, given.uncertainties)
         if self.places.kind == "line":
             return draw_line(found, path, k, f"U, k = {k:g}", "correction")

@@ -89,7 +89,6 @@ RECIPES = (
     "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4",
     "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
     "map map.yaml --points to-correct.csv --format csv",
-    "map gec-like.yaml --points to-correct.csv --budget",
     "curves map.yaml --plot out.svg",
     "curves map.npz --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
