@@ -727,6 +727,7 @@ def map(
     draw: int | None = None,
     seed: int = 1,
     budget: bool = False,
+    tasks: Experiment | PathLike | None = None,
 ) -> MachineErrors | FittedErrorMap | ErrorCurves:
     """Volumetric errors of a machine file, or of the map that a fit left behind, with expanded
     uncertainties: on a grid over the volume, in a plane, along a line of so many points, at given
@@ -735,7 +736,8 @@ def map(
     `line` is a text as in `ballplate map --line`, the places in metres of the two fixed
     axes, or two points; `plane` the place of the axis across it. `points` is their number along a
     line; or a table of points, as for the command; or their co-ordinates (m, d) in metres. Of a map
-    `probe` is the name of the probe. With `draw`, so many realisations of the random part, or of
+    `probe` is the name of the probe, and the lengths of the measuring `tasks` of an experiment are
+    told, too. With `draw`, so many realisations of the random part, or of
     what the covariance of a map leaves open, are drawn from a `seed`. With `budget` the result
     shows what each parametric error contributes, which its `budget` has in any case.
 
@@ -788,7 +790,8 @@ def map(
     )
     source = machine if isinstance(machine, FittedMap) else Path(machine)
     draws = None if draw is None else Draws(draw, seed)
-    return map_errors(source, asked, error, probe, draws, budget)
+    chosen = () if tasks is None else (_experiment(tasks),)
+    return map_errors(source, asked, error, probe, draws, budget, chosen)
 
 
 def curves(

@@ -43,6 +43,12 @@ def add_options(parser: ArgumentParser) -> None:
         "--probe", metavar="NAME", help="of a map file: the probe, default that of the map"
     )
     parser.add_argument(
+        "--tasks",
+        metavar="FILE",
+        type=Path,
+        help="of a map file: also the lengths of the measuring tasks of an experiment file",
+    )
+    parser.add_argument(
         "--draw",
         metavar="N",
         type=_draw,
@@ -155,6 +161,8 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
+    from ballplate.simulator.experiment.load import load
+
     from ..error_maps.map_places import PlacesAsked
     from ..error_maps.realisations import Draws
     from ..error_maps.volumetric_results import VolumetricMap
@@ -172,8 +180,11 @@ def run(options: Namespace) -> int:
     asked = PlacesAsked(options.grid, options.line, options.plane, number, table)
     seed = 1 if options.seed is None else options.seed
     draws = None if options.draw is None else Draws(options.draw, seed)
+    tasks = () if options.tasks is None else load(options.tasks)
     try:
-        found = map_errors(options.file, asked, options.error, options.probe, draws, options.budget)
+        found = map_errors(
+            options.file, asked, options.error, options.probe, draws, options.budget, tasks
+        )
     except ValueError as error:
         raise UsageError(error) from None
     for note in found.notes:

@@ -16,6 +16,7 @@ from ballplate.simulator.maps.corrected_points import (
     corrected,
     drawn_rows,
     probe_indices,
+    tips,
 )
 from ballplate.simulator.maps.fitted_map import FittedMap
 
@@ -101,27 +102,41 @@ def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> FittedErr
 
 
 @single_threaded
-def fitted_lengths(fitted: FittedMap, starts: Array, ends: Array, probe: int) -> FittedLengths:
-    """Errors of the distances between points (m, d), whose ends are read with the same probe."""
-    uncertainties = length_rows(fitted, starts, ends, probe).uncertainties(fitted)
-    moved = errors_of(fitted, ends, probe) - errors_of(fitted, starts, probe)
-    found = length_errors(starts, ends, moved)
-    nominal = np.linalg.norm(ends - starts, axis=1)
-    errors = np.where(np.isnan(uncertainties), np.nan, found)
-    return FittedLengths(starts, ends, nominal, errors, uncertainties)
+def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> FittedLengths:
+    """Errors of the lengths of places, both ends with the probe of an index unless they have their
+    own. Lengths are those between the tips; where these are by the scales, offsets are as stated.
+    """
+    first, last = (tips(fitted, *end) for end in length_ends(places, probe))
+    corrected_ends = [corrected(fitted, *end)[0] for end in length_ends(places, probe)]
+    moved = corrected_ends[1] - last - (corrected_ends[0] - first)
+    uncertainties = length_rows(fitted, places, probe).uncertainties(fitted)
+    errors = np.where(np.isnan(uncertainties), np.nan, length_errors(first, last, moved))
+    nominal = np.linalg.norm(last - first, axis=1)
+    return FittedLengths(places.starts, places.ends, nominal, errors, uncertainties)
 
 
-def length_rows(fitted: FittedMap, starts: Array, ends: Array, probe: int) -> ErrorRows:
-    """Derivatives (m, b) of the lengths between points (m, d)."""
-    direction = (ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None]
-    first, last = (rows_of_errors(fitted, one, probe) for one in (starts, ends))
+def length_ends(places: MapPlaces, probe: int) -> tuple[tuple[Array, Integers], ...]:
+    """Starts and ends (k, d) of lengths, each with the indices (k,) of their probes."""
+    probes = places.length_probes
+    if probes is None:
+        probes = np.full((len(places.starts), 2), probe)
+    return (places.starts, probes[:, 0]), (places.ends, probes[:, 1])
+
+
+def length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> ErrorRows:
+    """Derivatives (k, b) of lengths."""
+    first, last = length_ends(places, probe)
+    apart = tips(fitted, *last) - tips(fitted, *first)
+    direction = apart / np.linalg.norm(apart, axis=1)[:, None]
 
     def along(start: Array, end: Array) -> Array:
         return np.asarray(np.einsum("md,mdb->mb", direction, end - start))
 
-    if first.drawn is None or last.drawn is None:
-        return ErrorRows(along(first.rows, last.rows), None)
-    return ErrorRows(along(first.rows, last.rows), along(first.drawn, last.drawn))
+    rows = along(corrected(fitted, *first)[1], corrected(fitted, *last)[1])
+    at_first, at_last = drawn_rows(fitted, *first), drawn_rows(fitted, *last)
+    if at_first is None or at_last is None:
+        return ErrorRows(rows, None)
+    return ErrorRows(rows, along(at_first, at_last))
 
 
 def _part(probes: Probed, some: slice) -> Probed:
@@ -145,6 +160,6 @@ def drawn_errors(
         found = rows_of_errors(fitted, points[some], _part(probes, some))
         errors[:, some] = np.tensordot(deviations, found.rows, axes=(1, 2))
     errors += fitted_errors(fitted, points, probes).errors
-    lengths = fitted_lengths(fitted, places.starts, places.ends, probe).errors
-    rows = length_rows(fitted, places.starts, places.ends, probe).rows
+    lengths = fitted_lengths(fitted, places, probe).errors
+    rows = length_rows(fitted, places, probe).rows
     return Realisations(draws, errors, lengths + deviations @ rows.T)

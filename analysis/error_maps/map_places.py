@@ -45,7 +45,7 @@ class PlacesAsked:
 class MapPlaces:
     """Points (m, d), with the number of them along the axes of a grid, and the `starts` and `ends`
     (k, d) of lengths with `names`: the body diagonals, or the line's; metres. Points of a table may
-    have `names_of_points`, and `probes` (m,) by index.
+    have `names_of_points`, and `probes` (m,) by index; lengths may have `length_probes` (k, 2).
     """
 
     kind: PlaceKind
@@ -56,6 +56,7 @@ class MapPlaces:
     names: tuple[str, ...]
     names_of_points: tuple[str, ...] = ()
     probes: Integers | None = None
+    length_probes: Integers | None = None
 
 
 def parse_places(text: str) -> Line:

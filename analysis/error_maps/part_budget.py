@@ -16,7 +16,7 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from .fitted_errors import ErrorRows, length_rows, rows_of_errors
+from .fitted_errors import ErrorRows, length_ends, length_rows, rows_of_errors
 from .map_places import MapPlaces
 from .volumetric_errors import Volumetric, length_errors
 
@@ -65,22 +65,40 @@ class _Split:
         return np.stack([*found, whole - np.sum(found, axis=0)])
 
 
+@dataclass(frozen=True, eq=False)
+class _End:
+    """An end of lengths: scale readings `points` (k, d), offsets of probes (k, d), and these as
+    they are stated.
+    """
+
+    points: Array
+    offsets: Array
+    stated: Array
+
+    @property
+    def tips(self) -> Array:
+        """Where the tips (k, d) are by the scales."""
+        return self.points + self.stated
+
+
 def _figures(
-    split: _Split, places: MapPlaces, of_points: Array, of_lengths: Array
+    split: _Split, places: MapPlaces, of_points: Array, ends: tuple[_End, _End], offset: int = -1
 ) -> Iterator[tuple[str, bool, Array, Array, float]]:
     """Figures without uncertainties: the errors at points, with offsets of probes (m, d) or (d,),
-    then those of lengths.
+    then those of lengths, to which the part of the index `offset` contributes estimated offsets.
     """
-    points, starts, ends = places.points, places.starts, places.ends
+    points, (first, last) = places.points, ends
     at_points = split.errors(points, of_points)
     whole = at_points.sum(axis=0)
     square = float((whole**2).sum()) / len(points)
     own = np.sqrt((at_points**2).sum(axis=(1, 2)) / len(points))
     products = (at_points * whole).sum(axis=(1, 2)) / len(points)
     yield places.kind, False, own, _ratio(products, square), float(np.sqrt(square))
-    moved = split.errors(ends, of_lengths) - split.errors(starts, of_lengths)
-    totals = length_errors(starts, ends, moved.sum(axis=0))
-    along = np.einsum("md,kmd->km", _directions(starts, ends), moved)
+    moved = split.errors(last.points, last.offsets) - split.errors(first.points, first.offsets)
+    if offset >= 0:
+        moved[offset] += last.offsets - last.stated - (first.offsets - first.stated)
+    totals = length_errors(first.tips, last.tips, moved.sum(axis=0))
+    along = np.einsum("md,kmd->km", _directions(first.tips, last.tips), moved)
     # What is of second order belongs to no part alone.
     along[-1] += totals - along.sum(axis=0)
     for k, name in enumerate(places.names):
@@ -115,20 +133,24 @@ def fitted_budget(
     fitted: FittedMap, places: MapPlaces, probes: Integers, probe: int
 ) -> tuple[PartBudget, ...]:
     """Budgets of the errors of a fitted machine at points, and of the lengths beside them."""
-    points, starts, ends = places.points, places.starts, places.ends
     functions = {one.function: one.meaning for one in reversed(fitted.parameters)}
     of = list(dict.fromkeys(one.function for one in fitted.parameters))
     masks = np.array([[one.function == name for one in fitted.parameters] for name in of])
     parts = [OFFSETS if name == "offset" else (name, functions[name]) for name in of]
     offsets = fitted.probes.offsets
     split = _Split(fitted.model, fitted.values, masks[:, : len(fitted.values)])
-    at_points = rows_of_errors(fitted, points, probes)
-    of_lengths = length_rows(fitted, starts, ends, probe)
-    rows = [_flat(at_points, len(points)), *(_one(of_lengths, k) for k in range(len(starts)))]
+    at_points = rows_of_errors(fitted, places.points, probes)
+    of_lengths = length_rows(fitted, places, probe)
+    count = len(places.points)
+    rows = [_flat(at_points, count), *(_one(of_lengths, k) for k in range(len(places.names)))]
+    first, last = (
+        _End(points, offsets[own], fitted.drawn_offsets[own])
+        for points, own in length_ends(places, probe)
+    )
+    estimated = of.index("offset") if "offset" in of else -1
+    figures = _figures(split, places, offsets[probes], (first, last), estimated)
     found = []
-    for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, places, offsets[probes], offsets[probe]), rows, strict=True
-    ):
+    for (name, is_length, errors, shares, total), own in zip(figures, rows, strict=True):
         is_open = np.array(
             [np.isnan(_masked(own, mask).uncertainties(fitted)).any() for mask in masks]
         )
@@ -176,6 +198,7 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
     masks = np.array([[one.function == name for one in truth.model.parameters] for name in every])
     split = _Split(truth.model, truth.a, masks.reshape(len(every), -1))
     offset = np.array(machine.probe)
+    both = _End(starts, offset, offset), _End(ends, offset, offset)
     drawn, lasting = built.random_roots(points)
     at_points = np.concatenate([drawn, lasting], axis=2)
     variances = [(at_points**2).sum(axis=(0, 1)) / len(points)]
@@ -187,7 +210,7 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
     variances += list(np.concatenate([along[0] ** 2 + along[1] ** 2, along[2] ** 2], axis=1))
     found = []
     for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, places, offset, offset), variances, strict=True
+        _figures(split, places, offset, both), variances, strict=True
     ):
         by_part = np.array([own[[one == part for one in random]].sum() for part in every] + [0.0])
         variance = float(by_part.sum())

@@ -5,7 +5,7 @@ the points of a file, with their expanded uncertainties.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,7 @@ from ..presentation.result import Result
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
 from .adjustments import few_degrees_of_freedom
+from .wanted_lengths import WantedLengths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +63,7 @@ def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedErrorMap(Result):
     """Errors of a fitted machine at points: `errors`, and those of `lengths`: the body diagonals
-    or, along a line, the line's.
+    or, along a line, the line's, and measuring tasks that were asked for.
 
     `places` say where, `probes` (m,) are the indices of the points' probes, and `probe` that of the
     lengths'. `realisations` are drawn where they
@@ -213,7 +214,9 @@ class FittedErrorMap(Result):
             return draw_line(found, path, k, f"U, k = {k:g}", "correction")
         ends, u = self.lengths, np.full(len(self.lengths.nominal), np.nan)
         if self.places.kind == "grid" and self.fitted.dimension == 3:
-            lengths = LengthErrors(ends.starts, ends.ends, ends.nominal, ends.errors, u)
+            lengths = LengthErrors(
+                *(one[:4] for one in (ends.starts, ends.ends, ends.nominal, ends.errors, u))
+            )
             x, y, z = self.places.counts
             return draw_grid(found, lengths, (x, y, z), magnification, path)
         known = ~np.isnan(given.resultant)
@@ -233,9 +236,10 @@ def fitted_map_errors(
     probe: str | None = None,
     draws: Draws | None = None,
     with_budget: bool = False,
+    tasks: WantedLengths | None = None,
 ) -> FittedErrorMap:
     """Errors of a fitted machine at the places asked for, with a probe by its name, by default that
-    of the map.
+    of the map; the lengths of `tasks` come after the diagonals, or that of a line.
 
     :raises ValueError: what does not go together, is not in the volume, or no probe of the map.
     """
@@ -245,6 +249,15 @@ def fitted_map_errors(
         raise ValueError(f'no probe "{chosen}"; {hint(chosen, names)}')
     index = names.index(chosen)
     places = map_places(fitted.volume, asked, names, chosen)
+    if tasks is not None:
+        own = np.full((len(places.names), 2), index)
+        places = replace(
+            places,
+            starts=np.concatenate([places.starts, tasks.points[:, 0]]),
+            ends=np.concatenate([places.ends, tasks.points[:, 1]]),
+            names=places.names + tasks.names,
+            length_probes=np.concatenate([own, tasks.probes]),
+        )
     probes = np.full(len(places.points), index) if places.probes is None else places.probes
     return FittedErrorMap(
         label,
@@ -253,7 +266,7 @@ def fitted_map_errors(
         probes,
         index,
         fitted_errors(fitted, places.points, probes),
-        fitted_lengths(fitted, places.starts, places.ends, index),
+        fitted_lengths(fitted, places, index),
         None if draws is None else drawn_errors(fitted, places, draws, probes, index),
         with_budget,
     )

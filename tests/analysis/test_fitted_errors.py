@@ -16,7 +16,9 @@ import yaml
 from ballplate.cli import main
 from ballplate.error_maps.error_functions import error_functions
 from ballplate.error_maps.fitted_errors import fitted_lengths
+from ballplate.error_maps.map_places import PlacesAsked, map_places
 from ballplate.results.fit import Fit
+from ballplate.results.wanted_lengths import tasks_of_experiment
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.maps.fitted_map import FittedMap
@@ -147,6 +149,7 @@ def test_undetermined_offsets_are_no_errors_of_the_machine() -> None:
     experiment = small(probes=told["probes"] | {"right": right})
     fitted = bp.fit(experiment, bp.simulate(experiment, seed=6)).to_map()
     found = bp.map(fitted, points=[[0.9, 0.8, 0.7]])
+    _check_tasks(fitted, experiment)
     n = len(fitted.values)
     p = fitted.probes.offsets[fitted.probes.names.index("right")]
     assert len(fitted.scale) == n + 3 and fitted.probe == "right"
@@ -159,6 +162,40 @@ def test_undetermined_offsets_are_no_errors_of_the_machine() -> None:
     u = np.sqrt(np.einsum("di,ij,dj->d", rows, fitted.covariance, rows))
     assert found.errors.uncertainties[0] == pytest.approx(u, rel=1e-6)
     assert u.max() < 1e-6
+
+
+def _check_tasks(fitted: FittedMap, experiment: Experiment) -> None:
+    """Errors of tasks are what `correct` makes of them, also where an estimated offset of a probe
+    is at one end only; its part is how it was found against how it was stated.
+    """
+    ends = {"from": ["0 mm", "0.2 m", "0.1 m"], "to": ["0.9 m", "0.6 m", "0.8 m"]}
+    tasks = [
+        {"name": "one probe", "probe": "right", **ends},
+        {"name": "two probes", "probes": ["right", "back"], **ends},
+    ]
+    tasked = experiment.with_({"evaluation.tasks": tasks})
+    found = bp.map(fitted, tasks=tasked, budget=True)
+    wanted = tasks_of_experiment(fitted, tasked)
+    pairs = [(2 * k, 2 * k + 1) for k in range(2)]
+    probes = [fitted.probes.names[k] for k in wanted.probes.ravel()]
+    given = bp.correct(fitted, wanted.points.reshape(-1, 3), probes, pairs).lengths
+    assert found.places.names[4:] == ("one probe", "two probes")
+    for k, one in enumerate(given, start=4):
+        assert found.lengths.errors[k] == pytest.approx(one.value - one.read, abs=1e-14)
+        assert found.lengths.uncertainties[k] == pytest.approx(one.standard_uncertainty, rel=1e-6)
+        assert found.budget[k + 1].errors.sum() == pytest.approx(found.lengths.errors[k], abs=1e-15)
+        assert found.budget[k + 1].uncertainty == pytest.approx(one.standard_uncertainty, rel=1e-6)
+    offset = [name for name, _ in found.budget[5].parts].index("offsets")
+    assert abs(found.budget[5].errors[offset]) < 1e-15
+    right = fitted.probes.names.index("right")
+    stated = fitted.drawn_offsets
+    tips = (
+        np.array([[0.0, 0.2, 0.1], [0.9, 0.6, 0.8]])
+        + stated[[right, fitted.probes.names.index("back")]]
+    )
+    way = (tips[1] - tips[0]) / np.linalg.norm(tips[1] - tips[0])
+    expected = -way @ (fitted.probes.offsets[right] - stated[right])
+    assert found.budget[6].errors[offset] == pytest.approx(expected, abs=1e-15) != 0.0
 
 
 def test_parts_add_up_to_the_whole(fitted: FittedMap) -> None:
@@ -456,8 +493,8 @@ def covered(fitted: FittedMap, experiment: Experiment, campaigns: int) -> list[R
                 for f, g in zip(one.curves, other.curves, strict=True)
             ]
         )
-        ends = fitted.volume.diagonals
-        found, true = (fitted_lengths(each, *ends, 0) for each in (own, of_truth))
+        places = map_places(fitted.volume, PlacesAsked())
+        found, true = (fitted_lengths(each, places, 0) for each in (own, of_truth))
         inside[1].append(np.abs(found.errors - true.errors) <= 2.0 * found.uncertainties)
         inside[2].append(
             [
