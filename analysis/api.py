@@ -464,24 +464,27 @@ def fit(
     )
 
 
-def budget(
-    experiment: Experiment | PathLike, fit: Fit | None = None, by: Grouping = "calibration"
-) -> UncertaintyBudget:
-    """What each source contributes to U4, U6, the body diagonals and the measuring tasks of a
-    design or, with its `fit`, of that.
+def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:
+    """What each source contributes to U4, U6, the body diagonals and the measuring tasks of the
+    design of an experiment, or of a fit.
 
     `by` splits the readings by axis, probe, position or artefact; as they are by default, they are
     one source. Contributions add in squares.
 
     >>> budget(quickstart())
     <UncertaintyBudget of quickstart: readings 75 % of the variance of U6>
+    >>> budget(fit(quickstart(), simulate(quickstart())), by="probe").sources[0]
+    'readings with down'
     """
     from .results.budget import budget as budget_of
     from .results.fit import Fit
 
-    ensure_type(Fit, "the result of fit() by the full estimator", fit=fit)
     ensure_one_of(GROUPINGS, by=by)
-    return budget_of(_experiment(experiment), fit, by)
+    if isinstance(given, Fit):
+        if given.experiment is None:
+            raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
+        return budget_of(given.experiment, given, by)
+    return budget_of(_experiment(given), None, by)
 
 
 def compare(

@@ -181,7 +181,7 @@ def budget(
 
     `by` tells how readings are grouped: all as one source by default.
 
-    :raises ValueError: the fit has not converged, or there is nothing to evaluate.
+    :raises ValueError: the fit has not converged.
     """
     at, x = (
         (linearise(lay_out(experiment)), None)

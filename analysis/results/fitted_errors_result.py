@@ -41,6 +41,7 @@ from ..presentation.result import Result
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
 from .adjustments import few_degrees_of_freedom
+from .correction import left_out_words
 from .wanted_lengths import WantedLengths
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
     if fitted.sigma_is_estimated:
         remedy = "with few, take a larger coverage factor"
         found.append(few_degrees_of_freedom(fitted.degrees_of_freedom, "sigma", remedy))
+    if fitted.left_out:
+        found.append(left_out_words(fitted))
     count = fitted.undetermined.shape[1]
     if count:
         words = f"{count} direction{'s' * (count > 1)} of the parameters"

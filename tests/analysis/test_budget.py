@@ -147,7 +147,7 @@ def test_contributions_are_those_of_fits_with_other_values() -> None:
     )
     readings = bp.simulate(experiment, seed=4)
     fit = bp.fit(experiment, readings)
-    found = shares(bp.budget(experiment, fit), "U6", 1)
+    found = shares(bp.budget(fit), "U6", 1)
     stated = certified_values(experiment)
     values = np.array([one.value for one in stated])
     squares: dict[str, float] = {}
@@ -195,7 +195,7 @@ def test_influence_quantities_are_sources() -> None:
         for value in (11.5, 12.1, 10.9)
     ]
     task = [fit.functions.choose(["task"]).values[0] for fit in fits]
-    found = shares(bp.budget(experiment, fits[0]), "U6", 1)
+    found = shares(bp.budget(fits[0]), "U6", 1)
     assert found["influences[0]: temperature"] == pytest.approx(
         0.5 * abs(task[1] - task[2]), rel=1e-4
     )
@@ -234,8 +234,8 @@ def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> N
     experiment = small(sigma="estimated")
     readings = bp.simulate(experiment, seed=4)
     fit = bp.fit(experiment, readings)
-    found = bp.budget(experiment, fit, by="axis")
-    given = bp.budget(experiment, bp.fit(experiment, readings, sigma="given"), by="axis")
+    found = bp.budget(fit, by="axis")
+    given = bp.budget(bp.fit(experiment, readings, sigma="given"), by="axis")
     assert found.sigma == fit.sigma != 1.0 and found.notes == ()
     for one, other in zip(found.figures, given.figures, strict=True):
         assert one.contributions == pytest.approx(fit.sigma * np.array(other.contributions))

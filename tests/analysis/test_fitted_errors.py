@@ -462,6 +462,15 @@ def test_what_does_not_go_together_is_refused(
     assert told in capsys.readouterr().err
 
 
+def test_influences_of_the_campaign_are_told() -> None:
+    drift = {"kind": "drift", "axes": {"value": "0 um/h", "standard_uncertainty": "1 um/h"}}
+    experiment = small(influences=[drift])
+    fitted = bp.fit(experiment, bp.simulate(experiment)).to_map()
+    for found in (bp.map(fitted, (2, 2, 2)), bp.curves(fitted, "EXX")):
+        assert any("influence quantities" in note for note in found.notes)
+        assert any("influence quantities" in one for one in found.to_dict()["warnings"])
+
+
 def test_a_machine_file_has_no_map_and_no_probe(capsys: pytest.CaptureFixture[str]) -> None:
     machine = str(TOP / "designs/park/machines/npl-like.yaml")
     assert main(["map", machine, "--probe", "down"]) == 2
