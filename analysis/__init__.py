@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from .api import (
+        adjust,
         budget,
         certificate,
         check,
@@ -52,6 +53,7 @@ __all__ = [
     "GROUPINGS",
     "OtherSweepError",
     "StoreError",
+    "adjust",
     "budget",
     "certificate",
     "check",
