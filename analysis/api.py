@@ -13,6 +13,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
@@ -322,10 +323,11 @@ def read_report(
     """
     from .results.imported import ReadReport
     from .simulator.experiment.layout import lay_out
+    from .simulator.experiment.name_rules import check_rule
     from .simulator.inputs.quantities import LENGTH_UNITS
-    from .simulator.readings.feature_names import check_rule
     from .simulator.readings.formats.registered import FORMATS
-    from .simulator.readings.imported import ImportSettings, import_readings
+    from .simulator.readings.imported import ImportSettings
+    from .simulator.readings.planned_and_imported import import_readings
 
     paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
     for path in paths:
@@ -357,6 +359,8 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    names: str | None = None,
+    swap_names: bool | None = None,
 ) -> Fit: ...
 
 
@@ -378,6 +382,8 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    names: str | None = None,
+    swap_names: bool | None = None,
 ) -> FitResult: ...
 
 
@@ -398,12 +404,16 @@ def fit(
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
+    names: str | None = None,
+    swap_names: bool | None = None,
 ) -> FitResult:
-    """The estimate from readings: a table or several, or those that the experiment's file names.
+    """The estimate from readings: a table or several, or those that the experiment's file names;
+    also reports of measuring programs, as `read_report` reads them.
 
     `columns`, `unit` and `coordinates` say how tables are written, in place of the experiment's
     section `readings`: columns by role, the unit of those that state none, and whether co-ordinates
-    are scale readings, ball centres or those of a part.
+    are scale readings, ball centres or those of a part. `names` is the rule of names in reports;
+    with `swap_names` those of two balls are swapped where readings show that they are.
     `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
@@ -444,12 +454,14 @@ def fit(
     reason = misused(components, reweight, sigma)
     if reason:
         raise ValueError(reason)
-    said = {"columns": columns, "unit": unit, "coordinates": coordinates}
+    said: dict[str, object] = {"columns": columns, "unit": unit, "coordinates": coordinates}
+    said |= {"names": names, "swap_names": swap_names}
     chosen = _experiment(experiment).with_readings(said)
-    tables = _tables(readings, chosen)
+    tables, stated = _tables(readings, chosen), len(chosen.doubts)
     if certificate is not None:
         chosen = read_certificate(_table("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
+    observed = replace(observed, of_certificate=chosen.doubts[stated:])
     return fit_readings(
         chosen,
         observed,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from .outputs import add_force, add_output, text_writer, write
+from .table_options import rule
 from .telling import complain, note
 
 HELP = "make a table of readings of reports of CMM programs"
@@ -48,7 +49,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--name",
         metavar="RULE",
-        type=_rule,
+        type=rule,
         help=(
             'how features are named, such as "{position}_{ball}_{probe}"; points on a ball are'
             " numbered by {point} at the end; default: found out, and told"
@@ -75,15 +76,6 @@ def add_options(parser: ArgumentParser) -> None:
         ),
     )
     add_force(parser)
-
-
-def _rule(text: str) -> str:
-    from ballplate.simulator.readings.feature_names import check_rule
-
-    try:
-        return check_rule(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
 
 
 def run(options: Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ def add_readings(parser: ArgumentParser) -> None:
         nargs="+",
         type=Path,
         default=[],
-        help="readings: one table or several; default: readings.files of the experiment file",
+        help="tables of readings or reports; default: readings.files of the experiment file",
     )
     # With nargs="*" none would be looked for behind the first option.
     readings.required = False
@@ -59,12 +60,13 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
-    experiment = single(options)
+    experiment = with_options(options, single(options))
+    stated = len(experiment.doubts)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
-    experiment = with_options(options, experiment)
     sources = options.readings or named_sources(experiment)
     observed = read_readings(sources, lay_out(experiment), settings=experiment.readings)
+    observed = replace(observed, of_certificate=experiment.doubts[stated:])
     for remark in observed.told:
         note(options, remark)
     for remark in observed.remarks[len(observed.told) :]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
-KEYS = ("columns", "unit", "decimal", "coordinates")
+KEYS = ("columns", "unit", "decimal", "coordinates", "names", "swap_names")
 
 
 def add_tables(parser: ArgumentParser) -> None:
@@ -37,6 +37,35 @@ def add_tables(parser: ArgumentParser) -> None:
             " program has applied the offsets of probes; or ball centres in co-ordinates of a part"
         ),
     )
+    parser.add_argument(
+        "--name",
+        dest="names",
+        metavar="RULE",
+        type=rule,
+        help=(
+            'how reports name features, such as "{position}_{ball}_{probe}"; points on a ball are'
+            " numbered by {point} at the end; default: found out, and told"
+        ),
+    )
+    parser.add_argument(
+        "--swap-names",
+        action="store_const",
+        const=True,
+        help=(
+            "swap the names of two balls of a position where readings show that they are swapped,"
+            " and tell; default: refuse them"
+        ),
+    )
+
+
+def rule(text: str) -> str:
+    """Read a rule of names from the command line."""
+    from ballplate.simulator.experiment.name_rules import check_rule
+
+    try:
+        return check_rule(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def columns(text: str) -> dict[str, str]:

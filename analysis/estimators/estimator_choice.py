@@ -82,7 +82,8 @@ def fit_readings(
     :raises ExperimentError: it cannot estimate this experiment.
     """
     if experiment.influences and estimator != "full":
-        text = f"{estimator} does not know influence quantities; use the full estimator"
+        text = f"{estimator} does not know influence quantities; use the full estimator, or"
+        text += " remove them"
         raise refused(experiment.source, text, "influences")
     if estimator == "reversal":
         from .reversal_fits import fit_reversal

@@ -12,11 +12,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.messages import in_one_line, refused
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.heading_words import is_clock
 from ballplate.simulator.readings.reading_files import AXES
 
 from .schedule import RunSheet, Step
@@ -90,15 +92,23 @@ def feature_name(position: str, ball: str, probe: str) -> str:
     return "_".join(UNUSUAL.sub("-", part) for part in (position, ball, probe))
 
 
-def template_csv(readings: Sequence[PlannedReading], dimension: int) -> str:
-    """The table of readings with empty cells for the co-ordinates, as `fit` reads it when they are
-    filled in.
+def template_csv(readings: Sequence[PlannedReading], experiment: Experiment) -> str:
+    """The table of readings with empty cells for the co-ordinates, and for what influence
+    quantities ask of each, as `fit` reads it when they are filled in.
     """
     out = io.StringIO()
     writer = CsvWriter(out)
-    writer.writerow(["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[:dimension])])
+    blank = [f"{axis}_mm" for axis in AXES[: experiment.dimension]]
+    for kind in lay_out(experiment).influences if experiment.influences else ():
+        # Times are those of a clock.
+        named = (
+            name if is_clock("", units) else f"{name}_{next(iter(units))}"
+            for name, units in kind.columns.items()
+        )
+        blank += [name for name in named if name not in blank]
+    writer.writerow(["position", "ball", "probe", *blank])
     for one in readings:
-        writer.writerow([one.position, one.ball, one.probe, *[""] * dimension])
+        writer.writerow([one.position, one.ball, one.probe, *[""] * len(blank)])
     return out.getvalue()
 
 

@@ -112,7 +112,7 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     ]
     if messages:
         raise ExperimentError(messages)
-    design = lay_out(replace(experiment, positions=tuple(positions)))
+    design = lay_out(replace(experiment, positions=tuple(positions)), is_pool=True)
     refuse_influences(experiment, design)
     return PoolDesign(design, shared_layout(design), nominal_state(design))
 

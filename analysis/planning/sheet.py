@@ -71,9 +71,7 @@ class Sheet(Result):
         """The CSV file of the readings in order with empty cells, for `fit` when it is filled
         in.
         """
-        return template_csv(
-            planned_readings(self.sheet, self.experiment), self.experiment.dimension
-        )
+        return template_csv(planned_readings(self.sheet, self.experiment), self.experiment)
 
     def points(self, diameter: float | None = None) -> str:
         """The centres of the balls in order as a CSV file, with a `diameter` of the balls (m) as

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
@@ -23,6 +24,9 @@ YAML = (".yaml", ".yml")
 
 # Keys of experiment and machine files whose text is a path, as their schemas say.
 PATH_KEYS = ("file", "files", "values", "covariance")
+
+# Where an experiment names tables of readings.
+_READINGS = re.compile(r"(?:^|\.)readings\.files$")
 
 MEND = "move it there, or allow its folder with --folder"
 
@@ -45,7 +49,10 @@ def named_files(sweep: Sweep) -> list[Path]:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
     found: dict[Path, Scalar] = {}
     for start, node in nodes:
-        for scalar in path_scalars(node, start):
+        for key, scalar in _keyed_paths(node, start):
+            # Cells fit no readings.
+            if _READINGS.search(key):
+                continue
             for path in _there(base.parent, str(scalar.value)):
                 # A machine file names tables beside it.
                 for one in (path, *_of_machine_file(path)):
@@ -93,14 +100,19 @@ def _last(path: str) -> str:
 
 def path_scalars(node: Node, key: str) -> Iterator[Scalar]:
     """Texts below a node that are paths by the last key above them."""
+    return (scalar for _, scalar in _keyed_paths(node, key))
+
+
+def _keyed_paths(node: Node, key: str) -> Iterator[tuple[str, Scalar]]:
+    """The same with all keys above them, joined by points."""
     if isinstance(node, Mapping):
         for inner, item in node.items.items():
-            yield from path_scalars(item, inner)
+            yield from _keyed_paths(item, f"{key}.{inner}")
     elif isinstance(node, Entries):
         for item in node.items:
-            yield from path_scalars(item, key)
+            yield from _keyed_paths(item, key)
     elif isinstance(node, Scalar) and isinstance(node.value, str) and _last(key) in PATH_KEYS:
-        yield node
+        yield key, node
 
 
 def is_rooted(text: str) -> bool:

@@ -4,6 +4,7 @@ units.
 
 from __future__ import annotations
 
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -13,6 +14,8 @@ from typing import Any, ClassVar, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..computing.unusable import UnusableError
+from ..inputs.own_code import own_frame, told
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
 from .noise import Noise
@@ -251,7 +254,15 @@ def influence_shifts(
     at = disturbed_readings(state, readings, x)
     shift, parts = np.zeros(x.shape), [np.zeros((*x.shape, 0))]
     for one in design.influences:
-        stated, derivative = one.shifts(at)
+        try:
+            stated, derivative = one.shifts(at)
+        except MemoryError:
+            raise
+        except Exception as error:
+            frames = traceback.extract_tb(error.__traceback__)
+            own = own_frame(error) or next((f for f in frames[::-1] if f.name == "shifts"), None)
+            text = f"shifts of {type(one).__name__} has failed: {told(error, own)}"
+            raise UnusableError(text) from error
         shift += stated
         varies = np.array([parameter.uncertainty != 0.0 for parameter in one.parameters], bool)
         parts.append(derivative[:, :, varies])

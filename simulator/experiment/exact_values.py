@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from ..design.observations.calibration import Calibration
 from ..design.observations.coordinates import CoordinateCalibration
 from ..design.observations.distances import DistanceCalibration
 from ..design.observations.stated_values import value_name
+from ..geometry.ball_layouts import BallLayout
 from ..inputs.settings import listing
 from ..machines.protocol import Array, Integers
 
@@ -77,12 +78,27 @@ class _Exact:
 
 def check_exact_values(calibrations: Mapping[int, Calibration], references: References) -> None:
     """Report exact distances and co-ordinates of a plate that no arrangement of balls has."""
-    for artefact, settings in references.artefacts.items():
-        if settings.role == "length_standard":
-            continue
+    plates = [
+        name
+        for name, settings in references.artefacts.items()
+        if settings.role != "length_standard"
+    ]
+    for item, text in exact_contradictions(calibrations, plates, references.layouts):
+        references.problems.add(("calibration", item), text)
+
+
+def exact_contradictions(
+    calibrations: Mapping[int, Calibration],
+    plates: Iterable[str],
+    layouts: Mapping[str, BallLayout],
+) -> Iterator[tuple[int, str]]:
+    """Exact distances and co-ordinates of plates that no arrangement of balls has: of which item
+    the first is, and in words.
+    """
+    for artefact in plates:
         mine = {i: one for i, one in calibrations.items() if one.artefact == artefact}
-        layout = references.layouts[artefact]
-        exact = _exact_values(mine, references)
+        layout = layouts[artefact]
+        exact = _exact_values(mine, layout)
         if not exact.name:
             continue
         if len(exact.name) * len(exact.balls) * layout.coordinates.shape[1] > MOST_ENTRIES:
@@ -94,17 +110,16 @@ def check_exact_values(calibrations: Mapping[int, Calibration], references: Refe
         most = float(np.abs(misfit).max())
         order = np.argsort(-comparable(_doubtfulness(exact, *found), DIGITS), kind="stable")
         told = [k for k in order.tolist() if abs(misfit[k]) > SHARE * most]
-        items = sorted({exact.item[k] for k in told})
         names = listing(f"{exact.name[k]} in calibration[{exact.item[k]}]" for k in told)
-        text = (
+        yield (
+            min(exact.item[k] for k in told),
             f"values that are stated as exact contradict one another: {names}; no balls have them"
             f" all, at best one is off by {1e6 * most:.3g} µm: correct the one that is wrong, or"
-            " state uncertainties above 0 um"
+            " state uncertainties above 0 um",
         )
-        references.problems.add(("calibration", items[0]), text)
 
 
-def _exact_values(calibrations: Mapping[int, Calibration], references: References) -> _Exact:
+def _exact_values(calibrations: Mapping[int, Calibration], layout: BallLayout) -> _Exact:
     parts, items, names = [], [], []
     for i, one in calibrations.items():
         if not isinstance(one, DistanceCalibration | CoordinateCalibration):
@@ -113,7 +128,7 @@ def _exact_values(calibrations: Mapping[int, Calibration], references: Reference
         chosen = np.flatnonzero(given.is_exact)
         if not len(chosen):
             continue
-        called = one.names(references.layouts[one.artefact])
+        called = one.names(layout)
         parts.append((given, chosen))
         items += [i] * len(chosen)
         names += [

@@ -50,8 +50,10 @@ def resolve_influences(
     return tuple(found)
 
 
-def with_influences(design: Design, experiment: Experiment) -> Design:
+def with_influences(design: Design, experiment: Experiment, is_pool: bool = False) -> Design:
     """The design with the influence quantities of its experiment, and what is known of them.
+
+    Of a pool only parameters that positions share count against the limit.
 
     :raises ExperimentError: they have more parameters than there is memory for, or one twice; a
         class does not keep to what `Influence` says.
@@ -91,14 +93,7 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
     if twice:
         text = f"{twice[0]} is stated by two of them; remove it from one"
         raise ExperimentError([experiment.message(("influences",), text)])
-    shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
-    if shared > MOST_SHARED:
-        text = (
-            f"their {len(parameters)} parameters make {shared} besides the balls; at most"
-            f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
-            " of single positions as exact"
-        )
-        raise ExperimentError([experiment.message(("influences",), text)])
+    _refuse_too_many(disturbed, experiment, is_pool)
     known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
     stated = [parameters[k] for k in known]
     return disturbed.observed(_with_stated(design.of(Priors), known, stated))
@@ -120,6 +115,25 @@ def _with_stated(priors: Priors, known: Integers, stated: list[InfluenceParamete
         None if offsets is None else np.pad(offsets, ((0, len(known)), (0, 0), (0, 0))),
         priors.units,
     )
+
+
+def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -> None:
+    """Refuse more parameters than there is memory for.
+
+    :raises ExperimentError: there are.
+    """
+    parameters = disturbed.influence_parameters
+    shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
+    if is_pool:
+        poses = ~disturbed.positions.held[disturbed.posed_positions]
+        shared -= int(poses.sum()) + sum(one.position >= 0 for one in parameters)
+    if shared > MOST_SHARED:
+        text = (
+            f"their {len(parameters)} parameters make {shared} besides the balls; at most"
+            f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
+            " of single positions as exact"
+        )
+        raise ExperimentError([experiment.message(("influences",), text)])
 
 
 def _of_class(experiment: Experiment, i: int, text: str) -> ExperimentError:

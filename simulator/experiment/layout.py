@@ -48,8 +48,8 @@ FLAT = 1e-9
 
 
 # In one piece: every array of a design is laid out beside those whose order it shares.
-def lay_out(experiment: Experiment) -> Design:
-    """Design of an experiment.
+def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
+    """Design of an experiment, or of a pool of positions that are never solved for together.
 
     >>> from pathlib import Path
     >>> from ballplate.simulator.experiment.load import load
@@ -134,7 +134,7 @@ def lay_out(experiment: Experiment) -> Design:
         ),
         noise=experiment.noise,
     )
-    return with_influences(design, experiment)
+    return with_influences(design, experiment, is_pool)
 
 
 def _free(experiment: Experiment) -> Flags:

@@ -6,10 +6,11 @@ import codecs
 
 from ..design.lookup import References
 from ..inputs.messages import ExperimentError, Steps
-from ..inputs.quantities import LENGTH_UNITS, plain_unit
+from ..inputs.quantities import LENGTH_UNITS, QuantityError, parse_positive_length, plain_unit
 from ..inputs.settings import hint
 from .machine_file import load_machine
-from .readings_section import CompensationSettings, ReadingsSettings
+from .name_rules import check_rule
+from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings
 from .structure import Sections
 
 AXES = ("x", "y", "z")
@@ -26,6 +27,11 @@ def check_readings(sections: Sections, references: References) -> None:
     if settings.encoding is not None and not is_text_encoding(settings.encoding):
         text = f'unknown encoding "{settings.encoding}"; write for example utf-8 or cp1252'
         problems.add(("readings", "encoding"), text)
+    if settings.names is not None:
+        try:
+            check_rule(settings.names)
+        except ValueError as error:
+            problems.add(("readings", "names"), str(error))
     if settings.columns is not None:
         if settings.columns.z is not None and references.dimension == 2:
             problems.add(("readings", "columns", "z"), "there are two dimensions; leave z out")
@@ -33,6 +39,7 @@ def check_readings(sections: Sections, references: References) -> None:
             columns = getattr(settings.columns, axis)
             if isinstance(columns, dict):
                 _check_probes(list(columns), ("readings", "columns", axis), references)
+        _check_constants(settings.columns, references)
     offsets = settings.offsets_in_controller or {}
     _check_probes(list(offsets), ("readings", "offsets_in_controller"), references)
     for name, offset in offsets.items():
@@ -41,6 +48,20 @@ def check_readings(sections: Sections, references: References) -> None:
         text = "goes with coordinates: ball centres, or part; add it, or leave this out"
         problems.add(("readings", "offsets_in_controller"), text)
     _read_correction(settings, references)
+
+
+def _check_constants(columns: ColumnsSettings, references: References) -> None:
+    """Report what cannot be the same in all rows, and a wrong uncertainty that is."""
+    for role in ("ball", "diameter"):
+        if (getattr(columns, role) or "").startswith("="):
+            text = f"a {role} is that of a reading, and not of all rows; name its column"
+            references.problems.add(("readings", "columns", role), text)
+    if (columns.u or "").startswith("="):
+        try:
+            parse_positive_length((columns.u or "")[1:].strip())
+        except QuantityError as error:
+            text = f'{error}; of all rows write for example "=0.2 um"'
+            references.problems.add(("readings", "columns", "u"), text)
 
 
 def is_text_encoding(name: str) -> bool:

@@ -50,7 +50,9 @@ class ColumnsSettings(Settings):
     x: Columns | None = Field(None, description=_COORDINATE)
     y: Columns | None = Field(None, description=_COORDINATE)
     z: Columns | None = Field(None, description=_COORDINATE)
-    u: Name | None = Field(None, description="standard uncertainties of each co-ordinate")
+    u: Name | None = Field(
+        None, description="standard uncertainties of each co-ordinate; or =0.2 um, of all rows"
+    )
     diameter: Name | None = Field(None, description="diameters of the balls as measured")
 
 
@@ -58,7 +60,15 @@ class ReadingsSettings(Settings):
     """The laboratory's readings: where they are and how they are written."""
 
     files: Forms[Text, NonEmpty[Text], Text] | None = Field(
-        None, description="table of readings, or list of tables, for fit without READINGS"
+        None,
+        description="table or report of readings, or list of these, for fit without READINGS",
+    )
+    names: Text | None = Field(
+        None,
+        description=(
+            "how reports of measuring programs name features, such as"
+            " {position}_{ball}_{probe}; default: found in the report"
+        ),
     )
     columns: ColumnsSettings | None = Field(
         None, description="which columns of the table are meant, where their names do not tell"
@@ -77,6 +87,13 @@ class ReadingsSettings(Settings):
     )
     header: Annotated[int, Field(ge=0, strict=True)] | None = Field(
         None, description="number of the line with the names of columns, 0 without one"
+    )
+    swap_names: bool | None = Field(
+        None,
+        description=(
+            "true: where readings show that the names of two balls of a position are swapped, swap"
+            " them, and tell; default: refuse them"
+        ),
     )
     coordinates: Coordinate | None = Field(
         None,

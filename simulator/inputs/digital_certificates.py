@@ -141,10 +141,17 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
     lengths: list[DigitalValue] = []
     matrices: list[tuple[tuple[int, ...], NamedMatrix]] = []
     data = element.first("data")
-    for block, contexts, problem in _blocks(data, ()) if data is not None else ():
-        found = list(_values(block, contexts))
-        if problem:
-            found = [replace(one, problem=problem) for one in found]
+    for part in _parts(data, ()) if data is not None else ():
+        block = part.block
+        found = list(_values(block, part.contexts, part.labels))
+        if part.is_relative:
+            # What is stated in the unit of the values as well says the same, and of which kind.
+            found = [
+                replace(one, problem=RELATIVE)
+                if math.isnan(one.uncertainty) and not one.problem
+                else one
+                for one in found
+            ]
         start = len(lengths)
         lengths += found
         matrix = _matrix(block, len(found)) if _is_length(block) else None
@@ -161,26 +168,43 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
     )
 
 
-def _blocks(
-    element: Element, contexts: tuple[str, ...]
-) -> Iterator[tuple[Element, tuple[str, ...], str]]:
-    """Values and lists of values below an element, with what those above them are called, and what
-    is wrong with their quantity.
+@dataclass(frozen=True)
+class _Part:
+    """A value or a list of values, with what those above it are called; whether its quantity has a
+    relative uncertainty; and lists of texts that stand beside it, which may be labels.
     """
+
+    block: Element
+    contexts: tuple[str, ...]
+    labels: tuple[tuple[str, ...], ...] = ()
+    is_relative: bool = False
+
+
+def _parts(
+    element: Element, contexts: tuple[str, ...], labels: tuple[tuple[str, ...], ...] = ()
+) -> Iterator[_Part]:
+    """Values and lists of values below an element."""
     for one in element.children:
         if one.name in REALS:
-            yield one, contexts, ""
+            yield _Part(one, contexts, labels)
         elif one.name in ("quantity", "list", "hybrid"):
-            inner = list(_blocks(one, (*contexts, *_names(one))))
+            beside = labels
+            if one.name == "list":
+                texts = [each.text.split() for each in one.all("quantity", "charsXMLList")]
+                beside = (*labels, *map(tuple, texts))
+            inner = list(_parts(one, (*contexts, *_names(one)), beside))
             if one.first("relativeUncertainty") is not None:
-                inner = [(block, above, RELATIVE) for block, above, _ in inner]
+                inner = [replace(part, is_relative=True) for part in inner]
             # All parts of a hybrid are one quantity in several units.
-            in_metres = [each for each in inner if _is_length(each[0])]
+            in_metres = [each for each in inner if _is_length(each.block)]
             yield from (in_metres or inner)[:1] if one.name == "hybrid" else inner
 
 
 NO_LENGTH = "is no length"
-RELATIVE = "has a relative uncertainty, which is not read; state it in a CSV file"
+RELATIVE = (
+    "has a relative uncertainty alone, of which certificates do not say whether it is expanded;"
+    " state standard uncertainties in a CSV file"
+)
 
 
 def _units(block: Element) -> list[str]:
@@ -199,8 +223,10 @@ def _is_length(block: Element) -> bool:
         return False
 
 
-def _values(block: Element, contexts: tuple[str, ...]) -> Iterator[DigitalValue]:
-    """The values of a real, or of a list."""
+def _values(
+    block: Element, contexts: tuple[str, ...], beside: tuple[tuple[str, ...], ...] = ()
+) -> Iterator[DigitalValue]:
+    """The values of a real, or of a list, which has labels of its own or `beside` it."""
     if block.name == "real":
         stated = _uncertainty(block)
         yield _value(
@@ -219,7 +245,10 @@ def _values(block: Element, contexts: tuple[str, ...]) -> Iterator[DigitalValue]
     units = _units(block)
     stated = _uncertainty(block)
     for k, value in enumerate(values[: MOST_NAMES + 1]):
-        own = (labels[k],) if len(labels) == len(values) else ()
+        own: tuple[str, ...] = (labels[k],) if len(labels) == len(values) else ()
+        if not labels:
+            texts = [each[k] for each in beside if len(each) == len(values)]
+            own = tuple(dict.fromkeys((" ".join(texts), *texts))) if texts else ()
         own_unit = _one_of(units, k, len(values))
         if own_unit is None:
             yield DigitalValue(

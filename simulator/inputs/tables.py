@@ -256,15 +256,22 @@ def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, 
         yield Mark(mark.file, mark.line, column), cell, name, plain_unit(unit)
 
 
+def header_texts(path: Path | GivenText) -> set[str]:
+    """What the cells of the first line of a comma-separated file say; nothing where there are none.
+
+    :raises ExperimentError: the file cannot be read.
+    """
+    line = next((line for line in _lines(path)), (0, ""))[1]
+    return {cell for _, cell in split_cells(line) or []}
+
+
 def header_names(path: Path | GivenText) -> set[str]:
     """Names of the columns of a comma-separated file, without their units; none where there are
     none.
 
     :raises ExperimentError: the file cannot be read.
     """
-    line = next((line for line in _lines(path)), (0, ""))[1]
-    cells = split_cells(line) or []
-    return {cell.rpartition("_")[0] or cell for _, cell in cells}
+    return {cell.rpartition("_")[0] or cell for cell in header_texts(path)}
 
 
 def read_number(

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import importlib
 import sys
-import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from ..inputs.own_code import own_frame, told
 from ..inputs.quantities import with_quantities
-from ..inputs.settings import hint, listing, shorten
+from ..inputs.settings import hint, listing
 from .protocol import Array, ErrorModel, Parameter
 
 GROUP = "ballplate.error_models"
@@ -148,16 +148,9 @@ def attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resul
         with np.errstate(all="ignore"):
             return call()
     except (Exception, SystemExit) as error:
-        # The innermost place in the user's code; without one, the call itself was wrong.
-        frames = [
-            frame
-            for frame in traceback.extract_tb(error.__traceback__)[1:]
-            if not frame.filename.startswith("<")
-        ]
-        inner = [frame for frame in frames if Path(frame.filename) != Path(__file__)]
-        at = f" ({Path(inner[-1].filename).name}, line {inner[-1].lineno})" if inner else ""
-        told = shorten(f"{type(error).__name__}: {error}", 200)
-        raise CustomModelError(f"{what}: {told}{at}", key) from error
+        # Without a place in the user's code, the call itself was wrong.
+        text = told(error, own_frame(error))
+        raise CustomModelError(f"{what}: {text}", key) from error
 
 
 # In one piece: each check of a model relies on those before it.

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..experiment.readings_section import ReadingsSettings
+from ..experiment.readings_section import Coordinate, ReadingsSettings
 from ..inputs.decoding import LINE_END, decoded, refuse_controls
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import (
     LENGTH_UNITS,
     QuantityError,
     metres_or_radians,
+    parse_positive_length,
     plain_number,
     plain_unit,
     power_of_ten,
@@ -26,7 +27,10 @@ from ..inputs.spreadsheets import text_of_cell
 from ..inputs.tables import MOST_ROWS, FileRow
 from ..inputs.yamltree import GivenText, Mark, read_bytes
 from ..machines.protocol import Array
-from .headings import TEXTS, Group, HeadedColumn, Vocabulary, folded, missing_columns, unit_of
+from .above_headings import said_above
+from .clock_times import ClockError, ReadTime, clock_time
+from .heading_words import folded, unit_of
+from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary, missing_columns
 from .table_forms import (
     DECIMALS,
     NOTHING,
@@ -39,14 +43,6 @@ from .table_forms import (
     forms_of,
 )
 
-# Lines above the headings that say what all rows have.
-ABOVE = {
-    "position": r"position|pos|placement|set-?up|lage|aufstellung|stellung|messlage|aufspannung",
-    "probe": r"probe|stylus|tip|taster|taststift",
-    "unit": r"units?|einheit(?:en)?|all values in|alle (?:werte|angaben) in|lengths? in",
-}
-# Characters of such a line.
-LONGEST_LINE = 300
 TEMPERATURES = (
     "temperature_artefact_degC and temperature_scales_degC are used where the experiment has"
     " influences of kind: temperature for them"
@@ -60,13 +56,16 @@ class TableRows:
 
     `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
     `hints` are what to say where names are not known: that a position is the name of the file
-    though columns are not used.
+    though columns are not used. `coordinates` is what those of a report of a measuring program
+    are; None of a table, which does not say. `times` are those of rows that have clock times.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...] = ()
     diameters: tuple[float, ...] = ()
     hints: tuple[Message, ...] = ()
+    coordinates: Coordinate | None = None
+    times: tuple[ReadTime, ...] = ()
 
 
 def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[GivenText, str]:
@@ -139,7 +138,10 @@ class _Reader:
     def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
         form = self.form
         self._refuse_wrong()
-        above = self._above()
+        try:
+            above = said_above(self.form.above)
+        except HeadingError as error:
+            raise self.error(str(error)) from None
         texts, told = self._texts(above)
         units = self._units(above)
         found = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
@@ -148,7 +150,8 @@ class _Reader:
         rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
         self._refuse_doubtful(rows, is_possible)
         hints = self._of_positions(texts.get("position", ""))
-        return TableRows(tuple(rows), (self._told(units, told),), diameters, hints)
+        said = (self._told(units, told),)
+        return TableRows(tuple(rows), said, diameters, hints, times=self._times())
 
     def _refuse_wrong(self) -> None:
         form, headings = self.form, self.form.headings
@@ -166,26 +169,6 @@ class _Reader:
             messages.insert(0, Message(str(self.source), max(form.header, 1), 1, "", text))
         if messages:
             raise ExperimentError(messages)
-
-    def _above(self) -> dict[str, str]:
-        """What lines above the headings say of all rows: position, probe and unit.
-
-        :raises ExperimentError: they say two things.
-        """
-        found: dict[str, str] = {}
-        for text in (text[:LONGEST_LINE] for text in self.form.above):
-            for role, pattern in ABOVE.items():
-                match = re.match(
-                    rf'[\s#"]*(?:{pattern})["\s]*[:=;,\t|]\s*"?(.*?)["\s;,|]*$', text, re.IGNORECASE
-                )
-                if match is None or not match[1]:
-                    continue
-                if found.setdefault(role, match[1]) != match[1]:
-                    raise self.error(
-                        f'two lines above the headings state a {role}, "{shorten(found[role])}" and'
-                        f' "{shorten(match[1])}"; write which under readings'
-                    )
-        return found
 
     def _texts(self, above: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
         """What all rows have where no column says it, and in words where that comes from.
@@ -259,7 +242,8 @@ class _Reader:
         without: list[int] = []
         roles = self.form.headings.roles
         axes = [axis for group in self.form.headings.groups for axis in group.axes]
-        lengths = [*axes, *(roles[role] for role in ("u", "diameter") if role in roles)]
+        others = [roles[role] for role in ("u", "diameter") if role in roles]
+        lengths = [*axes, *(column for column in others if column.constant is None)]
         for column in lengths:
             unit = column.unit or self.form.units.get(column.place) or stated or once
             if unit is None and column not in axes and found:
@@ -288,15 +272,14 @@ class _Reader:
         factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
         further = [roles.get(name) for name in self.words.further]
         for name, known in self.words.further.items():
-            if name in roles:
-                factor = known[roles[name].unit or ""]
-                factors[roles[name].place] = factor, power_of_ten(factor)
+            if name in roles and (unit := roles[name].unit) is not None:
+                factors[roles[name].place] = known[unit], power_of_ten(known[unit])
         places = {role: roles[role].place for role in TEXTS if role in roles}
         found: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
-            factor, power = factors[i]
+            factor, power = factors.get(i, (None, ""))
             cell = cells[i].replace(sign, ".")
             value = plain_number(cell, power)
             if value is not None:
@@ -304,12 +287,17 @@ class _Reader:
             if cell.casefold() in NOTHING:
                 return math.nan
             try:
+                if factor is None:
+                    return clock_time(cells[i]).seconds
                 return metres_or_radians(cell, factor)
-            except QuantityError as error:
+            except (QuantityError, ClockError) as error:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
         u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
+        of_all = math.nan
+        if u is not None and (constant := roles["u"].constant) is not None:
+            u, of_all = None, parse_positive_length(constant)
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
                 break
@@ -325,7 +313,7 @@ class _Reader:
                         messages.append(mark.message("", f"no {role}; write its name"))
                 names.append(own)
             x = [number(cells, i, mark) for i in axes]
-            x.append(math.nan if u is None else number(cells, u, mark))
+            x.append(of_all if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
                 x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
             x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
@@ -334,6 +322,21 @@ class _Reader:
         if messages:
             raise ExperimentError(messages)
         return found
+
+    def _times(self) -> tuple[ReadTime, ...]:
+        """Clock times of rows, which have been read."""
+        clocks = [
+            column.place
+            for name, column in self.form.headings.roles.items()
+            if name in self.words.further and column.unit is None
+        ]
+        file = str(self.source)
+        return tuple(
+            (Mark(file, line, 1), cells[i], clock_time(cells[i]))
+            for line, cells in self.form.rows
+            for i in clocks
+            if cells[i].casefold() not in NOTHING
+        )
 
     def _refuse_doubtful(
         self, rows: Sequence[FileRow], is_possible: Callable[[Array], bool]
@@ -370,6 +373,8 @@ class _Reader:
         ]
         if "k" in headings.roles:
             parts.append("u is the expanded uncertainty divided by its coverage factor k")
+        if "u" in headings.roles and (u := headings.roles["u"].constant) is not None:
+            parts.append(f"u is {u} in all rows")
         if len(headings.groups) > 1:
             of = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
             parts.append(f"co-ordinates of {of} side by side")

@@ -26,7 +26,9 @@ from ..design.observations.calibration import (
     far_from_drawing,
 )
 from ..design.observations.priors import Priors
+from ..experiment.exact_values import exact_contradictions
 from ..experiment.model import Experiment
+from ..experiment.star_tables import doubt_of_table
 from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path, refused
 from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, listing
@@ -173,10 +175,12 @@ def ensure_certified(experiment: Experiment) -> None:
 
 
 def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experiment:
-    """An experiment with the certificate values of a file in place of its own.
+    """An experiment with the certificate values of a file in place of its own, and further
+    `doubts` where tables of stars are not those of its probes.
 
     :raises ExperimentError: a wrong table; a value that the experiment does not have, or has
-        already, or that is far from the drawing; values that are missing. All of them at once.
+        already, or that is far from the drawing; values that are missing, or exact and
+        contradictory. All of them at once.
     """
     problems: list[Message] = []
     table = path if isinstance(path, GivenText) else GivenText(str(path), read_text(path))
@@ -229,12 +233,32 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
     if problems:
         raise ExperimentError(sorted(problems)[:MOST_MESSAGES])
     found = with_values(experiment, values)
+    wrong = [Message(str(path), 1, 1, "", text) for text in _wrong_together(found)]
+    if wrong:
+        raise ExperimentError(wrong)
+    return replace(found, doubts=(*experiment.doubts, *_doubts_of_stars(path, found, experiment)))
+
+
+def _wrong_together(found: Experiment) -> Iterator[str]:
+    """What is wrong with certified values of which each is possible."""
     for one in found.calibration:
         if text := one.doubt(found.layouts[one.artefact]):
-            problems.append(Message(str(path), 1, 1, "", text))
-    if problems:
-        raise ExperimentError(problems)
-    return found
+            yield text
+    plates = [name for name, one in found.artefacts.items() if one.role != "length_standard"]
+    calibrations = dict(enumerate(found.calibration))
+    for _, text in exact_contradictions(calibrations, plates, found.layouts):
+        yield text
+
+
+def _doubts_of_stars(
+    path: Path | GivenText, found: Experiment, experiment: Experiment
+) -> Iterator[str]:
+    """What is unlikely of stars whose values are those of a file, where it was not before."""
+    for k, (star, before) in enumerate(zip(found.stars, experiment.stars, strict=True)):
+        offsets = np.array([found.probes[name].offset for name in star.probes])
+        text = doubt_of_table(star, offsets)
+        if text and text != doubt_of_table(before, offsets):
+            yield f"{path}: {format_path(('stars', k))}: {text}"
 
 
 def _unknown(row: FileRow, known: list[CertifiedValue]) -> str:

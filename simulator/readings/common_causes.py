@@ -8,7 +8,7 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import permutations, product
 
 import numpy as np
@@ -126,14 +126,48 @@ def _units() -> Iterator[tuple[str, float]]:
         yield f"if lengths are in {what}", ratio
 
 
+def mistaken_positions(design: Design, readings: Readings, seen: Array) -> dict[int, int]:
+    """Positions of plates most of whose places seen (m, d) are where another one was planned, and
+    not where their own was, each with that other one.
+    """
+    reach, found = AGAINST_DRAWING * ball_pitches(design), {}
+    artefacts, planned = design.positions.artefact, design.positions
+    for k in np.unique(readings.position).tolist():
+        rows = np.flatnonzero(readings.position == k)
+        ball = readings.ball[rows]
+        is_same = design.artefacts.is_plate[artefacts] & (artefacts == artefacts[k])
+        apart = {}
+        for j in np.flatnonzero(is_same).tolist():
+            there = design.balls.places[ball] @ planned.rotations[j].T + planned.origins[j]
+            off = np.sqrt(((seen[rows] - there) ** 2).sum(axis=1))
+            apart[j] = float(np.median(off / reach[ball]))
+        nearest = min(apart, key=lambda j: apart[j], default=k)
+        if apart.get(k, 0.0) > 1.0 and apart[nearest] <= 1.0:
+            found[k] = nearest
+    return found
+
+
+def words_of_mistaken(design: Design, mistaken: Mapping[int, int]) -> str:
+    """That positions are where others were planned, and what to do."""
+    names = design.positions.names
+    pairs = listing(f"{names[k]} where {names[j]}" for k, j in mistaken.items())
+    is_exchange = set(mistaken) == set(mistaken.values())
+    what = "exchange the names of positions" if is_exchange else "correct the names of positions"
+    return f"readings are where other positions were planned, {pairs}: {what}, or what is planned"
+
+
 def doubts_about_poses(design: Design, x: Array) -> tuple[str, ...]:
     """A sentence about plates that stood far from where they were planned, which machines rarely
     are the cause of; none where they stood about as planned.
     """
     readings = design.readings
-    found = poses_found(design, readings, x + design.probes.offsets[readings.probe]) or {}
+    seen = x + design.probes.offsets[readings.probe]
+    found = poses_found(design, readings, seen) or {}
     size = float(design.machine.volume.size.max())
     far = {k: pose for k, pose in found.items() if pose[0] > TURNED or pose[1] > SHIFTED * size}
+    mistaken = mistaken_positions(design, readings, seen)
+    if mistaken:
+        return (words_of_mistaken(design, mistaken),)
     if not far:
         return ()
     k = max(far, key=lambda k: far[k])

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from itertools import product
 
 from ..design.arrays import Design
+from ..experiment.name_rules import PLACE
 from ..inputs.messages import refused
 from ..inputs.settings import listing, shorten
 
-PLACES = ("position", "ball", "probe", "point")
-PLACE = re.compile(r"\{([^{}]*)\}")
 # Tried in this order where the experiment is known and no rule is given.
 RULES = (
     "{position}_{ball}_{probe}",
@@ -46,23 +45,6 @@ class Named:
     rule: str
     parts: tuple[Parts | None, ...]
     numbered: tuple[str, ...] = ()
-
-
-def check_rule(rule: str) -> str:
-    """A rule as it is.
-
-    :raises ValueError: it has no ball, or a place that there is not or that is there twice.
-    """
-    found = PLACE.findall(rule)
-    unknown = [name for name in found if name not in PLACES]
-    if unknown or "{" in PLACE.sub("", rule) or "}" in PLACE.sub("", rule):
-        told = f'"{shorten(unknown[0])}"' if unknown else "a brace without its other one"
-        raise ValueError(f"{told} in a rule of names; known: {', '.join(PLACES)}, in braces")
-    if "ball" not in found or len(set(found)) < len(found):
-        raise ValueError(f'"{shorten(rule)}" needs {{ball}}, and each place at most once')
-    if "point" in found and not rule.endswith("{point}"):
-        raise ValueError(f'"{shorten(rule)}": {{point}} comes last')
-    return rule
 
 
 def fold(name: str) -> str:

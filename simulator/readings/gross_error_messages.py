@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design
+from ..design.arrays import Design, Readings
 from ..design.objects import SLIGHTLY
+from ..design.observations.lengths import Lengths
 from ..estimation.length_ratios import LengthRatio, doubtful_lengths
 from ..experiment.readings_section import ReadingsSettings
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
-from .common_causes import common_cause
+from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 
 
@@ -31,6 +33,11 @@ def refuse_gross_errors(
     :raises ExperimentError: some readings are wrong; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
+    if positions:
+        seen = x + design.probes.offsets[design.readings.probe]
+        mistaken = mistaken_positions(design, design.readings, seen)
+        if {wrong.position for wrong in positions} <= set(mistaken):
+            raise ExperimentError([marks[0].message("", words_of_mistaken(design, mistaken))])
     if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
         cause = common_cause(design, x, settings)
         if cause:
@@ -54,6 +61,30 @@ def refuse_gross_errors(
         ]
     if messages:
         raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
+
+
+def with_names_swapped(
+    design: Design, readings: Readings, x: Array, marks: Sequence[Mark]
+) -> tuple[Readings, tuple[str, ...]]:
+    """Readings of plates with the names of two balls swapped wherever scale readings x (m, d) show
+    that they are, and that in words; all others as they are.
+    """
+    plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
+    of_plates = replace(design, readings=readings.select(plate)).observed(
+        design.of(Lengths).select(np.zeros(0, np.int64))
+    )
+    ball, told = readings.ball.copy(), []
+    for wrong in find_gross_errors(of_plates, x[plate])[1]:
+        i, j = int(plate[wrong.reading]), int(plate[wrong.partner])
+        if wrong.other_ball < 0 or wrong.partner < wrong.reading:
+            continue
+        ball[i], ball[j] = readings.ball[j], readings.ball[i]
+        names = " and ".join(design.ball_label(int(readings.ball[k])) for k in (i, j))
+        told.append(
+            f"the names of balls {names} in position {design.positions.names[readings.position[i]]}"
+            f" were swapped (lines {marks[i].line} and {marks[j].line})"
+        )
+    return replace(readings, ball=ball), tuple(told)
 
 
 def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:

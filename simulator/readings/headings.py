@@ -3,109 +3,28 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 from ..experiment.readings_section import ColumnsSettings
-from ..inputs.quantities import plain_unit
 from ..inputs.settings import hint, listing, shorten
+from .heading_words import (
+    LESS_CLEAR,
+    LONGEST,
+    MEASURED,
+    WORDS,
+    folded,
+    heading,
+    is_clock,
+    unit_of_further,
+)
 from .uncertainty_headings import FACTORS, headed_uncertainty
 
 AXES = ("x", "y", "z")
 # Roles of columns of text.
 TEXTS = ("position", "ball", "probe")
-
-# Characters of what may be a heading.
-LONGEST = 100
-
-# How headings write units that `LENGTH_UNITS` has under another name.
-UNITS: Mapping[str, str] = {
-    **{unit: unit for unit in ("m", "dm", "cm", "mm", "um", "nm", "in")},
-    **dict.fromkeys(("inch", "inches", "zoll", '"', "″"), "in"),
-    **dict.fromkeys(("micron", "microns", "micrometre", "micrometer", "mikrometer"), "um"),
-    **dict.fromkeys(("millimetre", "millimeter", "millimetres", "millimeters"), "mm"),
-    **dict.fromkeys(("metre", "meter", "metres", "meters"), "m"),
-}
-_UNIT = "|".join(re.escape(unit) for unit in sorted(UNITS, key=len, reverse=True))
-_HEADING = re.compile(
-    rf"(?P<name>.*?)(?:[\s_,;:]+|\s*(?=[\[(/]))(?:in\s+)?[\[(/]?\s*(?P<unit>{_UNIT})\.?\s*[\])]?"
-)
-
-# Words beside an axis that say no more than that it is what was measured.
-MEASURED = frozenset(
-    (
-        *("coordinate", "coordinates", "co", "ordinate", "koordinate", "coord", "value", "wert"),
-        *("actual", "act", "ist", "istwert", "measured", "meas", "gemessen", "messwert"),
-        *("centre", "center", "centro", "mitte", "mittelpunkt"),
-    )
-)
-WORDS: Mapping[str, tuple[str, ...]] = {
-    "position": (
-        *("position", "pos", "placement", "setup", "set up", "lage", "aufstellung"),
-        *("stellung", "messlage", "aufspannung", "plattenlage"),
-    ),
-    "ball": ("ball", "sphere", "kugel", "ball name", "sphere name", "kugelname", "bille", "esfera"),
-    "probe": ("probe", "stylus", "tip", "taster", "taststift", "probe name", "palpeur", "palpador"),
-    "diameter": ("diameter", "diam", "dia", "durchmesser", "sphere diameter", "ball diameter"),
-}
-# Only where no column has one of the words above.
-LESS_CLEAR: Mapping[str, tuple[str, ...]] = {
-    "position": (
-        "position no",
-        "position number",
-        "lage nr",
-        "pos nr",
-        "pos no",
-        "stellung nr",
-        "messlage nr",
-        "aufspannung nr",
-    ),
-    "ball": (
-        *("ball no", "ball number", "ball id", "sphere no", "kugel nr", "kugelnummer", "feature"),
-        *("element", "merkmal", "name", "label", "id", "no", "nr", "number", "nummer", "punkt"),
-    ),
-    "probe": ("stylus name", "tip name", "sensor", "probe no", "stylus no", "taster nr", "tip no"),
-    "diameter": ("d", "ø", "actual diameter", "diameter actual", "durchmesser ist"),
-}
-
-
-@lru_cache(maxsize=100_000)
-def folded(text: str) -> str:
-    """A text without what people write differently: case, signs between words, zeros before
-    numbers.
-
-    >>> folded("Z_low"), folded("z  LOW"), folded("P-007"), folded("p7")
-    ('z low', 'z low', 'p 7', 'p 7')
-    """
-    plain = unicodedata.normalize("NFKC", text).casefold()
-    words = re.findall(r"[^\W\d_]+|\d+", plain)
-    return " ".join(word.lstrip("0") or "0" if word.isdigit() else word for word in words)
-
-
-def heading(cell: str) -> tuple[str, str | None]:
-    """The name of a column, folded, and the unit that its heading states.
-
-    >>> [heading(cell) for cell in ("x_mm", "X [µm]", "Y/mm", "z in inch", "x in", "x")]
-    [('x', 'mm'), ('x', 'um'), ('y', 'mm'), ('z', 'in'), ('x', 'in'), ('x', None)]
-    """
-    if len(cell) > LONGEST:
-        return "", None
-    match = _HEADING.fullmatch(plain_unit(cell).casefold())
-    if match is None or not match["name"].strip():
-        return folded(cell), None
-    return folded(match["name"]), UNITS[match["unit"]]
-
-
-def unit_of(cell: str) -> str | None:
-    """The unit that a cell or a line states by itself, in brackets or not; None where none.
-
-    >>> unit_of("[mm]"), unit_of("inch"), unit_of("12")
-    ('mm', 'in', None)
-    """
-    return UNITS.get(plain_unit(cell).strip().strip("[]() ").casefold())
 
 
 class HeadingError(ValueError):
@@ -198,11 +117,17 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             taken.add(roles[role].place)
     for name, units in words.further.items():
         found = {
-            i: unit for i, cell in enumerate(cells) if (unit := _unit_of(cell, name)) is not None
+            i: unit
+            for i, cell in enumerate(cells)
+            if (unit := unit_of_further(cell, name)) is not None
         }
         if len(found) > 1:
             raise HeadingError(_which(name, [cells[i] for i in found]))
         for i, unit in found.items():
+            if is_clock(unit, units):
+                roles[name] = HeadedColumn(i)
+                taken.add(i)
+                continue
             if unit not in units:
                 text = f'the unit in the column "{shorten(cells[i])}" is not known'
                 raise HeadingError(f"{text}; write {listing(units)}")
@@ -288,22 +213,6 @@ def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
             f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
             " uncertainties; leave u out there: the heading says what it is"
         )
-
-
-def _unit_of(cell: str, name: str) -> str | None:
-    """The unit of a heading that names a further column, empty without one; None if it does not.
-
-    >>> _unit_of("t_scales_degC", "t_scales"), _unit_of("T scales [°C]", "t_scales")
-    ('degC', 'degC')
-    """
-    if folded(cell[:LONGEST]) == folded(name):
-        return ""
-    match = re.fullmatch(
-        r"(.+?)(?:[\s_]+|\s*(?=[\[(/]))[\[(/]?\s*([^\s_\[\]()/]+)\s*[\])]?", cell[:LONGEST]
-    )
-    if match is None or folded(match[1]) != folded(name):
-        return None
-    return match[2].replace("°", "deg")
 
 
 def numbered_columns(words: Vocabulary, count: int) -> Headings:

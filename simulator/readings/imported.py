@@ -16,10 +16,11 @@ import numpy as np
 
 from ..design.arrays import Design
 from ..estimation.spheres import FEWEST_POINTS, SphereFit, closest_sphere
+from ..experiment.readings_section import Coordinate
 from ..inputs.messages import ExperimentError, refused
 from ..inputs.settings import listing, shorten
 from ..inputs.spreadsheets import CsvWriter
-from ..inputs.yamltree import Mark
+from ..inputs.yamltree import GivenText, Mark
 from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file, without_point
 from .formats.registered import read_report
 from .formats.report import CIRCLE, POINT, SPHERE, UNSTATED, Feature, Report
@@ -62,7 +63,7 @@ class ImportedReadings:
     readings: tuple[ImportedReading, ...]
     told: tuple[str, ...]
     remarks: tuple[str, ...]
-    coordinates: str
+    coordinates: Coordinate
     dimension: int = 3
 
     def columns(self, uncertainties: bool = False) -> dict[str, list[str] | list[float]]:
@@ -157,8 +158,8 @@ class _Taken:
         return replace(one, centre=(x, y, z)), fit
 
 
-def import_readings(
-    paths: Sequence[Path], settings: ImportSettings = ImportSettings()
+def report_readings(
+    paths: Sequence[Path | GivenText], settings: ImportSettings
 ) -> ImportedReadings:
     """Readings of reports whose features have names by a rule (see `feature_names`).
 
@@ -197,58 +198,14 @@ def import_readings(
         remarks.append(
             "warning: centres in the machine's and in a part's system; import each apart"
         )
-    if settings.design is not None:
-        remarks += _against_plan(readings, settings.design)
-    coordinates = "part" if systems == {"part"} else "ball centres"
+    coordinates: Coordinate = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
     return ImportedReadings(
         tuple(readings), tuple(told), tuple(dict.fromkeys(remarks)), coordinates, dimension
     )
 
 
-def _against_plan(readings: Sequence[ImportedReading], design: Design) -> list[str]:
-    """Which planned readings the reports do not have, and which they have that are not planned."""
-    balls, positions, probes = design.balls.names, design.positions.names, design.probes.names
-    planned = {
-        (positions[position], balls[ball], probes[probe])
-        for position, ball, probe in zip(
-            *(design.readings.position, design.readings.ball, design.readings.probe), strict=True
-        )
-    }
-    read = {(one.position, one.ball, one.probe) for one in readings}
-    remarks = []
-    missing, more = planned - read, read - planned
-    if missing:
-        told = f"{len(missing)} of {len(planned)} planned readings are missing"
-        remarks.append(f"{told}: {_summed_up(missing, planned, design)}")
-    if more:
-        verb = "reading is" if len(more) == 1 else "readings are"
-        told = f"{len(more)} {verb} not planned"
-        remarks.append(f"{told}: {_summed_up(more, set(), design)}")
-    return remarks
-
-
-def _summed_up(
-    some: set[tuple[str, str, str]], planned: set[tuple[str, str, str]], design: Design
-) -> str:
-    """Readings by position, ball and probe, abbreviated; a position all of whose planned readings
-    are among them is told as one.
-    """
-    words = []
-    for name in design.positions.names:
-        own = [one for one in some if one[0] == name]
-        if own and len(own) == sum(one[0] == name for one in planned):
-            words.append(f"all of {name}")
-        elif own:
-            several = len(design.probes.names) > 1
-            order = {ball: k for k, ball in enumerate(design.balls.names)}
-            own.sort(key=lambda one: (order[one[1]], one[2]))
-            told = (f"{ball} ({probe})" if several else ball for _, ball, probe in own)
-            words.append(f"{listing(told, 4)} in {name}")
-    return listing(words)
-
-
-def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
+def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> _Taken:
     """The features of a report that are readings."""
     found, kinds = _Taken(report), settings.kinds
     found.left.update(one.kind for one in report.features if one.kind not in kinds)
@@ -272,7 +229,9 @@ def _taken(report: Report, path: Path, settings: ImportSettings) -> _Taken:
     features = [one for one, _ in complete]
     names, whose = _named(features, rule or None, settings.design, report.file)
     is_of_file = "{position}" not in names.rule
-    position = position_of_file(path.stem, settings.design, str(path)) if is_of_file else ""
+    position = (
+        position_of_file(Path(str(path)).stem, settings.design, str(path)) if is_of_file else ""
+    )
     others = [one for one, own in zip(features, names.parts, strict=True) if own is None]
     found.leave(others, f"the name is not of {names.rule}")
     known: set[tuple[object, ...]] = set()
@@ -356,7 +315,7 @@ def _grouped(candidates: list[Feature], apart: re.Pattern[str], found: _Taken) -
 
 
 def _readings(
-    one: _Taken, path: Path, variance: float, design: Design | None
+    one: _Taken, path: Path | GivenText, variance: float, design: Design | None
 ) -> list[ImportedReading]:
     """The readings of a report, with the probe that its names, its sensors or the plan tell."""
     readings = []

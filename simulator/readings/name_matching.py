@@ -15,11 +15,12 @@ import numpy as np
 
 from ..design.arrays import Design
 from ..geometry.motions import fit_motion, fixes_pose
+from ..geometry.symmetry import turns_onto_itself
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing, shorten
 from ..inputs.tables import FileRow
 from ..machines.protocol import Array, Integers
-from .headings import folded
+from .heading_words import folded
 
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.
@@ -33,17 +34,18 @@ _KINDS = re.compile(r"(?:ball|sphere|kugel|position|pos|lage|p|b|k|s|no|nr)\s*")
 
 @dataclass
 class Names:
-    """Names of a table that have been found, and what is to be told, or to be asked."""
+    """Names of a table that have been found, and what is to be told, or doubted, or asked."""
 
     told: list[str] = field(default_factory=list)
+    doubted: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
 
 
 def with_known_names(
     rows: Sequence[FileRow], design: Design, places: Callable[[Sequence[FileRow]], Array] | None
-) -> tuple[tuple[FileRow, ...], tuple[str, ...], tuple[str, ...]]:
-    """Rows with the names that the design has, in words what was matched how, and what could not
-    be.
+) -> tuple[tuple[FileRow, ...], Names]:
+    """Rows with the names that the design has, and in words what was matched how, and what could
+    not be.
 
     `places` makes places of balls in the machine, in metres, of rows; None where the table does not
     have them.
@@ -57,7 +59,7 @@ def with_known_names(
         [name for name in used[2] if name not in probes and name],
     ]
     if not any(strange) and "" not in used[2]:
-        return tuple(rows), (), ()
+        return tuple(rows), found
     if strange[2]:
         rows = _renamed(rows, 2, _alike("probes", used[2], probes, found))
     if strange[1]:
@@ -67,7 +69,7 @@ def with_known_names(
     rows = _matched_positions(rows, design, places, found)
     rows = _planned_probes(rows, design, found)
     rows = _matched_balls(rows, design, places, found)
-    return tuple(rows), tuple(found.told), tuple(found.asked)
+    return tuple(rows), found
 
 
 def _renamed(rows: Sequence[FileRow], role: int, names: Mapping[str, str]) -> Sequence[FileRow]:
@@ -318,7 +320,7 @@ def _by_number(
     numbers, order = _numbers(used, len(balls)), _order_read(design, balls)
     if numbers is None or not len(order):
         return {}
-    limit = BY_PLACE * _pitch(design.balls.places[balls])
+    limit, rotations = BY_PLACE * _pitch(design.balls.places[balls]), []
     for name in dict.fromkeys(row.texts[0] for row in rows):
         for probe in dict.fromkeys(row.texts[2] for row in rows if row.texts[0] == name):
             own = [row for row in rows if row.texts[0] == name and row.texts[2] == probe]
@@ -334,9 +336,43 @@ def _by_number(
             planned = design.positions.rotations[design.positions.names.index(name)]
             if not turned_freely and float(np.abs(rotation - planned).max()) > AS_PLANNED:
                 return {}
+            rotations.append(rotation)
     names = {name: design.balls.names[order[k]] for name, k in numbers.items()}
+    if turned_freely:
+        _doubt_numbers(design.balls.places[balls], rotations, limit, names, found)
     found.told.append(f"balls matched by number in reading order: {_pairs(names)}")
     return names
+
+
+def _doubt_numbers(
+    places: Array,
+    rotations: Sequence[Array],
+    limit: float,
+    names: Mapping[str, str],
+    found: Names,
+) -> None:
+    """Ask about numbers of balls at `places` that co-ordinates of a part, with `rotations` against
+    the artefact's axes, contradict, and doubt them where these do not tell.
+    """
+    if all(float(np.abs(one - np.eye(len(one))).max()) <= AS_PLANNED for one in rotations):
+        return
+    turns = turns_onto_itself(places, limit)
+    if not turns:
+        return
+    pairs = _pairs(names)
+    for one in rotations:
+        if any(float(np.abs(one - turn).max()) <= AS_PLANNED for turn in turns):
+            found.asked.append(
+                f"the numbers of balls ({pairs}, in reading order) and the places that they have"
+                " along the part's axes disagree, and the artefact turned onto itself looks the"
+                " same; write the names that balls have in the experiment"
+            )
+            return
+    found.doubted.append(
+        f"balls are matched by number in reading order alone ({pairs}): the artefact turned onto"
+        " itself looks the same, so that part co-ordinates do not tell whether they are numbered"
+        " otherwise; write the names that balls have in the experiment"
+    )
 
 
 def _by_place(

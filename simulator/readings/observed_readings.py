@@ -32,7 +32,8 @@ class ObservedReadings:
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the
     design did not foresee. `marks` tell where each reading stands; of the mean of several, where
     the first does. `told` is how tables were read, `of_offsets` what is doubtful about offsets of
-    probes in them, and about part co-ordinates that two positions have alike.
+    probes in them, and about part co-ordinates that two positions have alike; `of_certificate` what
+    is doubtful about values of a certificate that came with them.
     """
 
     design: Design
@@ -42,6 +43,7 @@ class ObservedReadings:
     marks: tuple[Mark, ...] = ()
     told: tuple[str, ...] = ()
     of_offsets: tuple[str, ...] = ()
+    of_certificate: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -58,6 +60,7 @@ class ObservedReadings:
         of_volume = doubts_about_volume(self.design, self.x, self.marks)
         of_poses = doubts_about_poses(self.design, self.x)
         return (
+            *self.of_certificate,
             *self.of_offsets,
             *of_poses,
             *doubts_about_lengths(self.design, self.x),

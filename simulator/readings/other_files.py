@@ -8,6 +8,7 @@ import re
 
 from ..inputs.yamltree import GivenText
 from .formats.registered import recognised
+from .formats.report import Format
 
 POINTS = frozenset(("feature", "nominal_x"))
 CERTIFICATE = frozenset(("item", "first", "second", "value"))
@@ -32,7 +33,7 @@ def what_it_is(source: GivenText) -> str:
     form = recognised(source.text)
     if form is None:
         return ""
-    if form.name == "dmis" and not re.search(r"^\s*FA\(", source.text, re.MULTILINE):
+    if is_program(form, source.text):
         return (
             "this is a DMIS program, not what was measured with it; run it on the machine, then"
             " ballplate import on its output"
@@ -41,6 +42,11 @@ def what_it_is(source: GivenText) -> str:
         f"this is a report of a measuring program ({form.title}), and no table of readings; run"
         " ballplate import first, which makes one of it"
     )
+
+
+def is_program(form: Format, text: str) -> bool:
+    """Whether a file of a format moves a machine, and has nothing that was measured."""
+    return form.name == "dmis" and not re.search(r"^\s*FA\(", text, re.MULTILINE)
 
 
 def is_calibration_table(source: GivenText) -> bool:

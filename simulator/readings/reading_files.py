@@ -22,9 +22,8 @@ from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .coordinate_kinds import as_scale_readings, doubts_about_copies
-from .gross_error_messages import (
-    refuse_gross_errors,
-)
+from .digits import doubts_about_digits
+from .gross_error_messages import refuse_gross_errors, with_names_swapped
 from .observed_readings import ObservedReadings, combine_standards, reading_keys
 from .offsets_applied import doubt_about_offsets, said_of
 from .reading_sources import Source, source_rows
@@ -76,17 +75,17 @@ def read_readings(
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
         cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
     """
-    d, settings = design.dimension, settings or no_settings()
+    d, asked = design.dimension, settings or no_settings()
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
     units = {name: one for kind in design.influences for name, one in kind.columns.items()}
     empty = AXES[:d] if design.positions.across is not None else ()
 
     def is_possible(x: Array) -> bool:
-        return settings.coordinates == "part" or not design.machine.volume.far_outside(x).any()
+        return asked.coordinates == "part" or not design.machine.volume.far_outside(x).any()
 
-    found = source_rows(sources, design, settings, messages, is_possible, units, empty)
-    rows = found.rows
+    found = source_rows(sources, design, asked, messages, is_possible, units, empty)
+    rows, settings = found.rows, found.settings
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
@@ -124,7 +123,11 @@ def read_readings(
     )
     readings = replace(readings, uncertainty=uncertainty, beside=beside)
     readings = in_sequence(readings, design.influences)
-    missing, unplanned = _compare(design, readings, [row.mark for row in rows])
+    marks = tuple(row.mark for row in rows)
+    swapped: tuple[str, ...] = ()
+    if settings.swap_names:
+        readings, swapped = with_names_swapped(design, readings, x, marks)
+    missing, unplanned = _compare(design, readings, marks)
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
@@ -139,12 +142,12 @@ def read_readings(
                 )
             ]
         )
-    marks = tuple(row.mark for row in rows)
-    doubt = doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    doubt = found.doubts + doubt_about_offsets(design, readings, given, settings, rows[0].mark)
+    doubt += doubts_about_digits(design, given, uncertainty)
     if settings.coordinates == "part":
         doubt += doubts_about_copies(design, readings, given)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, told=(*found.told, *said_of(settings)), of_offsets=doubt)
+    observed = replace(observed, told=(*found.told, *swapped, *said_of(settings)), of_offsets=doubt)
     refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)
     return observed
@@ -272,7 +275,7 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
 
 
 def _compare(
-    design: Design, readings: Readings, marks: list[Mark]
+    design: Design, readings: Readings, marks: Sequence[Mark]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, found = reading_keys(design.readings.expanded()), reading_keys(readings)
 

@@ -17,14 +17,17 @@ from ..geometry.motions import AXIS_NAMES
 from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing
-from ..inputs.tables import FileRow, header_names, read_table
+from ..inputs.tables import FileRow, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText
 from ..machines.protocol import Array
 from .any_table import TableRows, read_any_table, text_of
+from .clock_times import wrong_times
 from .coordinate_kinds import controller_offsets
-from .headings import Vocabulary, heading
+from .heading_words import heading, is_clock
+from .headings import Vocabulary
 from .name_matching import with_known_names
 from .other_files import what_it_is
+from .report_sources import report_rows, with_coordinates
 from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
@@ -41,12 +44,15 @@ ENOUGH = 3
 @dataclass(frozen=True)
 class SourceRows:
     """Rows of all tables; `told` is how they were read and what was matched, `hints` what to say
-    where names are not known.
+    where names are not known, and `settings` those given, with what reports say of co-ordinates.
+    `doubts` are about names that were matched.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...]
+    settings: ReadingsSettings
     hints: tuple[Message, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 def source_rows(
@@ -58,7 +64,8 @@ def source_rows(
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
-    """Rows of tables of readings, with the names of the design as far as they can be matched.
+    """Rows of tables of readings, or of reports of measuring programs, with the names of the design
+    as far as they can be matched.
 
     Messages about rows of plain tables are added to `messages`, so that more can be said at once.
 
@@ -70,28 +77,37 @@ def source_rows(
         "ball": design.balls.names,
         "probe": design.probes.names,
     }
+
+    def of_report(source: Source, text: GivenText) -> TableRows | None:
+        return report_rows(source, text, design, settings, units)
+
+    d = design.dimension
     tables = [
-        read_source(source, names, settings, messages, is_possible, design.dimension, units, empty)
+        read_source(source, names, settings, messages, is_possible, d, units, empty, of_report)
         for source in sources
     ]
     rows = [row for table in tables for row in table.rows]
     if messages:
-        return SourceRows(tuple(rows), ())
+        return SourceRows(tuple(rows), (), settings)
+    _refuse_wrong_times(sources, tables)
+    settings, said = with_coordinates(settings, sources, tables)
     diameters = [d for table in tables for d in table.diameters]
 
     def places(own: Sequence[FileRow]) -> Array:
         return _places(own, design, settings)
 
     hints = tuple(hint for table in tables for hint in table.hints)
-    named, matched, asked = with_known_names(
+    named, names_found = with_known_names(
         rows, design, None if settings.coordinates == "part" else places
     )
-    if asked:
-        raise ExperimentError([*(rows[0].mark.message("", text) for text in asked), *hints])
-    told = [text for table in tables for text in table.told]
+    if names_found.asked:
+        asked = [rows[0].mark.message("", text) for text in names_found.asked]
+        raise ExperimentError([*asked, *hints])
+    told = [*(text for table in tables for text in table.told), *said]
     if len(diameters) == len(rows):
         told += _about_diameters(named, np.array(diameters))
-    return SourceRows(named, (*told, *matched), hints)
+    doubts = tuple(names_found.doubted)
+    return SourceRows(named, (*told, *names_found.told), settings, hints, doubts)
 
 
 def _refuse_named_twice(sources: Sequence[Source]) -> None:
@@ -110,6 +126,20 @@ def _refuse_named_twice(sources: Sequence[Source]) -> None:
         seen[place] = source
 
 
+def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:
+    """Refuse clock times that may be of several days, or beside other times.
+
+    :raises ExperimentError: there are such.
+    """
+    times = [time for table in tables for time in table.times]
+    for source, table in zip(sources, tables, strict=True):
+        if times and not table.times:
+            text = f"no clock times, which {times[0][0].file} has; write all times of one kind"
+            raise refused(source, text)
+    if messages := wrong_times(times):
+        raise ExperimentError(messages)
+
+
 def read_source(
     source: Source,
     names: Mapping[str, Sequence[str]],
@@ -119,9 +149,10 @@ def read_source(
     dimension: int,
     units: Units,
     empty: Collection[str] = (),
+    of_report: Callable[[Source, GivenText], TableRows | None] = lambda source, text: None,
 ) -> TableRows:
     """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns,
-    and cells of the columns `empty` may be so in plain files.
+    and cells of the columns `empty` may be so in plain files. What is no table may be a report.
 
     :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
         `messages`.
@@ -132,9 +163,11 @@ def read_source(
     wrong: list[Message] = []
     rows: tuple[FileRow, ...] = ()
     heads = header_names(text)
+    clocks = {name for name, one in units.items() if is_clock("", one)}
     looks_plain = encoding in ("", "UTF-8") and heads & set(axes)
-    # Plain tables have standard uncertainties only.
+    # Plain tables have standard uncertainties only, and times in seconds or the like.
     others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
+    others |= not clocks.isdisjoint(header_texts(text))
     if looks_plain and not others and all(one is None for one in stated):
         # One probe need not be named.
         defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
@@ -153,6 +186,8 @@ def read_source(
     try:
         return read_any_table(text, encoding, words, settings, is_possible)
     except ExperimentError:
+        if (report := of_report(source, text)) is not None:
+            return report
         # Who names columns knows what the file is.
         if settings.columns is None and (other := what_it_is(text)):
             raise ExperimentError([Message(str(source), 1, 1, "", other)]) from None

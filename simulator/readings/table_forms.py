@@ -16,14 +16,13 @@ from ..experiment.readings_section import ReadingsSettings
 from ..inputs.messages import MOST_MESSAGES
 from ..inputs.settings import shorten
 from ..inputs.tables import MOST_COLUMNS
+from .heading_words import LONGEST, unit_of
 from .headings import (
-    LONGEST,
     HeadingError,
     Headings,
     Vocabulary,
     numbered_columns,
     read_headings,
-    unit_of,
 )
 
 # What separates columns → how it is told. Blanks by themselves, and two or more where names have

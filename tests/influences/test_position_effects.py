@@ -15,6 +15,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.montecarlo.experiments import trials
+from ballplate.planning.rows import draw
 from ballplate.results.variance_components.components import AS_STATED, LARGER, variance_components
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -343,14 +344,15 @@ def test_what_is_stated_too_small_is_found_larger(small: bp.Experiment) -> None:
         ("reproducibility of positions and probes", "displacements by position and probe"),
         ("scale of each position", "scales of positions"),
         ("reproducibility of positions and balls", "displacements by position and ball"),
-        ("probing, 0.3 µm", "probing errors of probes"),
+        ("probing, 1 µm between probes", "probing errors of probes"),
     ],
 )
 def test_intervals_of_stated_components_hold_them(
     name: str, group: str, small: bp.Experiment
 ) -> None:
     count = 400
-    experiment = small.with_(influences=[EVERY[name].settings])
+    settings = EVERY[name].settings if name in EVERY else PROBING | {"between_probes": "1 um"}
+    experiment = small.with_(influences=[settings])
     inside, ratios = 0, []
     for seed in range(count):
         found = bp.fit(experiment, bp.simulate(experiment, seed)).components("calibration")
@@ -359,6 +361,15 @@ def test_intervals_of_stated_components_hold_them(
         ratios.append(one.ratio)
     assert abs(inside / count - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
     assert abs(np.mean(ratios) - 1.0) < 4.0 * np.std(ratios) / np.sqrt(count)
+
+
+def test_components_that_hardly_show_are_not_estimated(small: bp.Experiment) -> None:
+    """Of a tenth of a micrometre, less than one degree of freedom is seen of the five."""
+    experiment = small.with_(influences=[PROBING])
+    found = bp.fit(experiment, bp.simulate(experiment)).components("calibration")
+    (one,) = [each for each in found.groups if each.name == "probing errors of probes"]
+    assert one.redundancy < 1.0 and not one.is_estimated
+    assert one.verdict == "cannot be estimated: too little redundancy"
 
 
 def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
@@ -383,6 +394,24 @@ def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) 
     chosen = bp.load(tmp_path / "chosen.yaml")
     assert len(chosen.positions) == 4
     assert lay_out(chosen).influence_parameters
+
+
+def test_poses_of_a_pool_do_not_count(
+    small: bp.Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plan solves for those of a choice only: a limit that all positions exceed is none of it."""
+    every = small.with_(influences=[SCALE])
+    design, of_balls = lay_out(every), 3 * 9
+    limit = "ballplate.simulator.experiment.influences.MOST_SHARED"
+    monkeypatch.setattr(limit, design.parameter_count - of_balls - 1)
+    with pytest.raises(ExperimentError, match="leave positions or candidates out"):
+        lay_out(every)
+    pool = draw(every, every.positions)
+    assert pool.design.parameter_count == design.parameter_count
+    # What all share are the errors of the machine.
+    monkeypatch.setattr(limit, pool.shared - 1)
+    with pytest.raises(ExperimentError, match="leave positions or candidates out"):
+        draw(every, every.positions)
 
 
 def test_unknown_values_are_free_parameters(small: bp.Experiment) -> None:

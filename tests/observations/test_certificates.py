@@ -74,7 +74,28 @@ def of_list(**more: str) -> str:
 
 METRES = [f"{float(one) / 1e3:.7f}" for one in MM]
 IN_METRES = [f"{float(one) / 1e6:.10f}" for one in U]
+# Beside a list without labels, in a list of quantities, texts in the same order.
+UNLABELLED = dcc.quantity(dcc.spaced([], MM, "\\milli\\metre", IN_MM), "distance")
+CHARACTERS = "<dcc:charsXMLList>{names}</dcc:charsXMLList>"
+BESIDE = f"<dcc:list>{dcc.quantity(CHARACTERS, 'balls')}{UNLABELLED}</dcc:list>"
+TWO_COLUMNS = "".join(
+    dcc.quantity(CHARACTERS.format(names=" ".join(pair[k] for pair in PAIRS)), name)
+    for k, name in enumerate(("from", "to"))
+)
+RELATIVE = (
+    "<dcc:relativeUncertainty><dcc:relativeUncertaintyXmlList><si:valueXMLList>3.3e-7"
+    "</si:valueXMLList><si:unitXMLList>\\one</si:unitXMLList></dcc:relativeUncertaintyXmlList>"
+    "</dcc:relativeUncertainty>"
+)
+RELATIVE_ALONE = dcc.quantity(dcc.spaced(LABELS, MM, "\\milli\\metre", []) + RELATIVE)
 SPELLINGS = {
+    "texts beside a list": dcc.certificate(dcc.result(BESIDE.format(names=" ".join(LABELS)))),
+    "two texts beside a list": dcc.certificate(
+        dcc.result(f"<dcc:list>{TWO_COLUMNS}{UNLABELLED}</dcc:list>")
+    ),
+    "a relative uncertainty as well": dcc.certificate(
+        dcc.result(dcc.quantity(dcc.spaced(LABELS, MM, "\\milli\\metre", IN_MM) + RELATIVE))
+    ),
     "single reals": singles(dcc.expanded),
     "single reals, version 2": singles(dcc.expanded, "2.4.0"),
     "single reals, D-SI 2.2": singles(dcc.expanded_later),
@@ -145,6 +166,13 @@ def test_co_ordinates_are_lists_by_axis(tmp_path: Path) -> None:
         tmp_path, {"kind": "coordinates", "values": "c.xml", "axes": ["x", "y"], "balls": "corners"}
     ).calibration
     assert plane.values.shape == (4, 2)  # type: ignore[attr-defined]
+
+
+def test_an_uncertainty_that_is_stated_does_without_a_relative_one(tmp_path: Path) -> None:
+    text = dcc.certificate(dcc.result(RELATIVE_ALONE))
+    one = found(tmp_path, text, standard_uncertainty="0.3 um")
+    np.testing.assert_allclose(one.values, VALUES, rtol=1e-15)
+    np.testing.assert_allclose(one.standard_uncertainties, 3e-7, rtol=1e-12)
 
 
 def test_it_is_told_what_was_taken(tmp_path: Path) -> None:
@@ -265,10 +293,16 @@ WRONG_CERTIFICATES = {
         "is none of a length",
     ),
     "a relative uncertainty": (
-        SPACED.replace(
-            "</si:realListXMLList>", "</si:realListXMLList><dcc:relativeUncertainty/>", 1
-        ),
-        "r1c1–r1c3 has a relative uncertainty, which is not read",
+        dcc.certificate(dcc.result(RELATIVE_ALONE)),
+        "r1c1–r1c3 has a relative uncertainty alone, of which certificates do not say whether",
+    ),
+    "labels of another number beside a list": (
+        dcc.certificate(dcc.result(BESIDE.format(names=" ".join(LABELS[:3])))),
+        "its values have no names",
+    ),
+    "labels twice beside a list": (
+        dcc.certificate(dcc.result(BESIDE.format(names=" ".join([LABELS[0], *LABELS[:3]])))),
+        "no value of r1c3–r3c3",
     ),
     "a covariance in lengths": (
         of_list(covariance=dcc.region(MATRIX, "\\micro\\metre")),

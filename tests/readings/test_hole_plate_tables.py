@@ -136,6 +136,10 @@ def test_circles_of_a_report_are_readings_of_holes(
     expected = json.loads(fitted(capsys, "readings.csv")[1])
     # Reports have nine decimals of a millimetre at most.
     assert json.loads(out)["sum_of_squares"] == pytest.approx(expected["sum_of_squares"], rel=1e-4)
+    # The report itself says as much.
+    status, straight, _ = fitted(capsys, "holes.dmo")
+    assert status == 0
+    assert json.loads(straight)["estimates"] == json.loads(out)["estimates"]
 
 
 def test_a_plan_goes_on_from_readings_of_holes(

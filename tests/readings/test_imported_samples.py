@@ -5,7 +5,6 @@ readings and estimates as the plain tables of the same campaign.
 from __future__ import annotations
 
 import csv
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -42,11 +41,6 @@ def scale_readings(centres: pd.DataFrame) -> pd.DataFrame:
 
 def estimates(table: pd.DataFrame) -> dict[str, Any]:
     return bp.fit(CAMPAIGN, table).to_dict()
-
-
-@cache
-def plain_estimates(name: str) -> dict[str, Any]:
-    return estimates(in_order(pd.read_csv(FOLDER / name)))
 
 
 def numbers(found: object) -> list[float]:
@@ -129,21 +123,8 @@ def _goes_on(line: str) -> bool:
     return line.rstrip().endswith("$")
 
 
-EXACT = [row for row in REPORTS if "points" not in row["file"]]
-
-
-@pytest.mark.parametrize("row", EXACT, ids=lambda row: row["file"])
-def test_a_report_fits_to_the_estimates_of_the_plain_table(row: dict[str, str]) -> None:
-    imported = bp.read_report(FOLDER / row["file"], CAMPAIGN).to_frame()
-    found = numbers(estimates(in_order(scale_readings(imported))))
-    expected = numbers(plain_estimates(row["plain"]))
-    assert len(found) == len(expected) > 100
-    # The plain tables are written in millimetres to 1e-11 m.
-    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=5e-11)
-
-
 def test_points_on_the_surface_fit_to_the_estimates_within_the_rounding_of_points() -> None:
-    (row,) = (row for row in REPORTS if row not in EXACT)
+    (row,) = (row for row in REPORTS if "points" in row["file"])
     imported = bp.read_report(FOLDER / row["file"], CAMPAIGN).to_frame()
     found = np.array(numbers(estimates(in_order(scale_readings(imported)))))
     plain = in_order(pd.read_csv(FOLDER / row["plain"]))

@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
-DESIGN = "designs/quickstart.yaml"
+DESIGN, POOL = "designs/quickstart.yaml", "designs/planning/campaign.yaml"
 SAMPLES = Path("tests/readings/samples")
 
 
@@ -21,23 +21,22 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     return capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("name", "title"),
-    [
-        ("calypso_chr.txt", "Calypso table"),
-        ("calypso_fet.txt", "Calypso table"),
-        ("dmis_mm.dmo", "DMIS output"),
-        ("dmis_inch.dmo", "DMIS output"),
-        ("pcdmis_mm.txt", "PC-DMIS report"),
-        ("qif_2_1_inch.qif", "QIF results"),
-        ("qif_3_0.qif", "QIF results"),
-    ],
-)
-def test_reports_of_measuring_programs_go_to_import(
-    capsys: pytest.CaptureFixture[str], name: str, title: str
+@pytest.mark.parametrize("name", ["calypso_fet.txt", "dmis_mm.dmo", "pcdmis_mm.txt", "qif_3_0.qif"])
+def test_reports_of_another_experiment_are_told_by_their_names(
+    capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     text = refusal(capsys, SAMPLES / name)
-    assert f"report of a measuring program ({title})" in text
+    assert "no names of the experiment in P1" in text and len(text.splitlines()) == 1
+
+
+def test_what_was_done_of_a_plan_is_told_by_tables(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A report has names of an experiment, which the pool of a plan is not yet."""
+    report = str(SAMPLES / "dmis_mm.dmo")
+    assert main(["plan", POOL, "--positions", "4", "--done", report, "-q"]) == 3
+    text = capsys.readouterr().err
+    assert "this is a report of a measuring program (DMIS output), and no table" in text
     assert "run ballplate import first" in text and len(text.splitlines()) == 1
 
 

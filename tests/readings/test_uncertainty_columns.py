@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
+import pandas as pd
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -118,3 +120,27 @@ def test_a_standard_uncertainty_goes_before_an_expanded_one(experiment: Experime
 def test_an_expanded_uncertainty_named_as_a_standard_one(experiment: Experiment) -> None:
     with pytest.raises(ExperimentError, match="names standard uncertainties"):
         uncertainties(experiment, "U (k=2) [um]", "0.9", columns={"u": "U (k=2) [um]"})
+
+
+def test_an_uncertainty_of_all_rows_is_that_of_a_column() -> None:
+    experiment, readings = bp.quickstart(), bp.simulate(bp.quickstart())
+    found = bp.fit(experiment, readings, columns={"u": "=0.35 um"})
+    expected = bp.fit(experiment, readings.assign(u_um=0.35))
+    for column in ("value", "standard uncertainty"):
+        pd.testing.assert_series_equal(found.to_frame()[column], expected.to_frame()[column])
+    assert any("u is 0.35 um in all rows" in one for one in found.remarks)
+
+
+@pytest.mark.parametrize(
+    ("columns", "text"),
+    [
+        ({"u": "=0.2"}, 'readings.columns.u: "0.2" has no unit; .* write for example "=0.2 um"'),
+        ({"u": "=0 um"}, 'readings.columns.u: "0 um" must be above zero'),
+        ({"u": "=-1 um"}, "readings.columns.u: .* must be above zero"),
+        ({"ball": "=r1c1"}, "readings.columns.ball: a ball is that of a reading"),
+        ({"diameter": "=22 mm"}, "readings.columns.diameter: a diameter is that of a reading"),
+    ],
+)
+def test_what_cannot_be_of_all_rows_is_refused(columns: dict[str, str], text: str) -> None:
+    with pytest.raises(ExperimentError, match=text):
+        bp.quickstart().with_(readings={"columns": columns})

@@ -83,6 +83,26 @@ def test_a_file_outside_is_refused_or_allowed_by_its_folder(where: str, folder: 
     assert main(["sweep", str(folder / "s.yaml"), *options]) == 0
 
 
+def test_readings_of_the_base_stay_where_they_are(folder: Path) -> None:
+    """Cells fit none; what tells how readings were made is another matter."""
+    (folder.parent / "lab.csv").write_text("position,ball,x_mm,y_mm,z_mm\n")
+    (folder / "own.csv").write_text("position,ball,x_mm,y_mm,z_mm\n")
+    stated = "readings: {files: [../lab.csv, own.csv]}\n"
+    (folder / "e.yaml").write_text(EXPERIMENT.replace("variants:", f"{stated}variants:"))
+    assert names(folder) == ["balls.csv", "e.yaml", "other.csv", "s.yaml", "third.csv"]
+    assert main(["sweep", str(folder / "s.yaml"), "--workers", "1"]) == 0
+    axis = SWEEP.replace(
+        "  words:", "  lab: {path: readings.files, values: [../lab.csv]}\n  words:"
+    )
+    (folder / "s.yaml").write_text(axis)
+    assert names(folder) == ["balls.csv", "e.yaml", "other.csv", "s.yaml", "third.csv"]
+    (folder.parent / "curve.csv").write_text("position_mm,EXX_um\n0,0\n500,1\n1000,2\n")
+    curves = "true_machine: {kind: curves, files: [../curve.csv]}\n"
+    (folder / "e.yaml").write_text(EXPERIMENT.replace("variants:", f"{stated}{curves}variants:"))
+    with pytest.raises(ExperimentError, match="outside the folders of the sweep"):
+        load_sweep(folder / "s.yaml")
+
+
 def test_a_link_to_a_file_outside_is_refused(folder: Path) -> None:
     (folder / "balls.csv").unlink()
     (folder.parent / "secret/balls.csv").write_text(BALLS)

@@ -43,7 +43,7 @@ def read_digital(
     The result is the one that is named, or else the only one that has them all.
     """
     # Loaded with a parser of XML, which few experiments need.
-    from ...inputs.digital_certificates import matrix_of, read_digital_certificate
+    from ...inputs.digital_certificates import RELATIVE, matrix_of, read_digital_certificate
 
     problems, path = references.problems, references.folder / settings.values
     place = (*steps, "values")
@@ -81,7 +81,9 @@ def read_digital(
             lines = listing(str(one.mark.line) for one in values)
             text = f"{value_name(names, is_pair)} has several values, in lines {lines}"
             problems.add_at(values[1].mark, place, text)
-        if values[0].problem:
+        # Who states the uncertainty needs none of the file.
+        is_stated = values[0].problem == RELATIVE and settings.standard_uncertainty is not None
+        if values[0].problem and not is_stated:
             text = f"{value_name(names, is_pair)} {values[0].problem}"
             problems.add_at(values[0].mark, place, text)
         entries.append(

@@ -1,0 +1,29 @@
+"""Rules by which measuring programs name features: a name with places in braces, such as
+{position}_{ball}_{probe}.
+"""
+
+from __future__ import annotations
+
+import re
+
+from ..inputs.settings import shorten
+
+PLACES = ("position", "ball", "probe", "point")
+PLACE = re.compile(r"\{([^{}]*)\}")
+
+
+def check_rule(rule: str) -> str:
+    """A rule as it is.
+
+    :raises ValueError: it has no ball, or a place that there is not or that is there twice.
+    """
+    found = PLACE.findall(rule)
+    unknown = [name for name in found if name not in PLACES]
+    if unknown or "{" in PLACE.sub("", rule) or "}" in PLACE.sub("", rule):
+        told = f'"{shorten(unknown[0])}"' if unknown else "a brace without its other one"
+        raise ValueError(f"{told} in a rule of names; known: {', '.join(PLACES)}, in braces")
+    if "ball" not in found or len(set(found)) < len(found):
+        raise ValueError(f'"{shorten(rule)}" needs {{ball}}, and each place at most once')
+    if "point" in found and not rule.endswith("{point}"):
+        raise ValueError(f'"{shorten(rule)}": {{point}} comes last')
+    return rule

@@ -1,0 +1,164 @@
+"""Every sample of a laboratory's export fits by one command, and to the estimates of the plain
+table of the same readings.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from functools import cache
+from pathlib import Path
+from shutil import copy
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from ballplate.cli import main
+from scipy.spatial.distance import pdist
+
+FOLDER = Path(__file__).parent / "samples"
+CAMPAIGN = FOLDER / "campaign.yaml"
+ROWS = list(csv.DictReader((FOLDER / "index.csv").read_text(encoding="utf-8").splitlines()))
+# What a table does not say of itself.
+OPTIONS = {
+    "centres.csv": ["--coordinates", "ball centres"],
+    "part.csv": ["--coordinates", "part"],
+    "swapped.csv": ["--swap-names"],
+}
+# Largest difference in standard uncertainties, 1e-4 else. Part co-ordinates do not tell the pose;
+# centres of points, good to 0.00018 µm, are compared with readings good to 0.3 µm: five of these.
+WITHIN = {"part.csv": 0.05, "dmis_points.dmo": 5 * 0.00018 / 0.3}
+
+
+@cache
+def plain(name: str) -> dict[str, dict[str, float]]:
+    return dict(bp.fit(CAMPAIGN, FOLDER / name).to_dict()["estimates"])
+
+
+def fitted(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[Any, str]:
+    capsys.readouterr()
+    status = main(["fit", *arguments, "--json"])
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    return json.loads(out)["estimates"], err
+
+
+def largest_difference(found: Any, expected: dict[str, dict[str, float]]) -> float:
+    """Of values, in standard uncertainties."""
+    assert found.keys() == expected.keys() and len(found) > 30
+    return max(
+        abs(one["value"] - expected[name]["value"]) / expected[name]["standard_uncertainty"]
+        for name, one in found.items()
+    )
+
+
+def split(estimates: Any) -> tuple[Any, Any]:
+    """The machine's estimates, and the co-ordinates of balls (n, 3)."""
+    places = [
+        one["value"] for name, one in estimates.items() if re.fullmatch("r[1-4]c[1-4]: [xyz]", name)
+    ]
+    machine = {name: one for name, one in estimates.items() if ":" not in name}
+    return machine, np.reshape(places, (16, 3))
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["file"])
+def test_an_export_fits_by_one_command(
+    row: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = FOLDER / row["file"]
+    files = sorted(map(str, path.iterdir())) if path.is_dir() else [str(path)]
+    options = OPTIONS.get(row["file"], [])
+    found, told = fitted([str(CAMPAIGN), *files, *options], capsys)
+    expected = plain(row["plain"])
+    if row["coordinates"] == "part":
+        # Where the plate stood is not in them: the machine's errors and the plate's shape are.
+        found, apart = split(found)
+        expected, there = split(expected)
+        assert np.abs(pdist(apart) - pdist(there)).max() < 1e-9
+    assert largest_difference(found, expected) <= WITHIN.get(row["file"], 1e-4)
+    if path.suffix in (".dmo", ".qif") or path.name.startswith(("pcdmis", "calypso")):
+        assert "taken: 112 " in told and "left: " in told
+        assert "co-ordinates are taken for ball centres, as reports have them" in told
+
+
+def test_an_experiment_names_its_reports(tmp_path: Path) -> None:
+    """From Python, without any argument; and a table beside a report, if both are centres."""
+    told = yaml.safe_load(CAMPAIGN.read_text(encoding="utf-8"))
+    copy(FOLDER / "qif_3_0.qif", tmp_path)
+    (tmp_path / "one.yaml").write_text(
+        yaml.safe_dump(told | {"readings": {"files": "qif_3_0.qif"}}), encoding="utf-8"
+    )
+    found = bp.fit(tmp_path / "one.yaml").to_dict()["estimates"]
+    assert largest_difference(found, plain("plain/mm6.csv")) <= 1e-4
+    # The first position is in a report, all others in a table of centres.
+    lines = (FOLDER / "dmis_mm.dmo").read_text(encoding="utf-8").splitlines(keepends=True)
+    until = next(k for k, line in enumerate(lines) if "P2_R1C1" in line)
+    (tmp_path / "first.dmo").write_text("".join(lines[:until]), encoding="utf-8")
+    table = pd.read_csv(FOLDER / "centres.csv")
+    table[table["position"] != "P1"].to_csv(tmp_path / "rest.csv", index=False)
+    both = [tmp_path / "first.dmo", tmp_path / "rest.csv"]
+    with pytest.raises(bp.ExperimentError, match="a table beside reports .* state what all"):
+        bp.fit(CAMPAIGN, both)
+    found = bp.fit(CAMPAIGN, both, coordinates="ball centres").to_dict()["estimates"]
+    assert largest_difference(found, plain("plain/mm5.csv")) <= 1e-4
+
+
+def test_the_rule_of_names_in_a_report_can_be_stated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (FOLDER / "qif_3_0.qif").read_text(encoding="utf-8")
+    names = {
+        f"{position} {ball} {probe}": f"{probe}+{ball}@{position}, one"
+        for position, ball, probe in pd.read_csv(FOLDER / "plain" / "mm6.csv")[
+            ["position", "ball", "probe"]
+        ].itertuples(index=False)
+    }
+    for name, other in names.items():
+        text = text.replace(f">{name}<", f">{other}<")
+    path = tmp_path / "other.qif"
+    path.write_text(text, encoding="utf-8")
+    assert main(["fit", str(CAMPAIGN), str(path)]) == 3
+    assert "state the rule with --name" in capsys.readouterr().err
+    rule = "{probe}+{ball}@{position}, one"
+    found, _ = fitted([str(CAMPAIGN), str(path), "--name", rule], capsys)
+    assert largest_difference(found, plain("plain/mm6.csv")) <= 1e-4
+    assert bp.fit(CAMPAIGN, path, names=rule).converged
+    with pytest.raises(bp.ExperimentError, match=r"readings.names: .* needs \{ball\}"):
+        bp.fit(CAMPAIGN, path, names="{position}")
+
+
+def test_what_reports_say_of_co_ordinates_is_not_contradicted() -> None:
+    with pytest.raises(bp.ExperimentError, match="scale readings are stated; state ball centres"):
+        bp.fit(CAMPAIGN, FOLDER / "dmis_mm.dmo", coordinates="scale readings")
+    # Who names columns says that it is a table.
+    with pytest.raises(bp.ExperimentError, match='no column "Kugel"'):
+        bp.fit(CAMPAIGN, FOLDER / "calypso_fet.txt", columns={"ball": "Kugel"})
+
+
+def test_names_are_swapped_only_where_asked_and_only_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(bp.ExperimentError, match="swap the names of the balls in lines 54 and 55"):
+        bp.fit(CAMPAIGN, FOLDER / "swapped.csv")
+    swapped = bp.fit(CAMPAIGN, FOLDER / "swapped.csv", swap_names=True)
+    told = [one for one in swapped.remarks if "swapped" in one]
+    assert told == [
+        "the names of balls r2c2 and r2c1 in position P3 were swapped (lines 54 and 55)"
+    ]
+    right = bp.fit(CAMPAIGN, FOLDER / "plain" / "mm5.csv", swap_names=True)
+    assert not [one for one in right.remarks if "swapped" in one]
+    # A ball that has the name of another, which was not read itself, stays wrong.
+    table = pd.read_csv(FOLDER / "swapped.csv").drop(index=53)
+    with pytest.raises(bp.ExperimentError, match="is where ball .* should be; correct its name"):
+        bp.fit(CAMPAIGN, table, swap_names=True)
+    # Many exchanges of neighbours in one position, each of which is told.
+    table = pd.read_csv(FOLDER / "plain" / "mm5.csv")
+    rows = np.flatnonzero(table["position"] == "P2")[:6]
+    names = table["ball"].to_numpy().copy()
+    names[rows] = names[rows[[1, 0, 3, 2, 5, 4]]]
+    found = bp.fit(CAMPAIGN, table.assign(ball=names), swap_names=True)
+    assert len([one for one in found.remarks if "swapped" in one]) == 3
+    difference = largest_difference(found.to_dict()["estimates"], plain("plain/mm5.csv"))
+    assert difference <= 1e-9

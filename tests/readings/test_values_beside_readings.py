@@ -1,0 +1,103 @@
+"""Values of certificates in a file beside the readings: they count with whatever options, and are
+compared with one another and with the probes as those of the experiment file are.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import ballplate as bp
+import pandas as pd
+import pytest
+from ballplate.cli import main
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.readings.certificate_files import read_certificate
+
+QUICKSTART = "designs/quickstart.yaml"
+
+
+@pytest.fixture(scope="module")
+def experiment() -> bp.Experiment:
+    return bp.quickstart()
+
+
+@pytest.fixture(scope="module")
+def readings(experiment: bp.Experiment) -> pd.DataFrame:
+    return bp.simulate(experiment)
+
+
+def test_options_of_tables_do_not_undo_a_certificate(
+    readings: pd.DataFrame, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A side that is longer by 10 um is so by the estimates of both balls."""
+    table = bp.certificate(QUICKSTART)
+    table.loc[0, "value"] = f"{float(table['value'][0].split()[0]) + 0.01!r} mm"
+    table.to_csv(tmp_path / "certificate.csv", index=False)
+    readings.to_csv(tmp_path / "readings.csv", index=False)
+    found = []
+    for options in ([], ["--unit", "mm"]):
+        files = [QUICKSTART, str(tmp_path / "readings.csv")]
+        main(
+            ["fit", *files, "--certificate", str(tmp_path / "certificate.csv"), "--json", *options]
+        )
+        found.append(json.loads(capsys.readouterr().out)["estimates"])
+    assert found[0] == found[1]
+    plain = bp.fit(QUICKSTART, readings).to_dict()["estimates"]
+    assert abs(found[0]["r1c5: x"]["value"] - plain["r1c5: x"]["value"]) > 1e-6
+
+
+SIDES = ["r1c1", "r1c5", "r5c5", "r5c1"]
+
+
+def test_exact_values_of_a_file_are_compared_with_one_another(
+    experiment: bp.Experiment, readings: pd.DataFrame
+) -> None:
+    """Four sides and two diagonals of a plane square: five of them make the sixth."""
+    pairs = [[a, b] for i, a in enumerate(SIDES) for b in SIDES[:i]]
+    item = {"kind": "distances", "pairs": pairs, "standard_uncertainty": "0 um"}
+    exact = experiment.with_(calibration=[item])
+    right = pd.DataFrame(
+        {
+            "item": "calibration[0]",
+            "first": [pair[0] for pair in pairs],
+            "second": [pair[1] for pair in pairs],
+            "value": [
+                "1060.6601717798212 mm" if {a[1] == b[1], a[3] == b[3]} == {False} else "750 mm"
+                for a, b in pairs
+            ],
+        }
+    )
+    assert bp.fit(exact, readings, certificate=right).converged
+    # Both diagonals longer than those of a square: bending makes one of them shorter.
+    wrong = right.copy()
+    wrong.loc[wrong["value"].str.startswith("1060"), "value"] = "1060.67 mm"
+    with pytest.raises(ExperimentError, match="stated as exact contradict one another"):
+        bp.fit(exact, readings, certificate=wrong)
+
+
+def test_a_star_of_a_file_is_compared_with_the_offsets(
+    readings: pd.DataFrame,
+    experiment: bp.Experiment,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    star = experiment.with_(stars=[{"standard_uncertainty": "0.2 um"}])
+    right = bp.certificate(star)
+    assert not any("exchanged" in one for one in bp.fit(star, readings, certificate=right).warnings)
+    names = {"right": "back", "back": "right"}
+    of_star = right["item"] == "stars[0]"
+    wrong = right.assign(first=right["first"].where(~of_star, right["first"].replace(names)))
+    found = read_certificate(GivenText("own.csv", wrong.to_csv(index=False)), star)
+    (told,) = found.doubts
+    assert told.startswith("own.csv: stars[0]: its tips are up to ")
+    assert '"right" and "back" are exchanged' in told
+    text = Path(QUICKSTART).read_text(encoding="utf-8")
+    (tmp_path / "star.yaml").write_text(f"{text}\nstars: [{{standard_uncertainty: 0.2 um}}]\n")
+    wrong.to_csv(tmp_path / "wrong.csv", index=False)
+    readings.to_csv(tmp_path / "readings.csv", index=False)
+    files = [str(tmp_path / "star.yaml"), str(tmp_path / "readings.csv")]
+    main(["fit", *files, "--certificate", str(tmp_path / "wrong.csv"), "-q"])
+    err = capsys.readouterr().err
+    assert err.count("are exchanged") == 1 and "warning: " in err
