@@ -9,6 +9,7 @@ argument that is, and TypeError for one of another kind.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -47,7 +48,8 @@ if TYPE_CHECKING:
 
     from .error_maps.curve_result import FittedCurve
     from .error_maps.length_tables import LengthMap
-    from .error_maps.volumetric_results import Line, MachineErrors
+    from .error_maps.map_places import Line
+    from .error_maps.volumetric_results import MachineErrors
     from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
     from .planning.criteria import CriterionName
@@ -60,15 +62,19 @@ if TYPE_CHECKING:
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
     from .results.adjusted_machine import AdjustedMachine
+    from .results.budget import UncertaintyBudget
     from .results.converted_map import ConvertedMap
     from .results.correction import Correction
     from .results.differences.map_difference import MapDifference
+    from .results.error_curves_result import ErrorCurves
     from .results.fit import Fit
+    from .results.fitted_errors_result import FittedErrorMap
     from .results.imported import ReadReport
     from .results.prediction import Prediction
     from .results.validation.cross_validation import CrossValidation
     from .results.validation.ladder_result import Ladder
     from .results.validation.left_out_result import Validation
+    from .simulator.machines.protocol import Array
     from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings.observed_readings import ObservedReadings
 
@@ -657,6 +663,29 @@ def diff(
     )
 
 
+def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:
+    """What each source contributes to U4, U6, the body diagonals and the measuring tasks of the
+    design of an experiment, or of a fit.
+
+    `by` splits the readings by axis, probe, position or artefact; as they are by default, they are
+    one source. Contributions add in squares.
+
+    >>> budget(quickstart())
+    <UncertaintyBudget of quickstart: readings 75 % of the variance of U6>
+    >>> budget(fit(quickstart(), simulate(quickstart())), by="probe").sources[0]
+    'readings with down'
+    """
+    from .results.budget import budget as budget_of
+    from .results.fit import Fit
+
+    ensure_one_of(GROUPINGS, by=by)
+    if isinstance(given, Fit):
+        if given.experiment is None:
+            raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
+        return budget_of(given.experiment, given, by)
+    return budget_of(_experiment(given), None, by)
+
+
 def compare(
     experiment: Experiment | PathLike,
     estimator: EstimatorName = "distances",
@@ -889,37 +918,107 @@ def lengths(
 
 
 def map(
-    machine: PathLike,
+    machine: PathLike | FittedMap,
     grid: Sequence[int] | None = None,
     line: str | Line | None = None,
     error: str | None = None,
-    points: int | None = None,
-) -> MachineErrors:
-    """Volumetric errors of a machine file: on a grid over the volume, along a line of so many
+    points: int | PathLike | pandas.DataFrame | Sequence[Sequence[float]] | None = None,
+    *,
+    plane: str | Mapping[str, float] | None = None,
+    probe: str | None = None,
+    draw: int | None = None,
+    seed: int = 1,
+    budget: bool = False,
+    tasks: Experiment | PathLike | None = None,
+) -> MachineErrors | FittedErrorMap | ErrorCurves:
+    """Volumetric errors of a machine file, or of the map that a fit left behind, with expanded
+    uncertainties: on a grid over the volume, in a plane, along a line of so many points, at given
     points, or one parametric error along its axis.
 
     `line` is a text as in `ballplate map --line`, the places in metres of the two fixed
-    axes, or two points.
+    axes, or two points; `plane` the place of the axis across it. `points` is their number along a
+    line; or a table of points, as for the command; or their co-ordinates (m, d) in metres. Of a map
+    `probe` is the name of the probe, and the lengths of the measuring `tasks` of an experiment are
+    told, too. With `draw`, so many realisations of the random part, or of
+    what the covariance of a map leaves open, are drawn from a `seed`. With `budget` the result
+    shows what each parametric error contributes, which its `budget` has in any case.
 
     >>> map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
     <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
+    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
+    array([[2.2e-07, 1.9e-07, 1.7e-07]])
     """
-    from .error_maps.volumetric_errors import MOST_POINTS
-    from .error_maps.volumetric_results import machine_errors, parse_places
+    import numpy as np
 
-    ensure_path("machine", machine)
+    from .error_maps.map_places import PlacesAsked, parse_places, parse_plane
+    from .error_maps.realisations import MOST_DRAWS, Draws
+    from .error_maps.volumetric_errors import MOST_POINTS
+    from .results.any_map import map_errors
+    from .simulator.maps.fitted_map import FittedMap
+
+    if not isinstance(machine, FittedMap):
+        ensure_path("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
-    ensure_whole(2, MOST_POINTS, points=points)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(bool, "True or False", budget=budget)
+    ensure_whole(1, MOST_DRAWS, draw=draw)
+    ensure_whole(0, seed=seed)
     counts = None
     if grid is not None:
-        if len(several := _several("grid", grid)) != 3:
+        counts = _several("grid", grid)
+        if len(counts) not in (2, 3):
             raise ValueError(f"grid={grid!r}; give three numbers of points, such as (5, 5, 5)")
-        ensure_whole(2, MOST_POINTS, **{f"grid[{k}]": count for k, count in enumerate(several)})
-        if (count := several[0] * several[1] * several[2]) > MOST_POINTS:
+        ensure_whole(2, MOST_POINTS, **{f"grid[{k}]": count for k, count in enumerate(counts)})
+        if (count := math.prod(counts)) > MOST_POINTS:
             raise ValueError(f"{count} points are too many; at most {MOST_POINTS} are possible")
-        counts = several[0], several[1], several[2]
-    places = parse_places(line) if isinstance(line, str) else line
-    return machine_errors(Path(machine), counts, places, error, points)
+    number: int | None = None
+    at: Path | GivenText | Array | None = None
+    if isinstance(points, int) or points is None:
+        ensure_whole(2, MOST_POINTS, points=points)
+        number = points
+    elif isinstance(points, str | os.PathLike) or hasattr(points, "to_csv"):
+        at = _table("points", points)
+    else:
+        at = given = np.asarray(points, float)
+        if given.ndim != 2 or not np.isfinite(given).all():
+            raise ValueError(f"points of shape {given.shape}; give finite numbers in metres (m, d)")
+    asked = PlacesAsked(
+        counts,
+        parse_places(line) if isinstance(line, str) else line,
+        parse_plane(plane) if isinstance(plane, str) else plane,
+        number,
+        at,
+    )
+    source = machine if isinstance(machine, FittedMap) else Path(machine)
+    draws = None if draw is None else Draws(draw, seed)
+    chosen = () if tasks is None else (_experiment(tasks),)
+    return map_errors(source, asked, error, probe, draws, budget, chosen)
+
+
+def curves(
+    fitted: FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
+) -> ErrorCurves:
+    """The error functions of a map at so many positions along each line, or some of them, with
+    their expanded uncertainties; squareness errors as angles, and other numbers of its model.
+
+    `fitted` is what `to_map()` of a fit gives, or the path of a map file.
+
+    >>> curves(fit(quickstart(), simulate(quickstart())).to_map())
+    <ErrorCurves of map: 18 error functions, 3 squareness errors>
+    """
+    from .results.any_map import map_of_source
+    from .results.error_curves_result import error_curves
+    from .simulator.maps.fitted_map import FittedMap
+
+    if not isinstance(fitted, FittedMap):
+        ensure_path("fitted", fitted)
+        fitted = Path(fitted)
+    ensure_whole(2, 10_000, points=points)
+    names = (errors,) if isinstance(errors, str) else tuple(errors)
+    for name in names:
+        ensure_type(str, "the name of a parametric error, such as EXX", errors=name)
+    return error_curves(*map_of_source(fitted), names, points)
 
 
 def load_map(path: PathLike) -> FittedMap:

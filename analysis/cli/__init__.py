@@ -22,9 +22,9 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *("check", "run", "plan", "sheet", "next", "reach", "lengths", "reliability", "simulate"),
-    *("import", "fit", "ladder", "validate", "certificate"),
-    *("correct", "convert", "diff", "adjust", "compare"),
+    *("check", "run", "budget", "plan", "sheet", "next", "reach", "lengths", "reliability"),
+    *("simulate", "import", "fit", "ladder", "validate", "certificate"),
+    *("correct", "curves", "convert", "diff", "adjust", "compare"),
     *("sweep", "export", "report", "map"),
     *("spline", "reproduce", "schema", "init"),
 )

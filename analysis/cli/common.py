@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .outputs import PICTURE, add_output
+from .outputs import PICTURE, UsageError, Writer, add_output, write
 from .telling import tell_notes, warn
 
 if TYPE_CHECKING:
@@ -163,6 +163,17 @@ def _picture(text: str) -> Path:
     if Path(text).suffix.lower() not in PICTURES:
         raise ArgumentTypeError(f'a picture\'s name ends in {", ".join(PICTURES)}, unlike "{text}"')
     return Path(text)
+
+
+def write_picture(options: Namespace, draw: Writer) -> None:
+    """Write the picture that the options name.
+
+    :raises UsageError: there is nothing to be drawn.
+    """
+    try:
+        write(options, {options.plot: draw})
+    except ValueError as error:
+        raise UsageError(f"--plot: {error}") from None
 
 
 def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.machines.arrangement import AXES
 from ballplate.simulator.machines.curves import Points
 from ballplate.simulator.machines.description import (
@@ -27,21 +28,14 @@ from ballplate.simulator.machines.kinematic import KinematicModel, error_functio
 from ballplate.simulator.machines.protocol import Array, TrueMachine
 from ballplate.simulator.machines.volumetric import VolumetricModel, squareness_field, thermal_field
 
+from .map_places import MapPlaces
+from .realisations import Draws, Realisations
+
 # Points of a grid or a line: each takes half a kilobyte.
 MOST_POINTS = 200_000
 
 # Points along an axis at which a parametric error is told.
 ALONG = 101
-
-DIAGONALS: tuple[tuple[tuple[int, int, int], tuple[int, int, int]], ...] = (
-    ((0, 0, 0), (1, 1, 1)),
-    ((1, 0, 0), (0, 1, 1)),
-    ((0, 1, 0), (1, 0, 1)),
-    ((0, 0, 1), (1, 1, 0)),
-)
-"""The four body diagonals as the document numbers them: lower (0) or upper (1) end of each axis,
-from and to.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +72,11 @@ class Volumetric:
     """A machine with what its errors are computed by, made once."""
 
     machine: MachineDescription
+
+    @property
+    def volume(self) -> Volume:
+        """The measuring volume."""
+        return Volume(np.array(self.machine.lower), np.array(self.machine.upper))
 
     @cached_property
     def truth(self) -> TrueMachine:
@@ -166,14 +165,9 @@ class Volumetric:
         the two, also of a function that has the same position at both. Squareness and temperature
         are wrong alike at both.
         """
-        difference = ends - starts
-        nominal = np.linalg.norm(difference, axis=1)
-        moved = self.systematic(ends) - self.systematic(starts)
-        direction = difference / nominal[:, None]
-        # |d + m| - |d| without the difference of two long lengths.
-        error = (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1)) / (
-            np.linalg.norm(difference + moved, axis=1) + nominal
-        )
+        nominal = np.linalg.norm(ends - starts, axis=1)
+        direction = (ends - starts) / nominal[:, None]
+        error = length_errors(starts, ends, self.systematic(ends) - self.systematic(starts))
         drawn_first, lasting_first = self.random_roots(starts)
         drawn_last, lasting_last = self.random_roots(ends)
         along = [
@@ -183,32 +177,41 @@ class Volumetric:
         deviation = np.sqrt(sum((one**2).sum(axis=1) for one in along))
         return LengthErrors(starts, ends, nominal, error, np.asarray(deviation))
 
-    def diagonals(self) -> LengthErrors:
-        """Length errors of the four body diagonals."""
-        ends = np.array([self.machine.lower, self.machine.upper])
-        starts, stops = (
-            np.array([[ends[one[way][k], k] for k in range(3)] for one in DIAGONALS])
-            for way in (0, 1)
+
+def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
+    """What distances (m,) between points (m, d) are longer where the ends have `moved` (m, d)
+    against the starts.
+    """
+    difference = ends - starts
+    # |d + m| - |d| without the difference of two long lengths.
+    return np.asarray(
+        (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1))
+        / (np.linalg.norm(difference + moved, axis=1) + np.linalg.norm(difference, axis=1))
+    )
+
+
+def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> Realisations:
+    """Errors with a random part that is drawn: of what lasts once for all points, of what each
+    approach draws at each point, and at both ends of a length, anew.
+    """
+    draws.ensure_possible(places.points)
+    (drawn, lasting), (first, at_start), (last, at_end) = (
+        built.random_roots(one) for one in (places.points, places.starts, places.ends)
+    )
+    (steady, *anew) = draws.normal(
+        lasting.shape[2:], *((len(one), one.shape[2]) for one in (drawn, first, last))
+    )
+
+    def moved(approach: Array, constant: Array, normal: Array) -> Array:
+        return np.einsum("mik,nmk->nmi", approach, normal) + np.einsum(
+            "mik,nk->nmi", constant, steady
         )
-        return self.lengths(starts, stops)
 
-    def grid(self, counts: tuple[int, int, int]) -> Array:
-        """Points (m, 3) of a grid over the volume, z changing fastest."""
-        ends = zip(self.machine.lower, self.machine.upper, counts, strict=True)
-        sides = [np.linspace(low, high, count) for low, high, count in ends]
-        return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-
-    def parallel(self, at: dict[str, float]) -> tuple[Array, Array]:
-        """Ends (3,) of the line along the axis that has no position in `at`."""
-        ends = np.array([self.machine.lower, self.machine.upper])
-        for name, value in at.items():
-            ends[:, AXES.index(name)] = value
-        return ends[0], ends[1]
-
-
-def between(start: Array, end: Array, count: int) -> Array:
-    """Points (count, 3), evenly spaced from start to end."""
-    return np.asarray(np.linspace(start, end, count))
+    errors = built.systematic(places.points) + moved(drawn, lasting, anew[0])
+    starts = built.systematic(places.starts) + moved(first, at_start, anew[1])
+    ends = built.systematic(places.ends) + moved(last, at_end, anew[2])
+    lengths = [length_errors(places.starts, places.ends, one) for one in ends - starts]
+    return Realisations(draws, errors, np.array(lengths).reshape(draws.count, -1))
 
 
 def _at(deviation: float | Points, positions: Array) -> Array:

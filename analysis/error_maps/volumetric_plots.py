@@ -55,7 +55,7 @@ MOST_MARKS = 60
 def magnification_of(errors: VolumetricErrors) -> float:
     """A round factor that makes the largest error well visible in the volume."""
     size = float(np.linalg.norm(np.ptp(errors.points, axis=0)))
-    largest = float(errors.resultant.max())
+    largest = float(np.nanmax(errors.resultant))
     return round_number(LARGEST * size / largest) if largest else 1.0
 
 
@@ -88,7 +88,7 @@ def draw_grid(
                 _face(axes, moved.take(side, axis) @ view.T, SERIES[0], 1.1, is_near)
         size = volume.size
         drawn = np.concatenate([volume.edges.reshape(-1, 2), moved.reshape(-1, 3) @ view.T])
-        low, high = drawn.min(axis=0), drawn.max(axis=0)
+        low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
         middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
         for k, corner in enumerate(diagonals.starts @ view.T):
             x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
@@ -127,9 +127,16 @@ def _spread(count: int, most: int) -> Integers:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
-def draw_line(found: VolumetricErrors, path: str | Path | None = None) -> Figure:
-    """A picture of the errors along a line: components, resultant, and twice the random part about
-    them; it is written to the path, if there is one.
+def draw_line(
+    found: VolumetricErrors,
+    path: str | Path | None = None,
+    factor: float = 2.0,
+    band: str = "2 standard deviations",
+    what: str = "error",
+) -> Figure:
+    """A picture of the errors along a line: components, resultant, and a `factor` times the random
+    part about them, as `band` says, with `what` they are; it is written to the path, if there is
+    one.
 
     :raises OSError: the file cannot be written.
     """
@@ -138,24 +145,19 @@ def draw_line(found: VolumetricErrors, path: str | Path | None = None) -> Figure
     if len(moving) == 1:
         axis = int(moving[0])
         name, positions = "xyz"[axis], 1e3 * found.points[:, axis]
-        where = ", ".join(f"{'xyz'[k]} = {start[k]:.6g} mm" for k in range(3) if k != axis)
+        others = [k for k in range(len(start)) if k != axis]
+        where = ", ".join(f"{'xyz'[k]} = {start[k] + 0.0:.6g} mm" for k in others)
         along = f"along {name} at {where}"
     else:
         name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
-        ends = [f"({', '.join(f'{value:.6g}' for value in point)})" for point in (start, end)]
+        ends = [f"({', '.join(f'{v + 0.0:.6g}' for v in point)})" for point in (start, end)]
         where = along = f"from {ends[0]} to {ends[1]} mm"
     with drawing(320.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 320.0 - BELOW - ABOVE)
         axes.set_title(where, loc="left", pad=TITLE_PAD)
-        for k, letter in enumerate("XYZ"):
-            _band(
-                axes,
-                positions,
-                1e6 * found.systematic[:, k],
-                1e6 * found.deviation[:, k],
-                k,
-                letter,
-            )
+        for k, letter in enumerate("XYZ"[: len(start)]):
+            values, half = 1e6 * found.systematic[:, k], 1e6 * factor * found.deviation[:, k]
+            _band(axes, positions, values, half, k, letter)
         axes.plot(
             positions,
             1e6 * found.resultant,
@@ -164,9 +166,9 @@ def draw_line(found: VolumetricErrors, path: str | Path | None = None) -> Figure
             linestyle=DASHES[3],
             label="resultant",
         )
-        _band_in_legend(axes, bool(found.deviation.any()))
-        _finish(axes, f"{name}, mm", "error, µm")
-        worst = int(comparable(found.resultant).argmax())
+        _band_in_legend(axes, bool(found.deviation.any()), band)
+        _finish(axes, f"{name}, mm", f"{what}, µm")
+        worst = int(comparable(np.nan_to_num(found.resultant)).argmax())
         told = (
             f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
             f" {positions[worst]:.6g} mm"
@@ -189,7 +191,7 @@ def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
         values = np.zeros(len(positions)) if along.values is None else 1e6 * along.values
         deviation = np.zeros(len(positions)) if along.deviation is None else 1e6 * along.deviation
         label = "random part alone" if along.values is None else "at the reference point"
-        _band(axes, positions, values, deviation, 0, label, mark=False)
+        _band(axes, positions, values, 2.0 * deviation, 0, label, mark=False)
         if (
             along.stated is not None
             and along.values is not None
@@ -222,9 +224,9 @@ def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
 
 
 def _band(
-    axes: Axes, x: Array, values: Array, deviation: Array, k: int, label: str, mark: bool = True
+    axes: Axes, x: Array, values: Array, half: Array, k: int, label: str, mark: bool = True
 ) -> None:
-    """A curve, and twice its standard deviation on either side."""
+    """A curve, and a band of `half` its width on either side."""
     marker = MARKERS[k] if mark and len(x) <= MOST_MARKS else ""
     axes.plot(
         x,
@@ -238,20 +240,18 @@ def _band(
         clip_on=not marker,
         zorder=3,
     )
-    if deviation.any():
-        low, high = values - 2.0 * deviation, values + 2.0 * deviation
+    if half.any():
+        low, high = values - half, values + half
         axes.fill_between(x, low, high, color=SERIES[k], alpha=0.1, linewidth=0)
         # Where bands overlap their edges tell whose they are.
         for edge in (low, high):
             axes.plot(x, edge, color=SERIES[k], linewidth=0.7, linestyle=DASHES[k])
 
 
-def _band_in_legend(axes: Axes, is_drawn: bool) -> None:
+def _band_in_legend(axes: Axes, is_drawn: bool, words: str = "2 standard deviations") -> None:
     """An entry for the bands of all colours."""
     if is_drawn:
-        axes.fill_between(
-            [], [], [], color=MUTED, alpha=0.3, linewidth=0, label="± 2 standard deviations"
-        )
+        axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label=f"± {words}")
 
 
 def _finish(axes: Axes, x: str, y: str) -> None:

@@ -4,25 +4,32 @@ along its axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from ballplate.simulator.experiment.error_tables import parse_line, parse_point
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import Message
 from ballplate.simulator.machines.volumetric import meaning
 
+from ..presentation.formatting import as_data
 from ..presentation.result import Result
+from ..presentation.scene import box_edges, projection
+from ..presentation.vectors import Vectors, draw_vectors
+from .fitted_tables import realisation_lines
+from .map_places import MapPlaces, PlacesAsked, map_places
+from .part_budget import PartBudget, machine_budget
+from .part_tables import budget_data, budget_lines
+from .realisations import Draws, Realisations
 from .volumetric_errors import (
     AlongAxis,
     LengthErrors,
     Volumetric,
     VolumetricErrors,
     along_axes,
-    between,
+    drawn_machine_errors,
 )
 from .volumetric_plots import draw_along, draw_grid, draw_line
 from .volumetric_tables import (
@@ -43,9 +50,6 @@ from .volumetric_tables import (
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-# Points along each axis of the volume, and along a line, unless told.
-GRID, POINTS = (5, 5, 5), 21
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,14 +85,59 @@ class MachineErrors(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorsAtPoints(MachineErrors):
-    """Volumetric errors at points: `errors`, and the errors of `lengths` between some of them."""
+    """Volumetric errors at `places`: `errors` at its points, and the errors of its `lengths`.
 
+    `realisations` of the random part are drawn where they were asked for, and `with_budget` says
+    whether the contributions of the parametric errors are shown.
+    """
+
+    places: MapPlaces
     errors: VolumetricErrors
     lengths: LengthErrors
+    realisations: Realisations | None = None
+    with_budget: bool = False
 
     def headline(self) -> str:
         largest = 1e6 * float(self.errors.resultant.max())
         return f"{len(self.errors.points)} points, resultant {largest:.4g} µm at most"
+
+    @cached_property
+    def budget(self) -> tuple[PartBudget, ...]:
+        """What each parametric error contributes: to the errors at the points, and to each of the
+        lengths.
+        """
+        return machine_budget(self.machine, self.places)
+
+    def more_lines(self) -> list[str]:
+        """Realisations and budget as lines of text, where they were asked for."""
+        lines = []
+        if self.realisations is not None:
+            lines += ["", *realisation_lines(self.realisations, self.places.names)]
+        if self.with_budget:
+            lines += ["", *budget_lines(self.budget, correlated=False)]
+        return lines
+
+    def more_data(self) -> dict[str, Any]:
+        """Realisations and budget as plain data, where they were asked for."""
+        found: dict[str, Any] = {}
+        if self.realisations is not None:
+            found["realisations"] = self.realisations.to_dict()
+        if self.with_budget:
+            found["budget"] = as_data(budget_data(self.budget))
+        return found
+
+    def lines(self) -> list[str]:
+        diagonals = diagonal_lines(self.lengths)
+        points = error_lines(self.errors)
+        return [*machine_lines(self.machine), "", *diagonals, "", *points, *self.more_lines()]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            **machine_data(self.machine),
+            "diagonals": diagonal_data(self.lengths),
+            self.places.kind: error_data(self.errors),
+            **self.more_data(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each point, in metres."""
@@ -105,23 +154,24 @@ class ErrorsAtPoints(MachineErrors):
     def point_lines(self) -> Iterator[str]:
         return error_csv(self.errors)
 
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The errors as vectors, magnified, seen from the front and above."""
+        view, towards = projection(3)
+        volume, found = self.machine.volume, self.errors
+        edges = box_edges(volume.lower, volume.upper, towards)[0]
+        vectors = Vectors("", found.points @ view.T, found.systematic @ view.T)
+        return draw_vectors((vectors,), self.title, path, edges @ view.T, "errors")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VolumetricMap(ErrorsAtPoints):
-    """Errors on a grid of `counts` points along the axes, and of the four body diagonals."""
+    """Errors on a grid over the volume, and of the four body diagonals."""
 
-    counts: tuple[int, int, int]
-
-    def lines(self) -> list[str]:
-        diagonals = diagonal_lines(self.lengths)
-        return [*machine_lines(self.machine), "", *diagonals, "", *error_lines(self.errors)]
-
-    def to_dict(self) -> dict[str, Any]:
-        return {
-            **machine_data(self.machine),
-            "diagonals": diagonal_data(self.lengths),
-            "grid": error_data(self.errors),
-        }
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Numbers of points along the axes."""
+        x, y, z = self.places.counts
+        return x, y, z
 
     def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
         """The outside of the grid, nominal and displaced by its magnified errors."""
@@ -133,13 +183,14 @@ class ErrorsOnLine(ErrorsAtPoints):
     """Errors along a line, and that of its length."""
 
     def lines(self) -> list[str]:
-        return [*error_lines(self.errors), length_line(self.lengths)]
+        return [*error_lines(self.errors), length_line(self.lengths), *self.more_lines()]
 
     def to_dict(self) -> dict[str, Any]:
         return {
             **machine_data(self.machine),
             "length": length_data(self.lengths)[0],
             "line": error_data(self.errors),
+            **self.more_data(),
         }
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -176,49 +227,18 @@ class ErrorAlongAxis(MachineErrors):
         return draw_along(self.along, path)
 
 
-Line = Mapping[str, float] | Sequence[Sequence[float]]
-"""The places in metres of the two fixed axes, by their names, or two points."""
-
-
-def parse_places(text: str) -> Line:
-    """A line that is written as on the command line.
-
-    :raises ValueError: written otherwise.
-
-    >>> parse_places("y = 600 mm, z = 600 mm")
-    {'y': 0.6, 'z': 0.6}
-    """
-    start, to, end = text.partition(" to ")
-    if to:
-        ends = parse_point(start), parse_point(end)
-        if ends[0] == ends[1]:
-            raise ValueError("a line ends where it begins; give two points")
-        return ends
-    found = parse_line(text)
-    if len(found) != 2:
-        raise ValueError("a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm")
-    return found
-
-
 def machine_errors(
     file: Path,
-    grid: tuple[int, int, int] | None = None,
-    line: Line | None = None,
+    asked: PlacesAsked,
     error: str | None = None,
-    points: int | None = None,
+    draws: Draws | None = None,
+    with_budget: bool = False,
 ) -> MachineErrors:
-    """Errors of a machine file: on a grid over the volume, or along a line of so many points, or of
-    one parametric error.
+    """Errors of a machine file at the places asked for, or of one parametric error along its axis.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.
     """
-    given = {"grid": grid, "line": line, "error": error}
-    several = [name for name, value in given.items() if value is not None]
-    if len(several) > 1:
-        raise ValueError(f"{' and '.join(several)} do not go together; give one of them")
-    if points is not None and line is None:
-        raise ValueError("points go with a line; leave them out")
     doubts: list[Message] = []
     machine = load_machine(file, doubts)
     built = Volumetric(machine)
@@ -228,16 +248,15 @@ def machine_errors(
         if error not in every:
             raise ValueError(why_not_along(error, built, str(file)))
         return ErrorAlongAxis(*common, every[error])
-    if line is None:
-        counts = grid or GRID
-        return VolumetricMap(*common, built.errors(built.grid(counts)), built.diagonals(), counts)
-    start, end = (
-        built.parallel(dict(line)) if isinstance(line, Mapping) else np.asarray(line, float)
+    if draws is not None and not built.is_random:
+        raise ValueError("this machine has no random part; leave the realisations out")
+    places = map_places(built.volume, asked)
+    kind = {"grid": VolumetricMap, "line": ErrorsOnLine}.get(places.kind, ErrorsAtPoints)
+    return kind(
+        *common,
+        places,
+        built.errors(places.points),
+        built.lengths(places.starts, places.ends),
+        None if draws is None else drawn_machine_errors(built, places, draws),
+        with_budget,
     )
-    ends = np.stack([start, end])
-    outside = np.flatnonzero(((ends < machine.lower) | (ends > machine.upper)).any(axis=0))
-    if len(outside):
-        named = " and ".join("xyz"[k] for k in outside)
-        raise ValueError(f"the line is outside the volume in {named}")
-    errors = built.errors(between(start, end, points or POINTS))
-    return ErrorsOnLine(*common, errors, built.lengths(start[None], end[None]))

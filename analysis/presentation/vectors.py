@@ -68,9 +68,10 @@ def draw_vectors(
     title: str,
     path: str | Path | None = None,
     edges: Array | None = None,
+    what: str = "residuals",
 ) -> Figure:
-    """Residual vectors as a picture, each from the place that was read, with a bar of known length
-    below.
+    """Residuals, or `what` they are, as a picture of vectors, each from the place that was read,
+    with a bar of known length below.
 
     It is written to the path, if there is one. With `edges` (k, 2, 2) the paper shows space, and
     they are those of the volume.
@@ -134,7 +135,7 @@ def draw_vectors(
         scale_bar(axes, 1e3 * length * times, -42.0 / height, told)
         if any(group.label for group in groups):
             axes.legend(loc="upper left", bbox_to_anchor=(0.0, -48.0 / height), borderaxespad=0.0)
-        return save(figure, path, f"{title}: residuals as vectors, magnified {times:g} times")
+        return save(figure, path, f"{title}: {what} as vectors, magnified {times:g} times")
 
 
 def _named(groups: tuple[Vectors, ...]) -> list[tuple[str, Array, Array]]:

@@ -38,6 +38,21 @@ class Volume:
         return np.asarray(self.upper - self.lower)
 
     @property
+    def diagonals(self) -> tuple[Array, Array]:
+        """Starts and ends (k, d) of the body diagonals: the first from the lower corner, the others
+        from the upper end of x, y and z each; of a plane, its two diagonals.
+
+        >>> Volume(np.zeros(2), np.array([2.0, 1.0])).diagonals[0].tolist()
+        [[0.0, 0.0], [2.0, 0.0]]
+        """
+        d = len(self.lower)
+        is_upper = np.eye(d + 1, d, -1, dtype=bool)[: 2 ** (d - 1)]
+        return (
+            np.where(is_upper, self.upper, self.lower),
+            np.where(is_upper, self.lower, self.upper),
+        )
+
+    @property
     def of_readings(self) -> tuple[Array, Array]:
         """Limits (d,) of scale readings, a thousandth of the volume outside it."""
         slightly = SLIGHTLY * self.size

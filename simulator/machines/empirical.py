@@ -160,7 +160,7 @@ class EmpiricalModel:
         index = list(FUNCTIONS).index(function)
         pairs = [(one, two) for one in LEVELS for two in LEVELS]
         pairs.sort(key=lambda pair: sum(level not in (0.0, 1.0) for level in pair))
-        words, places = [], []
+        words, places, axes = [], [], []
         for pair in pairs:
             for axis in range(3):
                 others = [k for k in range(3) if k != axis]
@@ -171,8 +171,9 @@ class EmpiricalModel:
                 line = np.zeros((len(t), 3))
                 line[:, axis], line[:, others] = t, pair
                 places.append(line)
+                axes.append(axis)
         values = self._values(np.concatenate(places))[index].reshape(len(words), len(t), -1)
-        return tuple(map(Line, words, values))
+        return tuple(map(Line, words, values, axes))
 
     def reported(self) -> Reported:
         """Coefficients of monomials where the terms are polynomials, otherwise the parameters

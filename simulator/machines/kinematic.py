@@ -197,10 +197,9 @@ class KinematicModel:
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
         """The function along its axis; a squareness error is the same everywhere."""
         return tuple(
-            Line(
-                "",
-                np.ones((len(t), 1)) if isinstance(f.error, SquarenessError) else f.basis.values(t),
-            )
+            Line("", np.ones((len(t), 1)))
+            if isinstance(f.error, SquarenessError)
+            else Line("", f.basis.values(t), f.axis)
             for f in self.functions
             if f.name == function
         )

@@ -109,11 +109,13 @@ class Line:
     """Values of an error function along a line: `basis` (points, parameters of the function) times
     its parameters.
 
-    `words` names the line where a function has more than one, such as "along X".
+    `words` names the line where a function has more than one, such as "along X", and `axis` is the
+    one (0 to 2) that it runs along; None where it runs along none.
     """
 
     words: str
     basis: Array
+    axis: int | None = None
 
 
 @runtime_checkable

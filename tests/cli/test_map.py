@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.error_maps.map_places import PlacesAsked, map_places
 from ballplate.error_maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
 
@@ -90,10 +91,12 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("map", BRIDGE, "--grid", "3,2,2", "--json") == 0
     found = json.loads(capsys.readouterr().out)
     built = Volumetric(load_machine(BRIDGE))
-    expected = built.errors(built.grid((3, 2, 2)))
+    expected = built.errors(map_places(built.volume, PlacesAsked((3, 2, 2))).points)
     assert [one["error"] for one in found["grid"]] == expected.systematic.tolist()
     assert [one["random"] for one in found["grid"]] == expected.deviation.tolist()
-    assert [one["error"] for one in found["diagonals"]] == built.diagonals().error.tolist()
+    assert [one["error"] for one in found["diagonals"]] == built.lengths(
+        *built.volume.diagonals
+    ).error.tolist()
     assert found["arrangement"] == "MB1" and found["parametric_errors"]["EBX"]["symbol"] == "Ey(x)"
     assert found["parametric_errors"]["ECX"] == {
         "symbol": "Ez(x)",
@@ -140,7 +143,8 @@ def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:
         [0.45, 0.575, 0.2],
         [0.0, 1.15, 0.4],
     ]
-    second = Volumetric(load_machine(BRIDGE)).diagonals()
+    built = Volumetric(load_machine(BRIDGE))
+    second = built.lengths(*built.volume.diagonals)
     assert (
         found["length"]["error"] == second.error[1]
         and found["length"]["random"] == second.deviation[1]
@@ -235,7 +239,7 @@ def test_magnification_is_round() -> None:
     from ballplate.error_maps.volumetric_plots import magnification_of
 
     built = Volumetric(load_machine(ARM))
-    found = built.errors(built.grid((3, 3, 3)))
+    found = built.errors(map_places(built.volume, PlacesAsked((3, 3, 3))).points)
     steps = [magnification_of(type(found)(found.points, factor * found.systematic, found.deviation))
              for factor in (0.5, 1.0, 2.0, 0.0)]  # fmt: skip
     assert steps == [2000, 1000, 500, 1]
@@ -257,10 +261,6 @@ def test_magnification_is_round() -> None:
             "a line ends where it begins; give two points",
         ),
         (("--line", "1 m, 1 m to 1 m, 1 m, 1 m"), "has 2 co-ordinates; give three"),
-        (
-            ("--line", "y = 600 mm"),
-            "a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm",
-        ),
         (
             ("--line", "y = 600 mm, z = 600 mm", "--points", "1"),
             "a line has 2 to 200000 points, not 1",
@@ -288,6 +288,10 @@ def test_wrong_usage(
         ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
         (("--points", "10"), "points go with a line; leave them out"),
+        (
+            ("--line", "y = 600 mm"),
+            "a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm",
+        ),
         (("--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
         (

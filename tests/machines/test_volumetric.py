@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.error_maps.volumetric_errors import Volumetric, between
+from ballplate.error_maps.map_places import PlacesAsked, map_places
+from ballplate.error_maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.curves import Points
@@ -51,7 +52,8 @@ def test_diagonals_of_scale_errors_have_their_closed_form() -> None:
         ParametricError(f"E{axis}{axis}", PowerSeries((5e-6, scale * size)))
         for axis, scale, size in zip("XYZ", scales.tolist(), SIZE.tolist(), strict=True)
     )
-    found = Volumetric(machine(errors=errors)).diagonals()
+    built = Volumetric(machine(errors=errors))
+    found = built.lengths(*built.volume.diagonals)
     expected = np.linalg.norm(SIZE * (1 + scales)) - np.linalg.norm(SIZE)
     np.testing.assert_allclose(found.error, expected, rtol=0, atol=1e-15)
     np.testing.assert_allclose(found.nominal, np.linalg.norm(SIZE), rtol=1e-15)
@@ -60,7 +62,8 @@ def test_diagonals_of_scale_errors_have_their_closed_form() -> None:
 def test_diagonals_of_squareness_have_their_closed_form() -> None:
     alpha, beta1, beta2 = 31e-6, -12e-6, 19e-6
     square = (Squareness("EC0Y", alpha), Squareness("EB0Z", -beta1), Squareness("EA0Z", beta2))
-    found = Volumetric(machine(squareness=square)).diagonals()
+    built = Volumetric(machine(squareness=square))
+    found = built.lengths(*built.volume.diagonals)
     for k, (start, end) in enumerate(
         [
             ((0, 0, 0), (1, 1, 1)),
@@ -78,7 +81,8 @@ def test_diagonals_of_squareness_have_their_closed_form() -> None:
 def test_a_square_machine_that_expands_evenly_has_no_error_but_its_scale() -> None:
     temperature = {axis: AxisTemperature(10e-6, 2.5) for axis in AXES}
     described = machine(temperature=temperature, reference=(0.3, 0.2, 0.1))
-    found = Volumetric(described).diagonals()
+    built = Volumetric(described)
+    found = built.lengths(*built.volume.diagonals)
     np.testing.assert_allclose(found.error, 25e-6 * np.linalg.norm(SIZE), rtol=0, atol=1e-15)
     np.testing.assert_allclose(
         Volumetric(described).systematic(np.array([[0.3, 0.2, 0.1]])), 0.0, atol=1e-20
@@ -94,7 +98,7 @@ def test_errors_along_a_line_have_their_closed_form() -> None:
         ParametricError("EZX", PowerSeries((1e-6, 9e-6, -8e-6))),
     )
     built = Volumetric(machine(errors=errors, probe=(0.05, 0.0, -0.2)))
-    points = between(*built.parallel({"y": 0.4, "z": 0.7}), 9)
+    points = map_places(built.volume, PlacesAsked(line={"y": 0.4, "z": 0.7}, points=9)).points
     t = np.linspace(0.0, 1.0, 9)
     pitch = 40e-6 * t**2
     expected = np.stack(

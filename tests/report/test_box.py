@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.error_maps import volumetric_plots
+from ballplate.error_maps.map_places import PlacesAsked, map_places
 from ballplate.error_maps.volumetric_errors import Volumetric
 from ballplate.presentation.svg import save
 from ballplate.simulator.experiment.machine_file import load_machine
@@ -42,8 +43,10 @@ def test_names_and_ends_of_axes_stand_apart_inside_the_picture(
 
     monkeypatch.setattr(volumetric_plots, "save", measured)
     machine = Volumetric(load_machine(path, []))
-    found = machine.errors(machine.grid((2, 2, 2)))
-    volumetric_plots.draw_grid(found, machine.diagonals(), (2, 2, 2), None, tmp_path / "grid.svg")
+    found = machine.errors(map_places(machine.volume, PlacesAsked((2, 2, 2))).points)
+    volumetric_plots.draw_grid(
+        found, machine.lengths(*machine.volume.diagonals), (2, 2, 2), None, tmp_path / "grid.svg"
+    )
     *texts, (_, whole) = drawn
     assert sorted(text for text, _ in texts) == sorted(
         ["x, mm", "y, mm", "z, mm", "0", "0", "0", "800", "600", str(height)]

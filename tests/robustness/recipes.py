@@ -117,6 +117,11 @@ RECIPES = (
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
     "map gec-like.yaml --error EXX --format csv",
     "map gec-like.yaml --grid 2,2,2 --plot out.svg --magnification 1000",
+    "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
+    "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
+    "map map.yaml --points to-correct.csv --format csv",
+    "curves map.yaml --plot out.svg",
+    "curves map.npz --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
     "spline curve.csv --evaluate '10 mm, 50 mm' --coefficients out.csv --powers global",
     (
@@ -134,6 +139,8 @@ RECIPES = (
     "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
     "schema sweep",
+    "budget small.yaml --by position",
+    "budget tables.yaml tables-readings.csv --certificate tables-certificate.csv --json",
     "init out.yaml",
     "init --machine out.yaml",
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,12 +26,32 @@ class ObservationGroup:
     rows: Integers
 
 
-def groups_of(design: Design, by: Grouping) -> tuple[ObservationGroup, ...]:
-    """All whitened rows of a design in groups: readings of plates by axis, probe, position or
-    artefact, or as one, and all other observations by kind and artefact.
+def kinds_of_rows(design: Design, one: Observations) -> list[str]:
+    """The group of each row of observations, by their kind and artefact.
 
     Values that influence quantities have by the same statement are a group, as what is stated of
     them is the variance that these values have.
+    """
+    if isinstance(one, Priors):
+        parameters = design.influence_parameters
+        return [
+            "priors" if k < 0 else parameters[k].component or "influence quantities"
+            for k in one.of_influence.tolist()
+        ]
+    count = one.count(design)
+    if isinstance(one, Lengths) or not one.balls.shape[1]:
+        return [f"{one.word}s"] * count
+    artefacts = design.balls.artefact[one.balls[:, 0]].tolist()
+    return [f"{one.word}s of {design.artefacts.names[k]}" for k in artefacts]
+
+
+def groups_of(
+    design: Design,
+    by: Grouping,
+    names_of: Callable[[Design, Observations], list[str]] = kinds_of_rows,
+) -> tuple[ObservationGroup, ...]:
+    """All whitened rows of a design in groups: readings of plates by axis, probe, position or
+    artefact, or as one, and all other observations by the names of their rows.
     """
     d, readings = design.dimension, design.readings.select(design.plate_readings)
     words, member = {
@@ -59,26 +79,11 @@ def groups_of(design: Design, by: Grouping) -> tuple[ObservationGroup, ...]:
     places = row_places(design)
     for one in design.observations:
         start = places[one.word].start
-        names = _names(design, one)
+        names = names_of(design, one)
         for name in dict.fromkeys(names):
             rows = np.flatnonzero([own == name for own in names])
             found.append(ObservationGroup(name, start + rows))
     return tuple(group for group in found if len(group.rows))
-
-
-def _names(design: Design, one: Observations) -> list[str]:
-    """The group of each row of a kind of observations."""
-    if isinstance(one, Priors):
-        parameters = design.influence_parameters
-        return [
-            "priors" if k < 0 else parameters[k].component or "influence quantities"
-            for k in one.of_influence.tolist()
-        ]
-    count = one.count(design)
-    if isinstance(one, Lengths) or not one.balls.shape[1]:
-        return [f"{one.word}s"] * count
-    artefacts = design.balls.artefact[one.balls[:, 0]].tolist()
-    return [f"{one.word}s of {design.artefacts.names[k]}" for k in artefacts]
 
 
 def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array) -> Design:

@@ -1,0 +1,165 @@
+"""Error functions of a fitted machine along their axes, squareness errors, and other numbers, with
+their uncertainties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.machines.error_names import SQUARENESS_ERRORS, SquarenessError
+from ballplate.simulator.machines.protocol import Array, HasLines, Unit
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+# Positions along each line.
+POSITIONS = 41
+
+OF_MODEL = "a parameter of the model"
+OF_ENDS = "from the ends of the volume's edges at its lower corner"
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionCurve:
+    """An error function along a line: `values` and standard `uncertainties` (m,) in `unit` at
+    `positions` (m,) in metres, of the `axis` that it runs along; NaN where undetermined.
+
+    Without an axis positions are fractions of the line, which `line` names where there are
+    several.
+    """
+
+    name: str
+    meaning: str
+    unit: Unit
+    line: str
+    axis: int | None
+    positions: Array
+    values: Array
+    uncertainties: Array
+
+    @property
+    def is_undetermined(self) -> bool:
+        """Whether nothing is known of it but where the frame holds it at zero."""
+        return not (self.uncertainties > 0.0).any() and bool(np.isnan(self.uncertainties).any())
+
+
+@dataclass(frozen=True)
+class EstimatedNumber:
+    """An error that is a single number in `unit`, with its standard uncertainty; NaN where
+    undetermined. `source` says what it is taken from.
+    """
+
+    name: str
+    meaning: str
+    unit: Unit
+    value: float
+    standard_uncertainty: float
+    source: str = OF_MODEL
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorFunctions:
+    """All error functions of a map, its squareness errors, and its other numbers."""
+
+    curves: tuple[FunctionCurve, ...]
+    squareness: tuple[EstimatedNumber, ...]
+    numbers: tuple[EstimatedNumber, ...]
+
+
+@single_threaded
+def error_functions(
+    fitted: FittedMap, names: Collection[str] = (), positions: int = POSITIONS
+) -> ErrorFunctions:
+    """The error functions of a map at so many positions, or those with some names.
+
+    :raises ValueError: there is none of a name.
+    """
+    curves: list[FunctionCurve] = []
+    numbers: list[EstimatedNumber] = []
+    functions = dict.fromkeys(one.function for one in fitted.model.parameters)
+    for name in functions:
+        own_curves = list(_curves(fitted, name, positions))
+        curves += own_curves
+        numbers += [] if own_curves else _numbers(fitted, name)
+    own = {one.name for one in numbers}
+    square = [one for one in numbers if one.name in SQUARENESS_ERRORS]
+    square += [one for one in _by_ends(fitted) if one.name not in own]
+    others = [one for one in numbers if one.name not in SQUARENESS_ERRORS]
+    known = [*functions, *(one.name for one in square), *(one.name for one in others)]
+    for name in names:
+        if name not in known:
+            raise ValueError(f'the map has no error "{name}"; {hint(name, dict.fromkeys(known))}')
+
+    def chosen(some: Sequence[EstimatedNumber]) -> tuple[EstimatedNumber, ...]:
+        return tuple(one for one in some if not names or one.name in names)
+
+    return ErrorFunctions(
+        tuple(one for one in curves if not names or one.name in names),
+        chosen(square),
+        chosen(others),
+    )
+
+
+def _columns(fitted: FittedMap, name: str) -> list[int]:
+    return [k for k, one in enumerate(fitted.model.parameters) if one.function == name]
+
+
+def _curves(fitted: FittedMap, name: str, positions: int) -> Iterator[FunctionCurve]:
+    """The function along its lines; none where it is a single number."""
+    model, t = fitted.model, np.linspace(0.0, 1.0, positions)
+    if not isinstance(model, HasLines) or name in SQUARENESS_ERRORS:
+        return
+    columns = _columns(fitted, name)
+    parameter = model.parameters[columns[0]]
+    lower, size = fitted.volume.lower, fitted.volume.size
+    for line in model.lines(name, t):
+        if not np.ptp(line.basis, axis=0).any():
+            continue
+        rows = np.zeros((len(t), len(fitted.scale)))
+        rows[:, columns] = line.basis
+        u = fitted.standard_uncertainties(rows)
+        values = np.where(np.isnan(u), np.nan, rows[:, columns] @ fitted.values[columns])
+        where = t if line.axis is None else lower[line.axis] + t * size[line.axis]
+        told = name, parameter.meaning, parameter.unit, line.words, line.axis
+        yield FunctionCurve(*told, where, values, u)
+
+
+def _numbers(fitted: FittedMap, name: str) -> Iterator[EstimatedNumber]:
+    """The parameters of a function that is no curve."""
+    for k in _columns(fitted, name):
+        one = fitted.model.parameters[k]
+        u = float(fitted.standard_uncertainties(np.eye(len(fitted.scale))[k]))
+        value = float("nan") if np.isnan(u) else float(fitted.values[k])
+        yield EstimatedNumber(one.name, one.meaning, one.unit, value, u)
+
+
+def _by_ends(fitted: FittedMap) -> Iterator[EstimatedNumber]:
+    """Squareness errors from the straight lines through the ends of two edges, with the tip at the
+    machine's own point; those that the model holds at zero are left out.
+    """
+    volume, d = fitted.volume, fitted.dimension
+    for one in SQUARENESS_ERRORS.values():
+        if d == 2 and not one.in_plane:
+            continue
+        points = np.tile(volume.lower, (3, 1))
+        points[1, one.axis], points[2, one.to] = volume.upper[one.axis], volume.upper[one.to]
+        none = np.zeros_like(points)
+        value = _angle(one, fitted.model.error(points, fitted.values, none), volume.size)
+        rows = np.zeros((2, len(fitted.scale)))
+        for row, a in zip(rows, (fitted.values, np.zeros_like(fitted.values)), strict=True):
+            slopes = fitted.model.jacobian(points, a, none)
+            row[: len(a)] = _angle(one, slopes, volume.size)
+        u = float(fitted.standard_uncertainties(*rows))
+        if np.isnan(u):
+            yield EstimatedNumber(one.name, one.meaning, "rad", np.nan, np.nan, OF_ENDS)
+        elif u > 0.0 or value:
+            yield EstimatedNumber(one.name, one.meaning, "rad", float(value), u, OF_ENDS)
+
+
+def _angle(one: SquarenessError, errors: Array, size: Array) -> Array:
+    """The turn of an axis, from errors (3, d, ...) at the corner and at the ends of both edges."""
+    of_axis = (errors[1, one.to] - errors[0, one.to]) / size[one.axis]
+    of_other = (errors[2, one.axis] - errors[0, one.axis]) / size[one.to]
+    return np.asarray(one.sign * (of_axis + of_other))

@@ -1,0 +1,165 @@
+"""Errors of a fitted machine with their uncertainties: at points, and of the lengths between some.
+
+An error is where the tip is, less where the scales say: the correction to be added to a reading,
+opposite in sign to the error of indication. The offset of the probe is not part of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.maps.corrected_points import (
+    POINTS_AT_ONCE,
+    corrected,
+    drawn_rows,
+    probe_indices,
+    tips,
+)
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+from .map_places import MapPlaces
+from .realisations import Draws, Realisations, symmetric_root
+from .volumetric_errors import length_errors
+
+# Indices (m,) of probes, or of the one of all points.
+Probed = Integers | int
+
+
+@dataclass(frozen=True, eq=False)
+class FittedErrors:
+    """Estimated errors (m, d) where the axes stand at `points` (m, d), with standard
+    `uncertainties` (m, d), in metres; both are NaN where undetermined.
+    """
+
+    points: Array
+    errors: Array
+    uncertainties: Array
+
+    @property
+    def resultant(self) -> Array:
+        """Length (m,) of the error, NaN where some co-ordinate is undetermined."""
+        return np.asarray(np.linalg.norm(self.errors, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class FittedLengths:
+    """Errors (m,) of distances from `starts` to `ends` (m, d): true distances less those that the
+    scales say, in metres, with standard `uncertainties` (m,); both are NaN where undetermined.
+    """
+
+    starts: Array
+    ends: Array
+    nominal: Array
+    errors: Array
+    uncertainties: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorRows:
+    """Derivatives (..., b) of functions by all that a map holds; `drawn`, those on a machine
+    without errors, tell what is undetermined, None where nothing is.
+    """
+
+    rows: Array
+    drawn: Array | None
+
+    def uncertainties(self, fitted: FittedMap) -> Array:
+        """Standard uncertainties (...), NaN where undetermined."""
+        return fitted.standard_uncertainties(self.rows, self.drawn)
+
+
+def rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRows:
+    """Derivatives (m, d, b) of errors at points (m, d) with probes of indices (m,), or of one."""
+    columns = fitted.offset_columns[probe_indices(fitted, len(points), probes)]
+    which, axis = np.nonzero(columns >= 0)
+    _, rows = corrected(fitted, points, probes)
+    drawn = drawn_rows(fitted, points, probes)
+    for one in (rows,) if drawn is None else (rows, drawn):
+        # The offset itself is no error of the machine; what the rotations make of it is.
+        one[which, axis, columns[which, axis]] -= 1.0
+    return ErrorRows(rows, drawn)
+
+
+def errors_of(fitted: FittedMap, points: Array, probes: Probed) -> Array:
+    """Estimated errors (m, d) at points (m, d), also of what is undetermined."""
+    offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
+    return np.asarray(fitted.model.error(points, fitted.values, offsets) - offsets)
+
+
+@single_threaded
+def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> FittedErrors:
+    """Errors at points (m, d), in metres, with probes of indices (m,), or of one."""
+    uncertainties = np.zeros(points.shape)
+    for start in range(0, len(points), POINTS_AT_ONCE):
+        some = slice(start, start + POINTS_AT_ONCE)
+        found = rows_of_errors(fitted, points[some], _part(probes, some))
+        uncertainties[some] = found.uncertainties(fitted)
+    errors = np.where(np.isnan(uncertainties), np.nan, errors_of(fitted, points, probes))
+    return FittedErrors(points, errors, uncertainties)
+
+
+@single_threaded
+def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> FittedLengths:
+    """Errors of the lengths of places, both ends with the probe of an index unless they have their
+    own. Lengths are those between the tips; where these are by the scales, offsets are as stated.
+    """
+    first, last = (tips(fitted, *end) for end in length_ends(places, probe))
+    corrected_ends = [corrected(fitted, *end)[0] for end in length_ends(places, probe)]
+    moved = corrected_ends[1] - last - (corrected_ends[0] - first)
+    uncertainties = length_rows(fitted, places, probe).uncertainties(fitted)
+    errors = np.where(np.isnan(uncertainties), np.nan, length_errors(first, last, moved))
+    nominal = np.linalg.norm(last - first, axis=1)
+    return FittedLengths(places.starts, places.ends, nominal, errors, uncertainties)
+
+
+def length_ends(places: MapPlaces, probe: int) -> tuple[tuple[Array, Integers], ...]:
+    """Starts and ends (k, d) of lengths, each with the indices (k,) of their probes."""
+    probes = places.length_probes
+    if probes is None:
+        probes = np.full((len(places.starts), 2), probe)
+    return (places.starts, probes[:, 0]), (places.ends, probes[:, 1])
+
+
+def length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> ErrorRows:
+    """Derivatives (k, b) of lengths."""
+    first, last = length_ends(places, probe)
+    apart = tips(fitted, *last) - tips(fitted, *first)
+    direction = apart / np.linalg.norm(apart, axis=1)[:, None]
+
+    def along(start: Array, end: Array) -> Array:
+        return np.asarray(np.einsum("md,mdb->mb", direction, end - start))
+
+    rows = along(corrected(fitted, *first)[1], corrected(fitted, *last)[1])
+    at_first, at_last = drawn_rows(fitted, *first), drawn_rows(fitted, *last)
+    if at_first is None or at_last is None:
+        return ErrorRows(rows, None)
+    return ErrorRows(rows, along(at_first, at_last))
+
+
+def _part(probes: Probed, some: slice) -> Probed:
+    return probes if isinstance(probes, int) else probes[some]
+
+
+@single_threaded
+def drawn_errors(
+    fitted: FittedMap, places: MapPlaces, draws: Draws, probes: Probed, probe: int
+) -> Realisations:
+    """Errors at points and of lengths of machines that the readings may come from: what the
+    covariance leaves open is drawn, once for all points of a machine.
+    """
+    draws.ensure_possible(places.points)
+    (normal,) = draws.normal((len(fitted.scale),))
+    deviations = normal @ symmetric_root(fitted.covariance, fitted.scale).T
+    points = places.points
+    errors = np.zeros((draws.count, *points.shape))
+    for start in range(0, len(points), POINTS_AT_ONCE):
+        some = slice(start, start + POINTS_AT_ONCE)
+        found = rows_of_errors(fitted, points[some], _part(probes, some))
+        errors[:, some] = np.tensordot(deviations, found.rows, axes=(1, 2))
+    errors += fitted_errors(fitted, points, probes).errors
+    lengths = fitted_lengths(fitted, places, probe).errors
+    rows = length_rows(fitted, places, probe).rows
+    return Realisations(draws, errors, lengths + deviations @ rows.T)

@@ -1,0 +1,306 @@
+"""The uncertainty budget of a design or a fit: what each source contributes to uncertainties."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.estimation.functions import (
+    Coordinates,
+    Distances,
+    MeasuredPoints,
+    linear_functions,
+)
+from ballplate.simulator.estimation.linearisation import LinearFunctions, Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from ..presentation.formatting import aligned, finite, number
+from ..presentation.result import Result
+from ..uncertainty.quantities import evaluation_points, task_distances
+from ..uncertainty.tasks import expansion
+from .adjustments import few_degrees_of_freedom
+from .fit import Fit
+from .source_sums import SourceSums, source_sums, sources_of
+from .variance_components.groupings import Grouping
+
+# Evaluation points of which all distances are looked at; of more, some are chosen evenly.
+MOST_PLACES = 200
+
+# Figures side by side in a table of text.
+SIDE_BY_SIDE = 6
+
+
+@dataclass(frozen=True)
+class BudgetFigure:
+    """An uncertainty with the `contributions` of all sources to it, which add in squares; metres.
+
+    Of several functions, as U6 is of many distances, it is the root mean square of those that are
+    determined; `undetermined` of the `count` are not. NaN where none is.
+    """
+
+    name: str
+    description: str
+    standard_uncertainty: float
+    contributions: tuple[float, ...]
+    count: int = 1
+    undetermined: int = 0
+
+
+@dataclass(frozen=True, repr=False)
+class UncertaintyBudget(Result):
+    """What the `sources` of uncertainty contribute to `figures`, standard uncertainties in metres.
+
+    `sigma` has multiplied all stated uncertainties; `coverage_factor` is that of expanded ones.
+    `of_fit` tells whether it is that of a fit, or what a design will achieve.
+    """
+
+    label: str
+    title: str
+    sources: tuple[str, ...]
+    figures: tuple[BudgetFigure, ...]
+    coverage_factor: float
+    sigma: float = 1.0
+    of_fit: bool = False
+    caution: str = ""
+
+    def headline(self) -> str:
+        known = [one for one in self.figures if one.standard_uncertainty > 0.0]
+        if not known:
+            return f"{len(self.sources)} sources, nothing is determined"
+        chosen = next((one for one in known if one.name == "U6"), known[0])
+        most = int(np.argmax(chosen.contributions))
+        return f"{self.sources[most]} {_share(chosen, most)} of the variance of {chosen.name}"
+
+    def lines(self) -> list[str]:
+        of = "the fit" if self.of_fit else "the design, at zero machine error"
+        lines = [f"{self.label}: {self.title}", f"uncertainty budget of {of}", ""]
+        for start in range(0, len(self.figures), SIDE_BY_SIDE):
+            lines += [*self._table(self.figures[start : start + SIDE_BY_SIDE]), ""]
+        lines += [f"{one.name}: {_words(one)}" for one in self.figures]
+        return lines
+
+    def _table(self, figures: Sequence[BudgetFigure]) -> list[str]:
+        rows = [["standard uncertainty, µm", *(one.name for one in figures)]]
+        for k, source in enumerate(self.sources):
+            rows.append([source, *(_cell(one, k) for one in figures)])
+        rows.append(["together, in squares", *(_micrometres(one, 1.0) for one in figures)])
+        expanded = f"expanded, k = {self.coverage_factor:g}"
+        rows.append([expanded, *(_micrometres(one, self.coverage_factor) for one in figures)])
+        return aligned(rows, [False, *[True] * len(figures)])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each source and figure, in metres."""
+        return [
+            {
+                "figure": one.name,
+                "source": source,
+                "standard uncertainty": contribution,
+                "share of variance": _ratio(one, k),
+                "unit": "m",
+            }
+            for one in self.figures
+            for k, (source, contribution) in enumerate(
+                zip(self.sources, one.contributions, strict=True)
+            )
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "of": "fit" if self.of_fit else "design",
+            "sigma": self.sigma,
+            "coverage_factor": self.coverage_factor,
+            "figures": [
+                {
+                    "figure": one.name,
+                    "description": one.description,
+                    "standard_uncertainty": finite(one.standard_uncertainty),
+                    "expanded_uncertainty": finite(self.coverage_factor * one.standard_uncertainty),
+                    "unit": "m",
+                    "count": one.count,
+                    "undetermined": one.undetermined,
+                    "contributions": [
+                        {
+                            "source": source,
+                            "standard_uncertainty": finite(one.contributions[k]),
+                            "share_of_variance": finite(_ratio(one, k)),
+                        }
+                        for k, source in enumerate(self.sources)
+                    ],
+                }
+                for one in self.figures
+            ],
+            "warnings": [self.caution] if self.caution else [],
+        }
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (f"warning: {self.caution}",) if self.caution else ()
+
+
+def _ratio(one: BudgetFigure, k: int) -> float:
+    """The share of a source in the variance; NaN where there is none."""
+    if not one.standard_uncertainty > 0.0:
+        return float("nan")
+    return (one.contributions[k] / one.standard_uncertainty) ** 2
+
+
+def _share(one: BudgetFigure, k: int) -> str:
+    percentage = 100.0 * _ratio(one, k)
+    return f"{percentage:.0f} %" if percentage >= 0.95 else f"{percentage:.1g} %"
+
+
+def _cell(one: BudgetFigure, k: int) -> str:
+    if not one.standard_uncertainty > 0.0:
+        return "undetermined" if np.isnan(one.standard_uncertainty) else "0"
+    return f"{number(1e6 * one.contributions[k], 3)} ({_share(one, k)})"
+
+
+def _micrometres(one: BudgetFigure, factor: float) -> str:
+    u = factor * one.standard_uncertainty
+    return "undetermined" if np.isnan(u) else number(1e6 * u)
+
+
+def _words(one: BudgetFigure) -> str:
+    if not one.undetermined or one.count == one.undetermined:
+        return one.description
+    return f"{one.description}; {one.undetermined} of {one.count} are undetermined and left out"
+
+
+@single_threaded
+def budget(
+    experiment: Experiment, fit: Fit | None = None, by: Grouping = "calibration"
+) -> UncertaintyBudget:
+    """The uncertainty budget of an experiment's design or, with its `fit`, of that.
+
+    `by` tells how readings are grouped: all as one source by default.
+
+    :raises ValueError: the fit has not converged.
+    """
+    at, x = (
+        (linearise(lay_out(experiment)), None)
+        if fit is None
+        else (fit.functions.at, fit.observed.x)
+    )
+    sigma = 1.0 if fit is None else fit.sigma
+    sums = source_sums(at, x, sources_of(at.design, experiment, by))
+    caution = ""
+    if fit is not None and fit.sigma_is_estimated:
+        remedy = "--sigma given takes the uncertainties as stated"
+        caution = few_degrees_of_freedom(fit.degrees_of_freedom, "sigma", remedy)
+    return UncertaintyBudget(
+        experiment.label,
+        experiment.title,
+        sums.names,
+        tuple(_figures(at, sums, sigma)),
+        expansion(experiment.coverage_factor),
+        sigma,
+        fit is not None,
+        caution,
+    )
+
+
+def _figures(at: Linearisation, sums: SourceSums, sigma: float) -> Iterator[BudgetFigure]:
+    design, places = at.design, evaluation_points(at.design)
+    every = [linear_functions(at, Coordinates(places))]
+    words = "error function at the evaluation points, root mean square of its co-ordinates"
+    yield _mean_square("U4", words, at, sums, every, sigma)
+    count = len(places.points)
+    some = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int))
+    if len(some) > 1:
+        chosen = MeasuredPoints(places.points[some], places.probes[some])
+        words = "distances between corrected points, root mean square"
+        if len(some) < count:
+            words += f"; between {len(some)} of the {count} evaluation points"
+        yield _mean_square("U6", words, at, sums, _distances(at, chosen), sigma)
+    starts, ends = design.machine.volume.diagonals
+    names = tuple(f"diagonal {k + 1}" for k in range(len(starts)))
+    points = np.stack([starts, ends], axis=1).reshape(-1, design.dimension)
+    probes = np.full(len(points), design.evaluation.probe)
+    pairs = np.arange(len(points)).reshape(-1, 2)
+    diagonals = Distances(MeasuredPoints(points, probes), pairs, names)
+    words = "length of the body diagonal" if design.dimension == 3 else "length of the diagonal"
+    tasks = [(task_distances(design), "length of the measuring task")] if design.tasks.names else []
+    for given, what in [(diagonals, words), *tasks]:
+        told = [f"{what} {_ends(given, k)}" for k in range(len(given.names))]
+        yield from _each(given.names, told, at, sums, linear_functions(at, given), sigma)
+
+
+def _ends(given: Distances, k: int) -> str:
+    assert given.pairs is not None and isinstance(given.places, MeasuredPoints)
+    ends = 1e3 * given.places.points[given.pairs[k]] + 0.0
+    return "from {} to {} mm".format(*(f"({', '.join(f'{v:.6g}' for v in one)})" for one in ends))
+
+
+def _distances(at: Linearisation, places: MeasuredPoints) -> Iterator[LinearFunctions]:
+    """Distances between all places that are apart, those from one place at a time."""
+    found = linear_functions(at, Coordinates(places))
+    as_drawn = found.drawn or found
+    now, drawn = places.at(at.design, at.state), places.at(at.design, at.as_drawn.state)
+    n, d = now.shape
+    rows, of_drawn = found.shared.reshape(n, d, -1), as_drawn.shared.reshape(n, d, -1)
+
+    def along(where: Array, derivatives: Array, k: int, others: Integers) -> Array:
+        unit = where[others] - where[k]
+        unit /= np.linalg.norm(unit, axis=1)[:, None]
+        return np.asarray(np.einsum("md,mds->ms", unit, derivatives[others] - derivatives[k]))
+
+    for k in range(n - 1):
+        others = k + 1 + np.flatnonzero((drawn[k + 1 :] != drawn[k]).any(axis=1))
+        of_pairs = LinearFunctions(along(drawn, of_drawn, k, others))
+        yield LinearFunctions(along(now, rows, k, others), drawn=of_pairs)
+
+
+def _mean_square(
+    name: str,
+    description: str,
+    at: Linearisation,
+    sums: SourceSums,
+    functions: Iterable[LinearFunctions],
+    sigma: float,
+) -> BudgetFigure:
+    """The root mean square of the uncertainties of many functions that are determined."""
+    squares, total, count, undetermined = np.zeros((at.rank, at.rank)), 0.0, 0, 0
+    for some in functions:
+        values = at.uncertainty(some)
+        is_known = ~np.isnan(values)
+        roots = some.shared[is_known] @ at.shared
+        squares += roots.T @ roots
+        total += float((values[is_known] ** 2).sum())
+        count, undetermined = count + len(values), undetermined + int((~is_known).sum())
+    number_of = count - undetermined
+    shares = sums.of_sum(squares) if number_of else np.full(len(sums.names), np.nan)
+    scale = sigma / np.sqrt(max(number_of, 1))
+    return BudgetFigure(
+        name,
+        description,
+        scale * np.sqrt(total) if number_of else float("nan"),
+        tuple((scale * np.sqrt(np.maximum(shares, 0.0))).tolist()),
+        count,
+        undetermined,
+    )
+
+
+def _each(
+    names: Sequence[str],
+    descriptions: Sequence[str],
+    at: Linearisation,
+    sums: SourceSums,
+    functions: LinearFunctions,
+    sigma: float,
+) -> Iterator[BudgetFigure]:
+    """Figures of single functions."""
+    values = at.uncertainty(functions)
+    shares = sums.variances(functions.shared @ at.shared)
+    shares[:, np.isnan(values)] = np.nan
+    contributions = sigma * np.sqrt(np.maximum(shares, 0.0)).T
+    for name, words, value, own in zip(
+        names, descriptions, (sigma * values).tolist(), contributions.tolist(), strict=True
+    ):
+        yield BudgetFigure(name, words, value, tuple(own), 1, int(np.isnan(value)))

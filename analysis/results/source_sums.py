@@ -1,0 +1,154 @@
+"""Shares of the sources of uncertainty in what is estimated.
+
+An estimate is linear in the errors of all observations, which are independent of one another once
+they are whitened: a function f of the parameters has the error g Q' e with a root G of the
+covariance, g = (df/dp) G, orthonormal columns Q = J G and errors e of unit variance. A source's
+share of its variance is g S g' with the sum S of q' q over the source's rows q of Q. These sums add
+to the identity, so that the contributions of all sources add in squares to the uncertainty,
+exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design, Observations
+from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.design.observations.joint_values import JointValues
+from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.star import Stars
+from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.protocol import Array
+
+from .variance_components.groupings import Grouping
+from .variance_components.groups import ObservationGroup, groups_of, kinds_of_rows
+
+# Lengths of standards are formed of readings and compared with certificates; each row mixes both.
+READ_STANDARDS = "readings of length standards"
+
+
+@dataclass(frozen=True, eq=False)
+class SourceSums:
+    """Sums (k, r, r) over the rows of the sources `names`, which add to the identity; r is the
+    rank of the shared parameters.
+    """
+
+    names: tuple[str, ...]
+    sums: Array
+
+    def variances(self, roots: Array) -> Array:
+        """Contributions (k, m) to the variances of functions with derivatives `roots` (m, r) by
+        the standard normal variables of the shared parameters.
+        """
+        return np.stack([((roots @ one) * roots).sum(axis=1) for one in self.sums])
+
+    def of_sum(self, squares: Array) -> Array:
+        """Contributions (k,) to the sum of the variances of functions, whose roots g have the sum
+        of g' g `squares` (r, r).
+        """
+        return np.asarray((self.sums * squares).sum(axis=(1, 2)))
+
+
+@single_threaded
+def source_sums(
+    at: Linearisation, x: Array | None, sources: Sequence[ObservationGroup]
+) -> SourceSums:
+    """The sums of all sources of a linearisation with scale readings `x` (readings, d), or
+    error-free ones.
+
+    Rows of length standards become the readings' noise and the certificates, whatever sources they
+    are of.
+    """
+    rank, member = at.rank, np.full(row_count(at.design), -1)
+    for k, one in enumerate(sources):
+        member[one.rows] = k
+    lengths = row_places(at.design).get(Lengths.word, slice(0, 0))
+    of_lengths = np.zeros((lengths.stop - lengths.start, rank))
+    sums = np.zeros((len(sources), rank, rank))
+    for some in hat_rows(at, x):
+        common, own = some.common[:, :rank], member[some.rows]
+        for k in np.unique(own[own >= 0]):
+            sums[k] += common[own == k].T @ common[own == k]
+        is_length = (some.rows >= lengths.start) & (some.rows < lengths.stop)
+        of_lengths[some.rows[is_length] - lengths.start] = common[is_length]
+    names = [one.name for one in sources]
+    if len(of_lengths):
+        certified = _of_certificates(at.design, of_lengths)
+        k = int(member[lengths.start])
+        names[k] = READ_STANDARDS
+        sums[k] -= sum(certified.values())
+        names += certified
+        sums = np.concatenate([sums, *(one[None] for one in certified.values())])
+    return SourceSums(tuple(names), sums)
+
+
+def _of_certificates(design: Design, rows: Array) -> dict[str, Array]:
+    """Sums (r, r) of the certificates of each length standard, from the rows (m, r) of lengths."""
+    given = design.of(Lengths)
+    pulled = given.uncertainty[:, None] * design.once(length_whitening).pulled(rows)
+    standard = design.balls.artefact[design.readings.ball[given.first]]
+    found = {}
+    for k in np.unique(standard[given.uncertainty > 0.0]):
+        own = standard == k
+        errors = np.zeros((int(given.certificate.max()) + 1, rows.shape[1]))
+        np.add.at(errors, given.certificate[own], pulled[own])
+        found[f"certificate of {design.artefacts.names[k]}"] = errors.T @ errors
+    return found
+
+
+def sources_of(
+    design: Design, experiment: Experiment, by: Grouping = "calibration"
+) -> tuple[ObservationGroup, ...]:
+    """The sources of uncertainty of an experiment's design: the readings as variance components
+    group them, every item of calibration, stars, offsets of probes, priors by what they are about,
+    and every influence quantity.
+    """
+    return groups_of(design, by, lambda design, one: _names(design, one, experiment))
+
+
+def _names(design: Design, one: Observations, experiment: Experiment) -> list[str]:
+    """The source of each row of observations."""
+    if isinstance(one, Priors):
+        return _of_priors(design, one, experiment)
+    if isinstance(one, Stars):
+        return [f"stars[{k}]" for k in one.star.tolist()]
+    names: list[str] = []
+    for k, item in enumerate(experiment.calibration):
+        if experiment.artefacts[item.artefact].role != "plate":
+            continue
+        given = item.observed(0)
+        if isinstance(one, type(given) if item.root is None else JointValues):
+            names += [f"calibration[{k}]: {item.kind} of {item.artefact}"] * len(given)
+    others = kinds_of_rows(design, one)[len(names) :]
+    if isinstance(one, CalibratedCoordinates):
+        # What no item states is how flat artefacts that are read in their plane are taken to be.
+        others = [f"flatness of {name.removeprefix('coordinates of ')}" for name in others]
+    return names + others
+
+
+def _of_priors(design: Design, priors: Priors, experiment: Experiment) -> list[str]:
+    of_influences = [
+        f"influences[{k}]: {vars(settings)['kind']}"
+        for k, (settings, one) in enumerate(
+            zip(experiment.influences, design.influences, strict=True)
+        )
+        for parameter in one.parameters
+        if parameter.uncertainty
+    ]
+    names = []
+    for influence, probe, position in zip(
+        priors.of_influence.tolist(), priors.probe.tolist(), priors.position.tolist(), strict=True
+    ):
+        if influence >= 0:
+            names.append(of_influences[influence])
+        elif probe >= 0:
+            names.append("offsets of probes")
+        else:
+            names.append("priors of poses" if position >= 0 else "priors of the error model")
+    return names
