@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         lengths,
         load,
         load_all,
+        load_map,
         map,
         plan,
         quickstart,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         sheet,
         simulate,
         spline,
+        write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
     from .results.variance_components.groupings import GROUPINGS
@@ -55,6 +57,7 @@ __all__ = [
     "lengths",
     "load",
     "load_all",
+    "load_map",
     "map",
     "plan",
     "quickstart",
@@ -70,6 +73,7 @@ __all__ = [
     "stored",
     "sweep",
     "sweep_report",
+    "write_map",
 ]
 
 _PLACES = {

@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
+    from .simulator.maps.fitted_map import FittedMap
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -719,6 +720,40 @@ def map(
         counts = several[0], several[1], several[2]
     places = parse_places(line) if isinstance(line, str) else line
     return machine_errors(Path(machine), counts, places, error, points)
+
+
+def load_map(path: PathLike) -> FittedMap:
+    """The map of a file that a fit left behind, YAML or .npz.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = f"{folder}/map.yaml"
+    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
+    ...     load_map(path)
+    <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
+    """
+    from .simulator.experiment.map_files import read_map
+
+    ensure_path("path", path)
+    return read_map(path)
+
+
+def write_map(fitted: FittedMap, path: PathLike) -> None:
+    """Write what `to_map()` of a fit gives into a file: YAML, or arrays of NumPy where its name
+    ends in .npz. Numbers keep all their digits; a file of that name is overwritten.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), f"{folder}/map.npz")
+    ...     load_map(f"{folder}/map.npz").degrees_of_freedom
+    580
+    """
+    from .simulator.experiment import map_files
+    from .simulator.maps.fitted_map import FittedMap
+
+    ensure_type(FittedMap, "what to_map() of a fit gives", fitted=fitted)
+    ensure_path("path", path)
+    map_files.write_map(fitted, path)
 
 
 def spline(

@@ -85,6 +85,24 @@ def number(text: str, unit: str = "") -> float:
         return math.nan
 
 
+def day(text: str) -> str:
+    """Argument type: a day such as 2026-11-22."""
+    from ballplate.simulator.inputs.days import stated_day
+
+    try:
+        return stated_day(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
+
+
+def map_path(text: str) -> Path:
+    """Argument type: a map file to be written, whose name says how."""
+    path = Path(text)
+    if path.suffix.lower() not in (".yaml", ".yml", ".npz"):
+        raise ArgumentTypeError(f'the name of a map ends in .yaml or .npz, unlike "{text}"')
+    return path
+
+
 def percentage(text: str) -> float:
     """Read a percentage above zero from the command line, as a ratio."""
     value = number(text, "%")

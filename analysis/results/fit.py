@@ -36,6 +36,7 @@ from .estimates import (
     estimate_rows,
     labels,
 )
+from .map_of_fit import map_of
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -56,6 +57,8 @@ from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
     from .variance_components.components import VarianceComponents
@@ -87,7 +90,7 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated.
+    estimates had been stated. `experiment` is that which was fitted.
     """
 
     label: str
@@ -108,6 +111,7 @@ class Fit(FitResult):
     estimated: EstimatedFunctions | None = None
     variance_components: VarianceComponents | None = None
     is_reweighted: bool = False
+    experiment: Experiment | None = None
 
     @property
     def design(self) -> Design:
@@ -344,6 +348,18 @@ class Fit(FitResult):
             raise ValueError(f"{len(asked)} probes for {len(given)} points")
         probes = np.broadcast_to([names.index(name) for name in asked], len(given))
         return correct(self.functions.at, given, probes, self.sigma)
+
+    def to_map(self, date: str | None = None) -> FittedMap:
+        """What the fit found of the machine, with its covariance, to be kept in a file and used;
+        `date` is the day of the campaign, such as "2026-11-22".
+
+        :raises ValueError: the estimate has not converged, or the date is no day.
+
+        >>> import ballplate as bp
+        >>> bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
+        <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
+        """
+        return map_of(self, date)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
         """Residuals of a fit that has converged, for each position; in three dimensions as they are

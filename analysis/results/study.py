@@ -161,6 +161,7 @@ def fit(
         untested,
         functions,
         found,
+        experiment=experiment,
     )
 
 
