@@ -24,7 +24,7 @@ from .axis_tables import (
     tabulated,
     tool_chain,
 )
-from .table_formats import SENSES, Sense, StatedTable, Table, TableFormat
+from .table_formats import SENSES, Sense, StatedTable, Table, TableFormat, with_sense
 
 AXES = ("x", "y", "z")
 
@@ -56,25 +56,26 @@ def read_table_files(
     """
     stated = made.read(paths)
     meant = _sense(stated, sense, paths[0])
-    sign = 1.0 if meant == "corrections" else -1.0
     if stated.volume is not None:
         if arrangement is not None:
             text = "a table of the whole volume has no arrangement of axes; leave it out"
             raise refused(paths[0], text)
-        volume = replace(stated.volume, values=sign * stated.volume.values)
-        return ReadTable(volume, meant, stated.notes)
+        return ReadTable(with_sense(stated.volume, meant), meant, stated.notes)
     own = _arrangement(stated, made, arrangement, paths[0])
     tables = AxisTables(
         own,
         _origin(stated, made, origin, paths[0]),
-        tuple(replace(one, values=sign * one.values) for one in stated.axes),
+        stated.axes,
     )
     if arrangement is not None:
         try:
             tables = in_arrangement(tables, arrangement)
         except NotOfAxesError as error:
             raise refused(paths[0], f"cannot be told in that arrangement: {error}") from None
-    return ReadTable(tables, meant, stated.notes)
+    notes = stated.notes
+    if not made.has_rotations:
+        notes = (*notes, f"{made.name} tables have no rotations: there are none in what is read")
+    return ReadTable(with_sense(tables, meant), meant, notes)
 
 
 def _sense(stated: StatedTable, sense: Sense | None, path: Path) -> Sense:

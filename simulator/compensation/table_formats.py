@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -22,9 +22,6 @@ MEANING: Mapping[Sense, str] = {
     "corrections": "to be added to scale readings: where the tip is less where the scales say",
     "errors of indication": "what the scales say less where the tip is",
 }
-
-# Rotations and their letters come behind displacements in all tables.
-MICROMETRE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +75,15 @@ def rounded(values: Array, made: TableFormat) -> Array:
     steps = np.repeat([made.length_step, made.angle_step], 3)
     found = np.round(values / steps) * steps
     return np.asarray(found if made.has_rotations else found * (np.arange(6) < 3))
+
+
+def with_sense(table: Table, sense: Sense) -> Table:
+    """A table of corrections with the signs of a sense, or the reverse."""
+    if sense == "corrections":
+        return table
+    if isinstance(table, VolumeTable):
+        return replace(table, values=-table.values)
+    return table.changed(lambda one: -one.values)
 
 
 def stated_sense(comment: str) -> Sense | None:

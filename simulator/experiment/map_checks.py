@@ -28,7 +28,7 @@ from ..machines.settings import (
 )
 from ..maps.fitted_map import FittedMap, LeftOut, MapData
 from .machine_file import load_machine
-from .map_content import AXES, corner_corrections, checksum_of
+from .map_content import AXES, checksum_of, corner_corrections
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
 
