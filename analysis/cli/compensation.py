@@ -35,6 +35,7 @@ DESCRIPTION = (
 )
 
 
+# In one piece: one option after the other, with its help.
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "files",

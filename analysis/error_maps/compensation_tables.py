@@ -10,21 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.compensation.axis_tables import (
+from ballplate.simulator.experiment.compensation.axis_tables import (
     AxisTables,
     NotOfAxesError,
     names_of,
     tool_chain,
 )
-from ballplate.simulator.compensation.formats import FORMATS
-from ballplate.simulator.compensation.making import (
+from ballplate.simulator.experiment.compensation.formats import FORMATS
+from ballplate.simulator.experiment.compensation.making import (
     MadeTable,
     TabledMachine,
     correction,
     made_table,
 )
-from ballplate.simulator.compensation.reading import machine_files, read_table_files
-from ballplate.simulator.compensation.table_formats import (
+from ballplate.simulator.experiment.compensation.reading import machine_files, read_table_files
+from ballplate.simulator.experiment.compensation.table_formats import (
     MEANING,
     Sense,
     Table,
@@ -32,7 +32,7 @@ from ballplate.simulator.compensation.table_formats import (
     parse_arrangement,
     with_sense,
 )
-from ballplate.simulator.compensation.volume_tables import VolumeTable
+from ballplate.simulator.experiment.compensation.volume_tables import VolumeTable
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.inputs.messages import Message, refused
@@ -302,8 +302,8 @@ def of_map(fitted: FittedMap, source: object) -> tuple[TabledMachine, tuple[str,
             " measure the machine so that they are determined",
         )
     if _open_with(fitted, OFFSET * np.eye(len(lower))):
-        names = listing(_open_functions(fitted))
-        text = f"{names} are undetermined: the table is right for tools like the map's probes only"
+        named = listing(_open_functions(fitted))
+        text = f"{named} are undetermined: the table is right for tools like the map's probes only"
         return machine, (text,)
     return machine, ()
 

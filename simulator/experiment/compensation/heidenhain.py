@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..inputs.messages import ExperimentError, Message, refused
-from ..inputs.settings import listing, shorten
-from ..inputs.tables import read_number
-from ..inputs.yamltree import Mark, read_text
-from ..machines.arrangement import AXES
+from ...inputs.messages import ExperimentError, Message, refused
+from ...inputs.settings import listing, shorten
+from ...inputs.tables import read_number
+from ...inputs.yamltree import Mark, read_text
+from ...machines.arrangement import AXES
 from .axis_tables import AxisTable, AxisTables
 from .table_formats import Sense, StatedTable, Table, TableFormat
 

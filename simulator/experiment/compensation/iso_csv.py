@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..experiment.curve_files import read_curves
-from ..experiment.error_tables import LineError, parse_point
-from ..inputs.messages import ExperimentError, Message, refused
-from ..inputs.quantities import format_length
-from ..inputs.settings import listing
-from ..inputs.yamltree import Mark, read_text
-from ..machines.arrangement import AXES, Arrangement
-from ..machines.error_names import AXIS_ERRORS
+from ...inputs.messages import ExperimentError, Message, refused
+from ...inputs.quantities import format_length
+from ...inputs.settings import listing
+from ...inputs.yamltree import Mark, read_text
+from ...machines.arrangement import AXES, Arrangement
+from ...machines.error_names import AXIS_ERRORS
+from ..curve_files import read_curves
+from ..error_tables import LineError, parse_point
 from .axis_tables import AxisTable, AxisTables, Corner, names_of
 from .table_formats import (
     MEANING,

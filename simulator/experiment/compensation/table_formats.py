@@ -10,9 +10,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ..inputs.settings import listing
-from ..machines.arrangement import ARRANGEMENTS, AXES, Arrangement
-from ..machines.protocol import Array
+from ...inputs.settings import listing
+from ...machines.arrangement import ARRANGEMENTS, AXES, Arrangement
+from ...machines.protocol import Array
 from .axis_tables import AxisTable, AxisTables, Corner
 from .volume_tables import VolumeTable
 

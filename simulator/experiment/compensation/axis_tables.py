@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..machines.arrangement import Arrangement
-from ..machines.curves import Points, curves_model
-from ..machines.error_names import AXIS_ERRORS
-from ..machines.kinematic import KinematicModel, carried_vectors
-from ..machines.plane import PlaneModel
-from ..machines.protocol import Array, ErrorModel, TrueMachine
-from ..machines.volumetric import Field, VolumetricModel
+from ...machines.arrangement import Arrangement
+from ...machines.curves import Points, curves_model
+from ...machines.error_names import AXIS_ERRORS
+from ...machines.kinematic import KinematicModel, carried_vectors
+from ...machines.plane import PlaneModel
+from ...machines.protocol import Array, ErrorModel, TrueMachine
+from ...machines.volumetric import Field, VolumetricModel
 
 Corner = tuple[float, ...]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..inputs.messages import refused
-from ..machines.arrangement import ARRANGEMENTS, Arrangement
-from ..machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
-from ..machines.protocol import Array
+from ...inputs.messages import refused
+from ...machines.arrangement import ARRANGEMENTS, Arrangement
+from ...machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
+from ...machines.protocol import Array
 from .axis_tables import (
     AxisTable,
     AxisTables,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..computing.threads import single_threaded
-from ..machines.protocol import Array, ErrorModel
+from ...computing.threads import single_threaded
+from ...machines.protocol import Array, ErrorModel
 from .axis_tables import (
     AxisTable,
     AxisTables,
@@ -261,7 +261,8 @@ def _compared(
         largest = np.maximum(
             largest, [np.linalg.norm(one - one[-1], axis=1).max() for one in apart]
         )
-    return MadeTable(written, origin, *largest.tolist(), len(x) - 1)
+    interpolation, rounding, total, left_out = largest.tolist()
+    return MadeTable(written, origin, interpolation, rounding, total, left_out, len(x) - 1)
 
 
 def _places(machine: TabledMachine, table: Table, axis: int, origin: Array) -> Array:

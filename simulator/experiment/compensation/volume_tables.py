@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from ..machines.protocol import Array, ErrorModel
+from ...machines.protocol import Array, ErrorModel
 
 # Of numerical derivatives by the probe offset, in metres: errors are nearly linear in it.
 OFFSET = 0.1

@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, refused
-from ..inputs.settings import hint, listing, shorten
-from ..inputs.tables import read_number
-from ..inputs.yamltree import Mark, read_text
-from ..machines.arrangement import AXES, Arrangement
-from ..machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
-from ..machines.protocol import Array
+from ...inputs.messages import MOST_MESSAGES, ExperimentError, Message, refused
+from ...inputs.settings import hint, listing, shorten
+from ...inputs.tables import read_number
+from ...inputs.yamltree import Mark, read_text
+from ...machines.arrangement import AXES, Arrangement
+from ...machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
+from ...machines.protocol import Array
 from .axis_tables import AxisTable, names_of, tool_chain
 from .table_formats import MEANING, Sense, StatedTable, Table, TableFormat, stated_sense
 from .volume_tables import VolumeTable
@@ -79,10 +79,10 @@ def _volume_lines(table: VolumeTable) -> list[str]:
     points = np.array(list(product(*table.nodes)))
     values = table.values.reshape(-1, 6)
     if d == 2:
-        heads = ("X", "Y", "EXX", "EYX", f"EC{last}")
-        return _aligned(heads, points, values[:, [0, 1, 5]])
-    heads = ("X", "Y", "Z", "EXX", "EYX", "EZX", *(f"E{letter}{last}" for letter in "ABC"))
-    return _aligned(heads, points, values)
+        in_plane = values[:, [0, 1, 5]]
+        return _aligned(("X", "Y", "EXX", "EYX", f"EC{last}"), points, in_plane)
+    turns = (f"E{letter}{last}" for letter in "ABC")
+    return _aligned(("X", "Y", "Z", "EXX", "EYX", "EZX", *turns), points, values)
 
 
 def _aligned(heads: Sequence[str], positions: Array, values: Array) -> list[str]:
@@ -275,7 +275,7 @@ def _grid(block: _Block) -> VolumeTable:
         raise ExperimentError([block.mark.message("", "a point of the grid stands twice")])
     for name in single:
         error = AXIS_ERRORS[name]
-        values[(*places, error.component + 3 * error.is_rotation)] += block.column(name)
+        values[..., error.component + 3 * error.is_rotation][places] += block.column(name)
     return VolumeTable(nodes, values)
 
 
