@@ -103,10 +103,12 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _lengths(text: str) -> tuple[float, ...]:
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
+    from ballplate.simulator.inputs.quantities import QuantityError
+
+    from ..error_maps.compensation_tables import parse_lengths
 
     try:
-        return tuple(parse_length(part.strip()) for part in text.split(","))
+        return parse_lengths(text)
     except QuantityError as error:
         raise ArgumentTypeError(str(error)) from None
 

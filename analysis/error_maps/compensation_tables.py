@@ -36,7 +36,7 @@ from ballplate.simulator.experiment.compensation.volume_tables import VolumeTabl
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.inputs.messages import Message, refused
-from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.quantities import format_length, parse_length
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import read_text
 from ballplate.simulator.machines.arrangement import AXES
@@ -90,7 +90,7 @@ class CompensationTable(Result):
             places = np.stack(np.meshgrid(*self.table.nodes, indexing="ij"), axis=-1)
             return [
                 dict(zip(AXES, place, strict=False))
-                | {f"E{name}": value for name, value in zip(_SHORT, values, strict=True)}
+                | {name: value for name, value in zip(_PARTS, values, strict=True)}
                 for place, values in zip(
                     places.reshape(-1, self.table.dimension).tolist(),
                     self.table.values.reshape(-1, 6).tolist(),
@@ -99,7 +99,7 @@ class CompensationTable(Result):
             ]
         return [
             {"axis": AXES[one.axis], "position": position}
-            | {f"E{name}": value for name, value in zip(_SHORT, values, strict=True)}
+            | {name: value for name, value in zip(_PARTS, values, strict=True)}
             for one in self.table.axes
             for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True)
         ]
@@ -136,7 +136,7 @@ class CompensationTable(Result):
         ]
 
 
-_SHORT = ("X", "Y", "Z", "A", "B", "C")
+_PARTS = (*(f"displacement {axis}" for axis in AXES), *(f"turn about {axis}" for axis in AXES))
 
 
 def _axis_lines(table: AxisTables) -> list[str]:
@@ -334,6 +334,17 @@ def _open_functions(fitted: FittedMap) -> list[str]:
             one.function for one, is_open in zip(fitted.parameters, touched, strict=True) if is_open
         )
     )
+
+
+def parse_lengths(text: str) -> tuple[float, ...]:
+    """Lengths in metres, written with commas between them.
+
+    :raises QuantityError: one is none.
+
+    >>> parse_lengths("50 mm, 0.1 m")
+    (0.05, 0.1)
+    """
+    return tuple(parse_length(part.strip()) for part in text.split(","))
 
 
 def made_compensation(

@@ -181,7 +181,8 @@ def tool_chain(arrangement: Arrangement) -> tuple[str, ...]:
 
 
 def in_arrangement(tables: AxisTables, arrangement: Arrangement) -> AxisTables:
-    """The same errors as those of another arrangement, to first order.
+    """The same errors, at the positions of the tables and to first order, as those of another
+    arrangement.
 
     An axis that carries the workpiece turns it, and so the tip the other way beside it. The same
     may be told as the turn of an axis that carries the tip: the axis's own way is not turned then,

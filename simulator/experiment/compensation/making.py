@@ -25,7 +25,7 @@ INTERVALS = 20
 SAME = 1e-6
 MOST_NODES, MOST_GRID_NODES = 5000, 100_000
 # Places along an axis at which a table is compared with the machine, and at random besides.
-PLACES, RANDOM = 45, 4000
+PLACES, RANDOM = 33, 4000
 
 
 class CannotMakeError(ValueError):
