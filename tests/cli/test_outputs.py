@@ -103,6 +103,12 @@ WALK = {
     "map": Walk(
         {"FILE": "machine.yaml"}, {"--plot": "map.png"}, ("--grid", "2,2,2"), ("measured/exx.csv",)
     ),
+    "compensation": Walk(
+        {"FILE": "machine.yaml"},
+        {"-o": "c.csv"},
+        ("--format", "isg", "--pitch", "200 mm"),
+        ("measured/exx.csv",),
+    ),
     "spline": Walk(
         {"FILE": "points.csv"},
         {"--coefficients": "s.csv", "--plot": "s.pdf", "--whiskers": "w.svg"},
