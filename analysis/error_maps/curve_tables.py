@@ -80,9 +80,9 @@ def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) ->
         both = f"; point {', '.join(on)} there belongs to both" if on else ""
         lines.append(f"features share value and slope at {shown(boundary, x)}{both}")
     for corner in curve.corners:
-        both = [float(fitted.values(np.array([corner]), 0, side)[0]) for side in SIDES]
-        told = " and ".join(shown(one, y, 4) for one in both)
-        lines.append(f"features meet at a corner at {shown(corner, x)}, with errors {told}")
+        sides = [float(fitted.values(np.array([corner]), 0, side)[0]) for side in SIDES]
+        errors = " and ".join(shown(one, y, 4) for one in sides)
+        lines.append(f"features meet at a corner at {shown(corner, x)}, with errors {errors}")
     if len(set(points.features)) > 1 and not curve.boundaries and not curve.corners:
         names = listing(dict.fromkeys(points.features))
         lines.append(

@@ -131,7 +131,6 @@ def fit_curve(
     order = np.argsort(x, kind="stable")
     x, points = x[order], points.chosen(order.tolist())
     boundaries, corners = tuple(sorted(set(boundaries))), tuple(sorted(set(corners)))
-    knots = settings.knots
     between = tuple(sorted({*boundaries, *corners}))
     problems = [
         *_misplaced(settings, between, lower, upper),
@@ -141,20 +140,7 @@ def fit_curve(
         raise SplineError(problems)
     features = list(pairwise((lower, *between, upper)))
     lines = [features[k - 1] for k in sorted(set(settings.straight))]
-    if knots is None:
-        found = at_every(x, settings.every, lower, upper, between)
-        knots = tuple(
-            knot for knot in found if not any(start <= knot <= end for start, end in lines)
-        )
-    space = SplineSpace(
-        settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order, corners)
-    )
-    if space.count > MOST_COEFFICIENTS:
-        text = (
-            f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible,"
-            " leave out knots"
-        )
-        raise SplineError([SplineProblem(text)])
+    space = _space(settings, x, ends, boundaries, corners, lines)
     constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
     for start, end in lines:
         constraints += straight(space, start, end)
@@ -180,6 +166,36 @@ def fit_curve(
         corners,
         profile,
     )
+
+
+def _space(
+    settings: CurveSettings,
+    x: Array,
+    ends: tuple[float, float],
+    boundaries: tuple[float, ...],
+    corners: tuple[float, ...],
+    lines: Sequence[tuple[float, float]],
+) -> SplineSpace:
+    """The splines with the knots that are wanted, or at every so many of the points x (m,) that are
+    not of straight `lines`.
+
+    :raises SplineError: there are too many knots.
+    """
+    knots = settings.knots
+    if knots is None:
+        found = at_every(x, settings.every, *ends, sorted({*boundaries, *corners}))
+        knots = tuple(
+            knot for knot in found if not any(start <= knot <= end for start, end in lines)
+        )
+    every = with_boundaries(knots, boundaries, settings.order, corners)
+    space = SplineSpace(settings.order, *ends, every)
+    if space.count > MOST_COEFFICIENTS:
+        text = (
+            f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible,"
+            " leave out knots"
+        )
+        raise SplineError([SplineProblem(text)])
+    return space
 
 
 def _misplaced(

@@ -10,7 +10,7 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.machines.arrangement import AXES, Arrangement
-from ballplate.simulator.machines.curves import NAMES
+from ballplate.simulator.machines.curves import NAMES, SmoothedPoints
 from ballplate.simulator.machines.protocol import Array, Parameter
 from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
 
@@ -69,11 +69,13 @@ def _stated_as(along: AlongAxis) -> str:
     error = along.error
     if along.values is None:
         return "random"
-    form = (
-        f"table of {len(along.measured.positions)} points"
-        if along.measured is not None
-        else "polynomial"
-    )
+    form = "polynomial"
+    if along.measured is not None:
+        form = f"table of {len(along.measured.positions)} points"
+    if isinstance(along.measured, SmoothedPoints):
+        sigma = number(1e6 * along.measured.fitted.sigma, 2)
+        curve = "spline" if along.measured.knots else "polynomial"
+        form = f"{curve} fitted to the {form}, sigma {sigma} {_unit(along)}"
     if error.line is not None and not error.is_rotation:
         others = [k for k in range(3) if k != error.axis]
         form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)

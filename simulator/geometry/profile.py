@@ -136,7 +136,8 @@ class Profile:
                     found.append(self._tangents(first, last)[own])
         if len(found) != 2:
             raise NotOnProfileError
-        tangents = np.array(found) / np.abs(found)
+        tangents: Complex = np.array(found)
+        tangents /= np.abs(tangents)
         return _as_pairs(self._outward * 1j * tangents), _as_pairs(tangents)
 
     def _tangents(self, first: int, last: int) -> Complex:
