@@ -25,6 +25,7 @@ COMMANDS = (
     *("check", "run", "plan", "sheet", "reach", "lengths", "reliability", "simulate", "import"),
     *(
         "fit",
+        "correct",
         "compare",
         "sweep",
         "export",

@@ -103,6 +103,14 @@ def map_path(text: str) -> Path:
     return path
 
 
+def coverage_factor(text: str) -> float:
+    """Argument type: a coverage factor."""
+    value = number(text)
+    if not 0.0 < value <= 100.0:
+        raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
+    return value
+
+
 def percentage(text: str) -> float:
     """Read a percentage above zero from the command line, as a ratio."""
     value = number(text, "%")

@@ -141,6 +141,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
+    from ..results.correction import left_out_words
     from ..results.fit import Fit
     from .common import show, single
     from .table_options import named_sources, with_options
@@ -175,6 +176,7 @@ def run(options: Namespace) -> int:
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
         write(options, {options.output: lambda path: write_map(fitted, path)})
+        warn([left_out_words(fitted)] if fitted.left_out else [])
     show(options, result)
     warn(result.cautions)
     if result.complaint:

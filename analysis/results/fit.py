@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_type
-from ballplate.simulator.inputs.settings import hint, shorten
+from ballplate.simulator.inputs.arguments import ensure_one_of
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.reading_files import far_outside
+from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
 from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
@@ -323,30 +321,10 @@ class Fit(FitResult):
         >>> fit.correct([[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], "down").covariance.shape
         (6, 6)
         """
-        design = self.design
-        try:
-            given = np.asarray(points, float)
-        except (TypeError, ValueError):
-            words = f"numbers in metres, {design.dimension} for each point"
-            raise ValueError(f"points={shorten(repr(points))}; give {words}") from None
-        if given.ndim != 2 or given.shape[1] != design.dimension:
-            raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
-        for i, axis in np.argwhere(far_outside(given, design)).tolist():
-            told = (
-                f"{AXIS_NAMES[axis]} = {given[i, axis]:.6g} m of points[{i}] is far outside the"
-                " volume"
-            )
-            raise ValueError(f"{told}; give points in metres")
-        names = design.probes.names
-        given_probe = names[design.evaluation.probe] if probe is None else probe
-        ensure_type(Iterable, "the name of a probe, or one for each point", probe=given_probe)
-        asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
-        for name in asked:
-            if name not in names:
-                raise ValueError(f'no probe "{name}"; {hint(name, names)}')
-        if len(asked) not in (1, len(given)):
-            raise ValueError(f"{len(asked)} probes for {len(given)} points")
-        probes = np.broadcast_to([names.index(name) for name in asked], len(given))
+        design, names = self.design, self.design.probes.names
+        given = ensure_points(points, design.machine.volume)
+        asked = names[design.evaluation.probe] if probe is None else probe
+        probes = probe_places(asked, names, len(given))
         return correct(self.functions.at, given, probes, self.sigma)
 
     def to_map(self, date: str | None = None) -> FittedMap:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -129,21 +130,35 @@ def _data(observed: ObservedReadings) -> MapData:
 
 
 def _temperatures(observed: ObservedReadings, experiment: Experiment) -> dict[str, float] | None:
-    """The reference temperature, and the mean ones of scales and artefacts, where they are
-    stated.
+    """The reference temperature, and the mean ones of scales and artefacts over readings that have
+    them, or else over positions, where they are stated.
     """
     stated = [one for one in experiment.influences if isinstance(one, TemperaturesSettings)]
     if not stated:
         return None
     found = {"reference": stated[0].reference}
     beside = observed.design.readings.beside or {}
-    for word, columns, measured in (
-        ("scales", AXIS_COLUMNS + (SCALES_COLUMN,), [one.scale_temperature for one in stated]),
-        ("artefact", (ARTEFACT_COLUMN,), [one.artefact_temperature for one in stated]),
+    for word, columns in (
+        ("scales", (*AXIS_COLUMNS, SCALES_COLUMN)),
+        ("artefact", (ARTEFACT_COLUMN,)),
     ):
-        values = [beside[name] for name in columns if name in beside]
-        values = [one[np.isfinite(one)] for one in values]
-        values += [np.atleast_1d(one.value) for one in measured if one is not None and not values]
-        if sum(map(len, values)):
+        values = [one[np.isfinite(one)] for name, one in beside.items() if name in columns]
+        if not sum(map(len, values)):
+            values = [
+                np.atleast_1d(value)
+                for one in stated
+                for value in _by_position(one, word, observed.design.positions.names)
+            ]
+        if values:
             found[word] = float(np.concatenate(values).mean())
     return found
+
+
+def _by_position(stated: TemperaturesSettings, word: str, positions: Sequence[str]) -> list[Any]:
+    """Temperatures of scales or artefacts in each position, none where none are stated."""
+    measured = stated.scale_temperature if word == "scales" else stated.artefact_temperature
+    if measured is None:
+        return []
+    own = stated.positions or {}
+    of_positions = [getattr(own.get(name), word, None) for name in positions]
+    return [measured.value if one is None else one for one in of_positions]

@@ -256,7 +256,7 @@ def _check_covariance(
         return
     variances = np.diagonal(covariance)
     for k in np.flatnonzero(variances < 0.0).tolist():
-        problems.add(("covariance", k), f"ends in the variance {variances[k]!r}, below zero")
+        problems.add(("covariance", k), f"ends in the variance {float(variances[k])!r}, below zero")
     if (variances < 0.0).any():
         return
     spread = np.where(variances > 0.0, np.sqrt(variances), 1.0)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from ..geometry.ball_layouts import Name
-from ..inputs.days import stated_day
+from ..inputs.days import Day
 from ..inputs.quantities import Length
 from ..inputs.settings import NonEmpty, Settings, Text
 from ..machines.protocol import Unit
 from ..machines.settings import ErrorModelSettings
+from .schema import DRAFT, tidied
 from .sections import Line, VolumeSettings
 
 Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
-Day = Annotated[str, AfterValidator(stated_day)]
 PerAxis = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 ROW = "a text of numbers separated by blanks"
 
@@ -127,3 +127,9 @@ class MapSettings(Settings):
     checksum: Sha256 | None = Field(
         None, description="SHA-256 of what the file says; left out of a file written by hand"
     )
+
+
+def map_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a map file in YAML."""
+    found: dict[str, Any] = tidied(MapSettings.model_json_schema())
+    return {"$schema": DRAFT, **found, "title": "ballplate map"}

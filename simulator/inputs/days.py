@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 from datetime import date
+from typing import Annotated
+
+from pydantic import AfterValidator
 
 
 def parse_day(text: str) -> date:
@@ -29,3 +32,7 @@ def stated_day(text: str) -> str:
     """
     parse_day(text)
     return text
+
+
+Day = Annotated[str, AfterValidator(stated_day)]
+"""A day in a file."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..computing.threads import single_threaded
@@ -55,6 +57,13 @@ def _rows(
     return rows
 
 
+def tips(fitted: FittedMap, points: Array, probes: Integers | int | None = None) -> Array:
+    """Where the tips (n, d) are by the scales: scale readings `points` (n, d) with the offsets that
+    were stated of the probes, in metres.
+    """
+    return np.asarray(points + fitted.drawn_offsets[probe_indices(fitted, len(points), probes)])
+
+
 def probe_indices(fitted: FittedMap, count: int, probes: Integers | int | None = None) -> Integers:
     """Indices (count,) of probes, by default all of them that of the map."""
     given = fitted.probes.names.index(fitted.probe) if probes is None else probes
@@ -68,12 +77,34 @@ def corrected_with_root(
     """Corrected points (n, d) and a square root (n, d, r) of their joint covariance, in metres; NaN
     where a co-ordinate is undetermined.
     """
-    indices = probe_indices(fitted, len(points), probes)
-    places = np.zeros(points.shape)
-    root = np.zeros((*points.shape, fitted.root.shape[1]))
+    found = list(_in_parts(fitted, points, probe_indices(fitted, len(points), probes)))
+    if not found:
+        return np.zeros(points.shape), np.zeros((*points.shape, fitted.root.shape[1]))
+    places, roots = zip(*found, strict=True)
+    return np.concatenate(places), np.concatenate(roots)
+
+
+@single_threaded
+def corrected_with_blocks(
+    fitted: FittedMap, points: Array, probes: Integers | int | None = None
+) -> tuple[Array, Array]:
+    """Corrected points (n, d) and the covariance of each by itself (n, d, d), for any number of
+    points; metres, NaN where undetermined.
+    """
+    d = fitted.dimension
+    places, blocks = np.zeros(points.shape), np.zeros((len(points), d, d))
+    start = 0
+    for some, root in _in_parts(fitted, points, probe_indices(fitted, len(points), probes)):
+        part = slice(start, start + len(some))
+        places[part], blocks[part] = some, root @ root.transpose(0, 2, 1)
+        start += len(some)
+    return places, blocks
+
+
+def _in_parts(fitted: FittedMap, points: Array, indices: Integers) -> Iterator[tuple[Array, Array]]:
+    """Corrected points and roots as above, some points at a time."""
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
-        places[some], rows = corrected(fitted, points[some], indices[some])
+        places, rows = corrected(fitted, points[some], indices[some])
         drawn = drawn_rows(fitted, points[some], indices[some])
-        root[some] = fitted.function_root(rows, drawn)
-    return places, root
+        yield places, fitted.function_root(rows, drawn)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,16 @@ from tests.machines.test_custom_model import GOOD
 
 PROBES = {"down": ["0 mm", "0 mm", "-50 mm"], "right": ["50 mm", "0 mm", "0 mm"]}
 CORNERS = ({"x": "50 mm", "y": "50 mm"}, {"y": "50 mm", "z": "50 mm"}, {"z": "50 mm", "x": "50 mm"})
-PLACES = [
+PLACES: list[dict[str, Any]] = [
     {"plane": "z", "level": "100 mm", "corner": CORNERS[0], "probes": ["down"]},
     {"plane": "z", "level": "400 mm", "corner": CORNERS[0], "probes": ["down"]},
-    {"plane": "z", "level": "250 mm", "corner": CORNERS[0], "quarter_turns": 1, "probes": ["down"]},
+    {
+        "plane": "z",
+        "level": "250 mm",
+        "corner": CORNERS[0],
+        "quarter_turns": 1,
+        "probes": ["down", "right"],
+    },
     {"plane": "x", "level": "150 mm", "corner": CORNERS[1], "probes": ["right"]},
     {
         "plane": "x",
@@ -33,12 +40,13 @@ PLACES = [
         "probes": ["right"],
     },
 ]
+POSITIONS: list[dict[str, Any]] = [{"name": f"P{k}", **one} for k, one in enumerate(PLACES)]
 IN_SPACE: dict[str, Any] = {
     "title": "a plate in space",
     "machine": {"volume": ["500 mm", "500 mm", "500 mm"], "repeatability": "0.3 um"},
     "probes": PROBES,
     "artefacts": {"plate": {"kind": "square", "balls": 5, "size": "400 mm"}},
-    "positions": [{"name": f"P{k}", **place} for k, place in enumerate(PLACES)],
+    "positions": POSITIONS,
     "calibration": [{"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"}],
 }
 CORNER = {"x": "50 mm", "y": "60 mm"}
@@ -59,6 +67,10 @@ MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "spatial metric": (IN_SPACE, {"kind": "metric"}),
     "kinematic": (IN_SPACE, {"kind": "kinematic", **SMALL}),
     "table": (IN_SPACE, {"kind": "kinematic", "arrangement": "FB1", "rotations": "full", **SMALL}),
+    "deficient": (
+        IN_SPACE | {"positions": [{**one, "probes": one["probes"][:1]} for one in POSITIONS]},
+        {"kind": "kinematic", "arrangement": "FB1", "rotations": "full", **SMALL},
+    ),
     "listed axes": (
         IN_SPACE,
         {
@@ -72,7 +84,7 @@ MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "empirical": (IN_SPACE, {"kind": "empirical", "terms": "quadratic"}),
     "estimated probe": (IN_SPACE | {"probes": FREE}, {"kind": "metric"}),
     "machine file": (IN_SPACE, {"kind": "machine", "file": "machine.yaml"}),
-    "python": (IN_SPACE, {"kind": "python", "object": "own_model_of_maps:build"}),
+    "python": (IN_SPACE, {"kind": "python", "object": "MODULE:build"}),
 }
 MACHINE = """\
 title: a machine with one table and one polynomial
@@ -89,13 +101,26 @@ def write_files(folder: Path) -> None:
     """The files that some of the models rest on."""
     (folder / "machine.yaml").write_text(MACHINE)
     (folder / "exx.csv").write_text(TABLE)
-    (folder / "own_model_of_maps.py").write_text(GOOD)
+    (folder / f"{module_of(folder)}.py").write_text(GOOD)
+
+
+def module_of(folder: Path) -> str:
+    """A name that no module in another folder has."""
+    return f"own_model_{hashlib.sha256(str(folder).encode()).hexdigest()[:12]}"
+
+
+def model_of(kind: str, folder: Path) -> dict[str, Any]:
+    """Settings of a kind of model."""
+    settings = dict(MODELS[kind][1])
+    if kind == "python":
+        settings["object"] = f"{module_of(folder)}:build"
+    return settings
 
 
 def experiment_of(kind: str, folder: Path, **more: Any) -> bp.Experiment:
     """The experiment for a kind of model; `folder` is where its files are."""
-    base, model = MODELS[kind]
-    return bp.experiment({**base, "error_model": model, **more}, folder)
+    sections = {**MODELS[kind][0], "error_model": model_of(kind, folder)}
+    return bp.experiment({**sections, **more}, folder)
 
 
 @cache
