@@ -180,8 +180,6 @@ def _refuse_misused(options: Namespace) -> None:
         if getattr(options, name):
             whose = "tables that are written" if options.read else "tables that are read"
             raise UsageError(f"--{name.replace('_', '-')} is for {whose}; leave it out")
-    if options.pitch is not None and min(options.pitch) <= 0.0:
-        raise UsageError("--pitch should be above zero, such as 50 mm")
     if options.without_rotations and options.format != "heidenhain":
         raise UsageError(f"{options.format} tables have rotations; leave --without-rotations out")
     if options.output is not None:

@@ -123,7 +123,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
     try:
         normals, tangents = curve.profile.beside(place)
     except NotOnProfileError:
-        text = "the corner at {0} has a feature of one point beside it, which has no direction"
+        text = "the corner at {0} has a feature of one point beside it; give that another point"
         raise SplineError([SplineProblem(text, (corner,))]) from None
     if abs(np.linalg.det(normals)) < CORNER:
         text = "the features at {0} are nearly tangent; make it a boundary"

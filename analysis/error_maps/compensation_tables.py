@@ -370,6 +370,10 @@ def made_compensation(
             " indication, as your controller takes them"
         )
     d = machine.dimension
+    if pitch is not None and len(pitch) not in (1, d):
+        raise ValueError(f"the pitch has {len(pitch)} lengths; give one, or {d}")
+    if pitch is not None and not min(pitch) > 0.0:
+        raise ValueError("the pitch should be above zero, such as 50 mm")
     steps = None if pitch is None else np.broadcast_to(np.asarray(pitch, float), (d,))
     zero = None if origin is None else np.asarray(origin, float)
     if zero is not None and len(zero) != d:

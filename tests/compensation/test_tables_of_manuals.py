@@ -117,8 +117,9 @@ def test_heidenhain_tables_by_the_active_line_of_their_assignment(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["csv", "isg", "heidenhain"])
-@pytest.mark.parametrize("sense", ["corrections", "errors of indication"])
-@pytest.mark.parametrize("source", ["npl-like", "measured-errors"])
+@pytest.mark.parametrize(
+    ("source", "sense"), [("npl-like", "corrections"), ("measured-errors", "errors of indication")]
+)
 def test_a_written_table_becomes_a_machine_file_with_the_same_errors(
     name: str, sense: str, source: str, tmp_path: Path
 ) -> None:

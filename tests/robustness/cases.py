@@ -279,7 +279,7 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     if command == "compensation":
         # Tables of single axes, or of errors, beside what is named.
         parts = [f"{part}{end}" for part in (*AXES, *AXIS_ERRORS) for end in (".csv", ".com")]
-        written |= {path.with_name(f"{path.stem}-{part}") for path in written for part in parts}
+        written |= {one.with_name(f"{one.stem}-{p}") for one in written if one.name for p in parts}
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
     if not getattr(options, "force", True):
         allowed -= before.keys()

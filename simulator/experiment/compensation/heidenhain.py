@@ -91,7 +91,7 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     others = [name for name in active[0].cells if name not in (*LETTERS, ACTIVE, "NR")]
     notes += [f"{path}: tables of {listing(others)} are not read"] if others else []
     if [table.axis for table in axes] not in ([0, 1], [0, 1, 2]):
-        raise refused(path, "the active line names no tables of x and y, or of x, y and z")
+        raise refused(path, "the active line names no tables of x and y; add them")
     return StatedTable(tuple(axes), notes=tuple(notes))
 
 
@@ -122,7 +122,9 @@ def _axis(path: Path, axis: int) -> tuple[AxisTable, list[str]]:
     positions = found[:, 0]
     steps = np.diff(positions)
     if len(found) < 2 or steps.min() <= 0.0 or np.ptp(steps) > EVEN * steps.max():
-        text = f"{POSITION} should have two positions or more, ascending and evenly spaced"
+        text = (
+            f"{POSITION} should have two positions or more, ascending and evenly spaced; correct it"
+        )
         raise refused(path, text)
     notes = []
     if has_backlash:
@@ -157,7 +159,7 @@ def _lines(path: Path) -> Iterator[_Line]:
         elif line.strip():
             yield _Line(mark, dict(_cells(line, heads, mark)))
     if not ended:
-        raise refused(path, "[END] is missing: the file is not whole")
+        raise refused(path, "[END] is missing, the file is not whole; copy it again")
 
 
 def _cells(line: str, heads: Sequence[tuple[int, str]], mark: Mark) -> Iterator[tuple[str, str]]:

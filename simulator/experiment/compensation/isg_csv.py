@@ -115,7 +115,9 @@ def _read(paths: Sequence[Path]) -> StatedTable:
             remark = line.partition("//")[2]
             if (stated := stated_sense(remark)) is not None:
                 if sense not in (None, stated):
-                    raise refused(path, f"states {stated}, where {sense} were stated before")
+                    raise refused(
+                        path, f"states {stated}, and another file {sense}; let all say the same"
+                    )
                 sense = stated
             if match := CHAIN.match(remark):
                 names = match[1].lower()
@@ -184,7 +186,11 @@ def _wrong_names(names: Sequence[str], mark: Mark) -> list[Message]:
         f'the column "{shorten(name)}" is no linear axis and no error of one; {hint(name, known)}'
         for name in wrong
     ]
-    texts += [f"a second column {name}" for name in set(names) if names.count(name) > 1]
+    texts += [
+        f"a second column {name}; remove one of them"
+        for name in set(names)
+        if names.count(name) > 1
+    ]
     arguments = [name for name in names if name in AXES_LETTERS]
     single = [name for name in names if name in AXIS_ERRORS]
     if len(arguments) == 1 and not wrong:
@@ -213,7 +219,7 @@ def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
         order = np.argsort(block.column(block.arguments[0]), kind="stable")
         positions = block.column(block.arguments[0])[order]
         if len(positions) < 2 or (np.diff(positions) <= 0.0).any():
-            text = "needs at least two positions, each once"
+            text = "needs at least two positions, each once; correct its rows"
             raise ExperimentError([block.mark.message("", text)])
         values = np.column_stack(
             [
@@ -263,7 +269,7 @@ def _grid(block: _Block) -> VolumeTable:
         raise ExperimentError([block.mark.message("", text)])
     counts = tuple(len(one) for one in nodes)
     if min(counts) < 2 or int(np.prod(counts)) != len(block.rows):
-        text = f"{len(block.rows)} rows are no grid of {' x '.join(map(str, counts))} points"
+        text = f"{len(block.rows)} rows are no grid of {' x '.join(map(str, counts))} points; give each once"
         raise ExperimentError([block.mark.message("", text)])
     places = tuple(
         np.searchsorted(one, block.column(name)) for one, name in zip(nodes, "XYZ", strict=False)
@@ -272,7 +278,9 @@ def _grid(block: _Block) -> VolumeTable:
     seen = np.zeros(counts, bool)
     seen[places] = True
     if not seen.all():
-        raise ExperimentError([block.mark.message("", "a point of the grid stands twice")])
+        raise ExperimentError(
+            [block.mark.message("", "a point of the grid stands twice; leave one out")]
+        )
     for name in single:
         error = AXIS_ERRORS[name]
         values[..., error.component + 3 * error.is_rotation][places] += block.column(name)

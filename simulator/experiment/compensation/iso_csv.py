@@ -120,7 +120,7 @@ def _comments(path: Path) -> dict[str, Sense | Arrangement | Corner]:
             if key == "states":
                 sense = stated_sense(match[1])
                 if sense is None:
-                    raise ValueError("write corrections or errors of indication")
+                    raise ValueError("unknown sense; write corrections or errors of indication")
                 found["sense"] = sense
             elif key == "arrangement":
                 found["arrangement"] = parse_arrangement(text)

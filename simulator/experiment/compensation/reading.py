@@ -71,7 +71,9 @@ def read_table_files(
         try:
             tables = in_arrangement(tables, arrangement)
         except NotOfAxesError as error:
-            raise refused(paths[0], f"cannot be told in that arrangement: {error}") from None
+            raise refused(
+                paths[0], f"cannot be told in that arrangement: {error}; name another"
+            ) from None
     notes = stated.notes
     if not made.has_rotations:
         notes = (*notes, f"{made.name} tables have no rotations: there are none in what is read")
