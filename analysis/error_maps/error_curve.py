@@ -258,7 +258,7 @@ def _misplaced_corners(
             )
             problems.append(SplineProblem(text, (corner,)))
         if any(corner in hold.places for hold in holds):
-            text = "nothing can be prescribed at the corner at {0}, which is of two features; leave it out"
+            text = "nothing can be prescribed at the corner at {0}, of two features; leave it out"
             problems.append(SplineProblem(text, (corner,)))
     if corners and settings.period is not None:
         problems.append(SplineProblem("a periodic curve has no corners; leave them out"))

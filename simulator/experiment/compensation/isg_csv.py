@@ -269,7 +269,8 @@ def _grid(block: _Block) -> VolumeTable:
         raise ExperimentError([block.mark.message("", text)])
     counts = tuple(len(one) for one in nodes)
     if min(counts) < 2 or int(np.prod(counts)) != len(block.rows):
-        text = f"{len(block.rows)} rows are no grid of {' x '.join(map(str, counts))} points; give each once"
+        grid = " x ".join(map(str, counts))
+        text = f"{len(block.rows)} rows are no grid of {grid} points; give each point once"
         raise ExperimentError([block.mark.message("", text)])
     places = tuple(
         np.searchsorted(one, block.column(name)) for one, name in zip(nodes, "XYZ", strict=False)
