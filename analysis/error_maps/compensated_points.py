@@ -57,10 +57,15 @@ class CompensatedPoints:
         for k, name in enumerate(self.names):
             lengths = [*self.nominal[k], *self.compensated[k]]
             values = [self.errors[k], self.uncertainties[k], -self.errors[k]]
-            told = [f"{1e3 * value + 0.0:.6f}" for value in lengths]
-            told += ["" if np.isnan(value) else f"{1e6 * value + 0.0:.4f}" for value in values]
-            writer.writerow([name, *told, *(f"{value + 0.0:.9f}" for value in self.normals[k])])
+            told = [_fixed(1e3 * value, 6) for value in lengths]
+            told += ["" if np.isnan(value) else _fixed(1e6 * value, 4) for value in values]
+            writer.writerow([name, *told, *(_fixed(value, 9) for value in self.normals[k])])
         return text.getvalue()
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals; what rounds to zero has no sign."""
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
 def nominal_points(path: Path) -> tuple[tuple[str, ...], Array]:
