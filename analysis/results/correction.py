@@ -153,6 +153,11 @@ class Correction(Result):
                 f"{len(outside)} of {len(self.points)} points lie outside the volume of the map,"
                 f" where it is extrapolated and its uncertainty need not hold: {words}"
             )
+        if fitted.without_scatter:
+            found.append(
+                "the readings of the map agree with its model but for rounding, as computed ones"
+                " do: its uncertainties are zero, too, and cannot be relied on"
+            )
         if fitted.sigma_is_estimated:
             remedy = f"expanded uncertainties with k = {self.coverage_factor:g} may be too small"
             freedom = fitted.degrees_of_freedom

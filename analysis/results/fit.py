@@ -12,6 +12,7 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
@@ -68,9 +69,6 @@ REWEIGHTED = (
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
-
-# An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
-LEAST_SIGMA = 1e-6
 
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3

@@ -118,6 +118,7 @@ def _with_stated(priors: Priors, known: Integers, stated: list[InfluenceParamete
         np.append(priors.uncertainty, [one.uncertainty for one in stated]),
         np.append(np.full(len(priors), -1), known),
         None if offsets is None else np.pad(offsets, ((0, len(known)), (0, 0), (0, 0))),
+        priors.units,
     )
 
 

@@ -179,6 +179,7 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
         np.array([p.value for p in given], float),
         np.array([p.standard_uncertainty for p in given], float),
         by_offset=by_offset,
+        units=tuple(p.unit for p in given),
     )
 
 

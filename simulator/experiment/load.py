@@ -69,7 +69,9 @@ def load(
     trees = variant_trees(root, base_problems)
     if not with_modules:
         forbidden = {
-            message for tree in (root, *trees.values()) for message in refused_modules(tree)
+            message
+            for tree in (root, *trees.values())
+            for message in refused_modules(tree, source.parent)
         }
         if forbidden:
             raise ExperimentError(sorted(forbidden))

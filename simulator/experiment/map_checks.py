@@ -205,7 +205,8 @@ def _triangle(settings: MapSettings, size: int, problems: Problems) -> Array:
         return found
     for k, row in enumerate(rows):
         found[k, : k + 1] = _numbers(row, k + 1, ("covariance", k), problems)
-    return found + np.tril(found, -1).T
+        found[:k, k] = found[k, :k]
+    return found
 
 
 def _directions(settings: MapSettings, size: int, problems: Problems) -> Array:

@@ -96,7 +96,7 @@ def checksum_of(head: Mapping[str, Any], covariance: Array, undetermined: Array)
     """SHA-256 of what a file says, however it is written."""
     said = {key: value for key, value in head.items() if key not in WORDS}
     found = hashlib.sha256(json.dumps(said, sort_keys=True).encode())
-    for one in (covariance, undetermined):
+    for one in (covariance[np.tril_indices(len(covariance))], undetermined):
         found.update(repr(one.shape).encode())
         found.update(np.ascontiguousarray(one, "<f8").tobytes())
     return found.hexdigest()

@@ -39,7 +39,9 @@ def write_map(fitted: FittedMap, path: str | os.PathLike[str]) -> None:
     if target.suffix.lower() != BINARY:
         target.write_text(map_text(fitted, head), encoding="utf-8", newline="\n")
         return
-    parts = {"covariance": fitted.covariance, "undetermined": fitted.undetermined}
+    lower = np.tril(np.ones(fitted.covariance.shape, bool))
+    covariance = np.where(lower, fitted.covariance, fitted.covariance.T)
+    parts = {"covariance": covariance, "undetermined": fitted.undetermined}
     # Opened here, as NumPy would add an ending to names that have it in capitals.
     with target.open("wb") as stream:
         np.savez(stream, map=np.array(json.dumps(head)), **parts)  # type: ignore[arg-type,unused-ignore]
@@ -81,17 +83,24 @@ def read_map(path: str | os.PathLike[str]) -> FittedMap:
     """
     source = Path(path)
     refused_messages: list[Message] = []
-    if source.suffix.lower() == BINARY:
-        root, arrays = _binary(source)
-    else:
-        if read_bytes(source)[:2] == b"PK":
-            raise refused(source, "has arrays of NumPy; give it the ending .npz")
-        root, arrays = read_tree(source, refused_messages), {}
+    root, arrays = map_tree(source, refused_messages)
     problems = Problems(root)
     found = map_of_tree(root, arrays, source, problems)
     if found is None or problems.messages or refused_messages:
         raise ExperimentError(in_order(problems.messages, refused_messages, source))
     return found
+
+
+def map_tree(source: Path, minor: list[Message]) -> tuple[Node, dict[str, Array]]:
+    """What a map file says, and the arrays that it has beside that; `minor` as for `read_tree`.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    if source.suffix.lower() == BINARY:
+        return _binary(source)
+    if read_bytes(source)[:2] == b"PK":
+        raise refused(source, "has arrays of NumPy; give it the ending .npz")
+    return read_tree(source, minor), {}
 
 
 def _binary(source: Path) -> tuple[Node, dict[str, Array]]:

@@ -94,6 +94,13 @@ def resolve_map_prior(
     kept = np.concatenate([kept, len(fitted.values) + np.array(shared, np.int64)])
     drift = (settings.drift_per_year or 0.0) * years
     found = determined_combinations(marginal_of(fitted, kept), settings.inflation, drift)
+    if fitted.without_scatter or not (found[2] > 0.0).all():
+        text = (
+            "states no uncertainty, as that of readings without scatter does; use the map of real"
+            " readings"
+        )
+        problems.add(of_file, text)
+        return []
     mark = mark_of(problems.root, of_file)
     priors = []
     for k, (row, value, uncertainty) in enumerate(zip(*found, strict=True)):

@@ -14,6 +14,9 @@ from ..design.objects import Probes, Volume
 from ..geometry.motions import AXIS_NAMES
 from ..machines.protocol import Array, ErrorModel, Integers, Parameter, Unit
 
+# An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
+LEAST_SIGMA = 1e-6
+
 # Eigenvalues of correlations below this, in parts of the largest, are rounding.
 ROUNDING = 1e-13
 
@@ -88,6 +91,11 @@ class FittedMap:
     def dimension(self) -> int:
         """2 or 3, the number of machine axes."""
         return self.model.dimension
+
+    @property
+    def without_scatter(self) -> bool:
+        """Whether sigma, and with it the covariance, is zero but for rounding."""
+        return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
 
     @cached_property
     def offset_columns(self) -> Integers:

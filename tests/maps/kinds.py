@@ -45,7 +45,7 @@ IN_SPACE: dict[str, Any] = {
     "title": "a plate in space",
     "machine": {"volume": ["500 mm", "500 mm", "500 mm"], "repeatability": "0.3 um"},
     "probes": PROBES,
-    "artefacts": {"plate": {"kind": "square", "balls": 5, "size": "400 mm"}},
+    "artefacts": {"plate": {"kind": "square", "balls": 3, "size": "400 mm"}},
     "positions": POSITIONS,
     "calibration": [{"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"}],
 }
@@ -53,7 +53,7 @@ CORNER = {"x": "50 mm", "y": "60 mm"}
 IN_PLANE: dict[str, Any] = {
     "title": "a plate in a plane",
     "machine": {"volume": ["500 mm", "600 mm"], "repeatability": "0.5 um"},
-    "artefacts": {"plate": {"kind": "square", "balls": 4, "size": "400 mm"}},
+    "artefacts": {"plate": {"kind": "square", "balls": 3, "size": "400 mm"}},
     "positions": [{"name": f"Q{k}", "corner": CORNER, "quarter_turns": k} for k in range(3)],
     "calibration": [{"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"}],
 }

@@ -12,6 +12,8 @@ import pytest
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 
+from tests.maps.kinds import IN_PLANE
+
 POINTS, PAIRS = 40, 60
 # Of a normal distribution within two standard deviations.
 EXPECTED = 0.9545
@@ -30,7 +32,7 @@ def shares_covered(
         fit = bp.fit(experiment, bp.simulate(experiment, seed))
         path = folder / f"map{seed % 2}.{'yaml' if seed % 2 else 'npz'}"
         bp.write_map(fit.to_map(), path)
-        x = generator.uniform(volume.lower, volume.upper, (POINTS, 3))
+        x = generator.uniform(volume.lower, volume.upper, (POINTS, len(volume.lower)))
         pairs = generator.permuted(np.tile(np.arange(POINTS), (PAIRS, 1)), axis=1)[:, :2]
         places = x + truth.model.error(x, truth.a, np.repeat(offset, POINTS, axis=0))
         apart = places[pairs[:, 0]] - places[pairs[:, 1]]
@@ -49,10 +51,17 @@ def shares_covered(
 
 
 def test_a_few_campaigns_cover_what_they_state(tmp_path: Path) -> None:
-    experiment = bp.quickstart().with_(
-        {"error_model.position_coefficients": 3, "error_model.rotation_coefficients": 3}
+    experiment = bp.experiment(
+        IN_PLANE
+        | {
+            "error_model": {"kind": "metric", "scale": "split"},
+            "true_machine": {
+                "kind": "coefficients",
+                "values": {"alpha": "20 urad", "gamma": "-10 ppm"},
+            },
+        }
     )
-    shares = shares_covered(experiment, 12, tmp_path, with_repeatability=False)
+    shares = shares_covered(experiment, 16, tmp_path, with_repeatability=False)
     error = shares.std(ddof=1) / np.sqrt(len(shares))
     # Four standard errors of the mean over campaigns, which the lengths of one have in common.
     assert abs(shares.mean() - EXPECTED) < 4.0 * max(error, 0.01)

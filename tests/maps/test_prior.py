@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.sweeps.fingerprint import fingerprint
 
 from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files
 
@@ -77,7 +81,16 @@ def determined(fitted: FittedMap, undetermined: np.ndarray) -> tuple[np.ndarray,
     return across.T @ (fitted.estimates / fitted.scale), across.T @ covariance @ across
 
 
-KINDS = ("metric", "spatial metric", "kinematic", "empirical", "machine file", "python", "plane")
+# Cheap ones in every run.
+KINDS = [
+    "metric",
+    "plane",
+    "machine file",
+    *(
+        pytest.param(kind, marks=pytest.mark.long)
+        for kind in ("spatial metric", "kinematic", "empirical", "python")
+    ),
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -159,7 +172,7 @@ def test_plans_and_trials_know_the_map(tmp_path: Path) -> None:
     with_map = campaigns.experiment(
         "B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}]
     )
-    found = bp.run(with_map, trials=40, seed=1, workers=1)
+    found = bp.run(with_map, trials=4, seed=1, workers=1)
     assert (
         found.quantities["U6"].average
         < bp.run(campaigns.experiment("B", campaigns.second)).quantities["U6"].average
@@ -224,3 +237,55 @@ def test_a_map_of_a_plane_is_refused_in_space(tmp_path: Path) -> None:
     with pytest.raises(bp.ExperimentError, match="is of 2 axes, but machine.volume of 3"):
         in_space.fit_of_second({})
     assert len(IN_PLANE["machine"]["volume"]) == 2
+
+
+def test_a_map_without_scatter_is_no_prior(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    exact = campaigns.experiment("A", campaigns.first, sigma="estimated")
+    fitted = bp.fit(exact, bp.simulate(exact, exact=True)).to_map()
+    bp.write_map(fitted, tmp_path / "first.yaml")
+    with pytest.raises(bp.ExperimentError, match="states no uncertainty, as that of readings"):
+        campaigns.fit_of_second({})
+    assert "agree with its model but for rounding" in bp.correct(fitted, [[0.1, 0.1, 0.1]]).notes[0]
+
+
+def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    campaigns.map_of_first()
+    design = lay_out(
+        campaigns.experiment("B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}])
+    )
+    (priors,) = (one for one in design.observations if one.word == "prior")
+    assert {priors.unit(design, k) for k in range(len(priors))} == {"m"}
+    names = {priors.name(design, k) for k in range(len(priors))}
+    assert len(names) == 6
+    assert all(one.startswith("prior of first.yaml, combination ") for one in names)
+
+
+def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Path) -> None:
+    write_files(tmp_path)
+    experiment = bp.experiment(IN_SPACE | {"error_model": model_of("python", tmp_path)}, tmp_path)
+    for name in ("own.yaml", "own.npz"):
+        bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / name)
+        sections = IN_SPACE | {
+            "error_model": {"kind": "metric"},
+            "true_machine": {"kind": "map", "file": name},
+        }
+        (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
+        assert load(tmp_path / "file.yaml")
+        with pytest.raises(bp.ExperimentError, match="true_machine.file: is the map of an error"):
+            load(tmp_path / "file.yaml", with_modules=False)
+
+
+def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    fitted = campaigns.map_of_first()
+
+    def told(**truth: Any) -> str:
+        more = {"true_machine": {"kind": "map", "file": "first.yaml", **truth}}
+        return fingerprint(campaigns.experiment("B", campaigns.second, **more))
+
+    before = told()
+    assert before == told() != told(draw=1)
+    bp.write_map(replace(fitted, values=1.01 * fitted.values), tmp_path / "first.yaml")
+    assert told() != before

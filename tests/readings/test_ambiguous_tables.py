@@ -16,7 +16,6 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.any_table import TableRows
-
 from ballplate.simulator.readings.reading_sources import read_source
 from hypothesis import example, given, settings
 from hypothesis import strategies as st

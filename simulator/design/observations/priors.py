@@ -22,8 +22,8 @@ class Priors(Observations):
     rotation), about a probe offset (`probe` and `component`), about a parameter of an influence
     quantity (`influence`, None where there are none), or about a linear function of the model's
     parameters, `by_model` (m, n), and of probe offsets, `by_offset` (m, l, d), None where there are
-    no such; indices that do not apply are -1. Origins and offsets are
-    stated as co-ordinates, pose angles as deviations from the nominal pose.
+    no such; indices that do not apply are -1. `units` are those of the first, where they are told.
+    Origins and offsets are stated as co-ordinates, pose angles as deviations from the nominal pose.
     """
 
     word: ClassVar[str] = "prior"
@@ -38,6 +38,7 @@ class Priors(Observations):
     uncertainty: Array
     influence: Integers | None = None
     by_offset: Array | None = None
+    units: tuple[Unit, ...] = ()
 
     @property
     def of_influence(self) -> Integers:
@@ -79,6 +80,8 @@ class Priors(Observations):
         return f"prior of {self.names[k]}"
 
     def unit(self, design: Design, k: int) -> Unit:
+        if k < len(self.units):
+            return self.units[k]
         if self.position[k] >= 0:
             return "rad" if self.component[k] >= design.dimension else "m"
         if self.probe[k] >= 0:
