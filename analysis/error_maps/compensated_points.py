@@ -18,6 +18,7 @@ from ballplate.simulator.inputs.tables import header_names, read_table
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.splines.spline_problems import SplineError, SplineProblem
 
+from ..presentation.formatting import fixed
 from .curve_tables import SIDES
 from .error_curve import ErrorCurve
 
@@ -57,15 +58,10 @@ class CompensatedPoints:
         for k, name in enumerate(self.names):
             lengths = [*self.nominal[k], *self.compensated[k]]
             values = [self.errors[k], self.uncertainties[k], -self.errors[k]]
-            told = [_fixed(1e3 * value, 6) for value in lengths]
-            told += ["" if np.isnan(value) else _fixed(1e6 * value, 4) for value in values]
-            writer.writerow([name, *told, *(_fixed(value, 9) for value in self.normals[k])])
+            told = [fixed(1e3 * value, 6) for value in lengths]
+            told += ["" if np.isnan(value) else fixed(1e6 * value, 4) for value in values]
+            writer.writerow([name, *told, *(fixed(value, 9) for value in self.normals[k])])
         return text.getvalue()
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """A number with so many decimals; what rounds to zero has no sign."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
 def nominal_points(path: Path) -> tuple[tuple[str, ...], Array]:

@@ -20,6 +20,7 @@ from ..presentation.formatting import (
     as_data,
     ascii_units,
     csv_lines,
+    fixed,
     number,
     records,
 )
@@ -186,7 +187,7 @@ def error_lines(errors: VolumetricErrors) -> list[str]:
     ):
         cells = [_millimetres(value) for value in point]
         cells += [
-            _fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
+            fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
         ]
         rows.append(cells)
     return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(errors)]
@@ -227,7 +228,7 @@ def along_lines(along: AlongAxis) -> list[str]:
         rows.append(
             [
                 _millimetres(float(positions[k])),
-                *(_fixed(1e6 * values[k], 3) for values in given.values()),
+                *(fixed(1e6 * values[k], 3) for values in given.values()),
             ]
         )
     head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
@@ -342,11 +343,6 @@ def along_data(along: AlongAxis) -> dict[str, Any]:
         "random": along.deviation,
     }
     return dict(as_data(data))
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """A number with so many decimals; what rounds to zero has no sign."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
 def _millimetres(value: float) -> str:
