@@ -87,7 +87,7 @@ title: a small machine
 volume: {x: [0 mm, 800 mm], y: [0 mm, 600 mm], z: [0 mm, 500 mm]}
 arrangement: MB2
 errors:
-  EXX: {file: exx.csv}
+  EXX: {file: exx.csv, fit: {order: 3}}
   EYX: {polynomial: [0 um, 8 um, -8 um], line: {y: 300 mm, z: 400 mm}}
   EAX: {polynomial: [0 urad, 4 urad], bandwidth: 3 urad}
 squareness: {EC0Y: 21 urad}

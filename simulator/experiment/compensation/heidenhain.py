@@ -74,7 +74,7 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     """
     path = paths[0]
     if len(paths) > 1 or path.suffix.lower() != ".cma":
-        text = "name the .CMA file alone, which says of which axis each .COM file is"
+        text = "is not a .CMA file alone; name that, which says of which axis each .COM file is"
         raise refused(path, text)
     active = [line for line in _lines(path) if line.cells.get(ACTIVE) == "*"]
     if len(active) != 1:
