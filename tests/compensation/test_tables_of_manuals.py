@@ -175,9 +175,22 @@ def test_the_sense_is_never_guessed(tmp_path: Path) -> None:
     assert_allclose(one.correction(NODES), -two.correction(NODES))
 
 
+def test_files_of_one_table_state_the_same_sense(tmp_path: Path) -> None:
+    made = bp.compensation(MACHINES / "npl-like.yaml", "csv", "200 mm").files("t")
+    files = [written(tmp_path, name, text) for name, text in made.items()]
+    written(tmp_path, "t-y.csv", made["t-y.csv"].partition("\n")[2])
+    with pytest.raises(bp.ExperimentError, match="t-y.csv: does not state whether"):
+        bp.read_compensation(files, "csv", "corrections")
+    one = written(tmp_path, "a.csv", "// states: corrections\nX EXX\n0 0\n1 0\n")
+    two = written(tmp_path, "b.csv", "Y EYY\n0 0\n1 0\n")
+    with pytest.raises(bp.ExperimentError, match="b.csv: states not what another file does"):
+        bp.read_compensation([one, two], "isg", "corrections", "MB2")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [
+        ("isg", "// chain XXZ\nX EXX\n0 0\n1 0\n", "has an axis twice"),
         ("isg", "X EXX\n0 0\n1 0,5\n", "decimal comma"),
         ("isg", "X EXX EXX\n0 0 0\n1 0 0\n", "second column EXX"),
         ("isg", "X EXW\n0 0\n1 0\n", 'column "EXW" is no linear axis'),

@@ -108,22 +108,24 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     :raises ExperimentError: what is wrong with them.
     """
     blocks: list[_Block] = []
-    sense: Sense | None = None
+    senses: set[Sense | None] = set()
     arrangement: Arrangement | None = None
     for path in paths:
+        sense: Sense | None = None
         for line in read_text(path).splitlines():
             remark = line.partition("//")[2]
-            if (stated := stated_sense(remark)) is not None:
-                if sense not in (None, stated):
-                    raise refused(
-                        path, f"states {stated}, and another file {sense}; let all say the same"
-                    )
-                sense = stated
+            sense = stated_sense(remark) or sense
             if match := CHAIN.match(remark):
                 names = match[1].lower()
                 names += "".join(axis for axis in AXES if axis not in names)
+                if sorted(names) != list(AXES):
+                    raise refused(path, f"chain {match[1]} has an axis twice; name each once")
                 arrangement = Arrangement(tuple(names))
+        senses.add(sense)
+        if len(senses) > 1:
+            raise refused(path, "states not what another file does; let all say the same")
         blocks += _blocks(path)
+    sense = senses.pop()
     if not blocks:
         raise refused(paths[0], "no table; its first line names the columns, such as X EXX EYX EZX")
     grids = [block for block in blocks if len(block.arguments) > 1]

@@ -19,6 +19,7 @@ from ..error_tables import LineError, parse_point
 from .axis_tables import AxisTable, AxisTables, Corner, names_of
 from .table_formats import (
     MEANING,
+    SENSES,
     Sense,
     StatedTable,
     Table,
@@ -61,6 +62,7 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     """
     axes: dict[int, AxisTable] = {}
     stated: dict[str, object] = {}
+    silent = []
     messages: list[Message] = []
     for path in paths:
         try:
@@ -73,10 +75,16 @@ def _read(paths: Sequence[Path]) -> StatedTable:
             text = f"a second table of {AXES[table.axis]}; name one file for each axis"
             messages.append(Message(str(path), 0, 0, "", text))
         axes[table.axis] = table
+        silent += [] if "sense" in said else [path]
         for key, value in said.items():
             if stated.setdefault(key, value) != value:
                 text = f"its {key} is not that of {paths[0]}; let all files of a table say the same"
                 messages.append(Message(str(path), 0, 0, "", text))
+    if "sense" in stated:
+        text = (
+            f"does not state whether values are {' or '.join(SENSES)}, as others do; add # states:"
+        )
+        messages += [Message(str(path), 0, 0, "", text) for path in silent]
     missing = [AXES[k] for k in range(3) if k not in axes]
     if not messages and missing not in ([], ["z"]):
         text = f"no table of {listing(missing)}; name the files of x, y and z together"
