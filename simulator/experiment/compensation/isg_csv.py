@@ -26,7 +26,15 @@ from ...machines.arrangement import AXES, Arrangement
 from ...machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
 from ...machines.protocol import Array
 from .axis_tables import AxisTable, names_of, tool_chain
-from .table_formats import MEANING, Sense, StatedTable, Table, TableFormat, stated_sense
+from .table_formats import (
+    MEANING,
+    MOST_GRID_NODES,
+    Sense,
+    StatedTable,
+    Table,
+    TableFormat,
+    stated_sense,
+)
 from .volume_tables import VolumeTable
 
 # Squareness errors as the format names them: C0Y for ISO 230-1's EC0Y.
@@ -168,7 +176,9 @@ def _blocks(path: Path) -> Iterator[_Block]:
                     for cell, name in zip(cells, names, strict=True)
                 ]
             )
-        if len(messages) >= MOST_MESSAGES:
+        if len(rows) > MOST_GRID_NODES:
+            messages.append(mark.message("", f"more than {MOST_GRID_NODES} rows; leave some out"))
+        if len(messages) >= MOST_MESSAGES or len(rows) > MOST_GRID_NODES:
             break
     if messages:
         raise ExperimentError(messages)

@@ -16,14 +16,13 @@ from .axis_tables import (
     on_tool_side,
     tabulated,
 )
-from .table_formats import Table, TableFormat, rounded
+from .table_formats import MOST_GRID_NODES, MOST_NODES, Table, TableFormat, rounded
 from .volume_tables import VolumeTable, volume_table
 
 # Distances between nodes of an axis where no pitch is chosen.
 INTERVALS = 20
 # A node is where an axis ends if it is nearer than this part of the pitch.
 SAME = 1e-6
-MOST_NODES, MOST_GRID_NODES = 5000, 100_000
 # Places along an axis at which a table is compared with the machine, and at random besides.
 PLACES, RANDOM = 33, 4000
 

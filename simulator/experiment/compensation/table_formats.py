@@ -40,6 +40,9 @@ class StatedTable:
     notes: tuple[str, ...] = ()
 
 
+# Of an axis, and of a grid.
+MOST_NODES, MOST_GRID_NODES = 5000, 100_000
+
 Table = AxisTables | VolumeTable
 Written = Callable[[Table, Sense, str], dict[str, str]]
 
