@@ -16,7 +16,7 @@ from ..estimators.estimator_choice import (
 from ..results.variance_components.groupings import GROUPINGS
 from .common import add_file, add_json, add_picture, day, map_path
 from .compare import add_pairs
-from .outputs import UsageError, add_force, add_output, write
+from .outputs import UsageError, Writer, add_force, add_output, write
 from .table_options import add_tables
 from .telling import complain, note, warn
 
@@ -171,12 +171,15 @@ def run(options: Namespace) -> int:
         options.components,
         options.reweight,
     )
+    writers: dict[Path, Writer] = {}
     if options.plot and result.converged:
-        write(options, {options.plot: result.plot})
+        writers[options.plot] = result.plot
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
-        write(options, {options.output: lambda path: write_map(fitted, path)})
+        writers[options.output] = lambda path: write_map(fitted, path)
         warn([left_out_words(fitted)] if fitted.left_out else [])
+    if writers:
+        write(options, writers)
     show(options, result)
     warn(result.cautions)
     if result.complaint:
