@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, overload
 
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.arguments import (
@@ -27,6 +27,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_whole,
 )
 from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.quantities import QuantityError
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
 
@@ -46,6 +47,7 @@ PathLike = str | os.PathLike[str]
 if TYPE_CHECKING:
     import pandas
 
+    from .error_maps.compensation_tables import MadeCompensation, ReadCompensation
     from .error_maps.curve_result import FittedCurve
     from .error_maps.length_tables import LengthMap
     from .error_maps.map_places import Line
@@ -82,6 +84,8 @@ if TYPE_CHECKING:
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
 
 SIGMAS = ("estimated", "given")
+TableFormatName = Literal["csv", "isg", "heidenhain"]
+TableSense = Literal["corrections", "errors of indication"]
 
 
 def load(path: PathLike, variant: str | None = None) -> Experiment:
@@ -1091,6 +1095,92 @@ def adjust(
     changes = [scale_change(text) for text in _texts("scale", scale)]
     changes += [guideway_turn(text) for text in _texts("turn", turn)]
     return adjusted_machine(first.title, first, changes, second, share)
+
+
+def compensation(
+    machine: PathLike | FittedMap,
+    format: TableFormatName,
+    pitch: str | Sequence[float] | None = None,
+    origin: str | Sequence[float] | None = None,
+    sense: TableSense | None = None,
+    volumetric: bool = False,
+    without_rotations: bool = False,
+) -> MadeCompensation:
+    """A compensation table of a machine file or of a map, in the format csv, isg or heidenhain.
+
+    `pitch` is the distance of positions, one for all axes or one for each, and `origin` where
+    errors are zero: texts with units, or metres. `sense` is corrections or errors of indication.
+    `files(stem)` of the result are the texts of its files.
+
+    >>> compensation("designs/park/machines/npl-like.yaml", "isg", "50 mm")
+    <MadeCompensation of npl-like: isg, 19, 24, 9 positions>
+    """
+    from .error_maps.compensation_tables import made_compensation, of_map, tabled_machine
+    from .simulator.maps.fitted_map import FittedMap
+
+    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableSense), sense=sense)
+    if isinstance(machine, FittedMap):
+        source, remarks = of_map(machine, machine.title)
+        label = machine.title
+    else:
+        ensure_path("machine", machine)
+        source, remarks = tabled_machine(Path(machine))
+        label = Path(machine).stem
+    lengths = _metres("pitch", pitch), _metres("origin", origin)
+    flags = volumetric, without_rotations
+    return made_compensation(source, label, format, *lengths, sense, *flags, remarks)
+
+
+def read_compensation(
+    files: PathLike | Sequence[PathLike],
+    format: TableFormatName,
+    sense: TableSense | None = None,
+    arrangement: str | None = None,
+    origin: str | Sequence[float] | None = None,
+) -> ReadCompensation:
+    """The compensation table that files in the format csv, isg or heidenhain hold.
+
+    What the files do not say is said beside them: the `sense`, corrections or errors of indication,
+    the `arrangement` of the axes, such as MB2 or "probe x z, workpiece y", and the `origin` from
+    which levers of rotations count. `correction(points)` of the result are corrections between the
+    table's positions, `machine_files(stem)` the texts of a machine file.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> made = compensation("designs/park/machines/npl-like.yaml", "isg")
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder, "table.csv")
+    ...     _ = file.write_text(made.files("table")["table.csv"])
+    ...     read_compensation(file, "isg")
+    <ReadCompensation of table: isg, 21, 21, 21 positions>
+    """
+    from .error_maps.compensation_tables import read_compensation_files
+
+    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableSense), sense=sense)
+    ensure_type(str, "an arrangement, such as MB2", arrangement=arrangement)
+    several = [files] if isinstance(files, str | os.PathLike) else files
+    paths = [Path(one) for one in several]
+    if not paths:
+        raise ValueError("files: no file; give one at least")
+    return read_compensation_files(paths, format, sense, arrangement, _metres("origin", origin))
+
+
+def _metres(name: str, given: str | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Lengths in metres, of a text with units or of numbers."""
+    from .error_maps.compensation_tables import parse_lengths
+
+    if given is None:
+        return None
+    if isinstance(given, str):
+        try:
+            return parse_lengths(given)
+        except QuantityError as error:
+            raise ValueError(f"{name}: {error}") from None
+    found = tuple(given) if isinstance(given, Iterable) else (given,)
+    if not all(isinstance(one, int | float) and math.isfinite(one) for one in found):
+        raise TypeError(f"{name}={given!r}; give lengths in metres, or a text with units")
+    return tuple(float(one) for one in found)
 
 
 def correct(

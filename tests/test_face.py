@@ -51,6 +51,13 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
         ),
         (lambda: bp.map(MACHINE, error="EXX"), ("map", MACHINE, "--error=EXX")),
         (
+            lambda: bp.compensation(MACHINE, "isg", "200 mm", sense="errors of indication"),
+            (
+                *("compensation", MACHINE, "--format=isg", "--pitch=200 mm"),
+                "--sense=indication",
+            ),
+        ),
+        (
             lambda: bp.spline(
                 TABLE, y="finish_error", points="12-32", start_slope="0", evaluate="1 mm"
             ),

@@ -24,7 +24,7 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 COMMANDS = (
     *("check", "run", "budget", "plan", "sheet", "next", "reach", "lengths", "reliability"),
     *("simulate", "import", "fit", "ladder", "validate", "certificate"),
-    *("correct", "curves", "convert", "diff", "adjust", "compare"),
+    *("correct", "curves", "compensation", "convert", "diff", "adjust", "compare"),
     *("sweep", "export", "report", "map"),
     *("spline", "reproduce", "schema", "init"),
 )

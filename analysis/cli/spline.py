@@ -83,6 +83,13 @@ def add_options(parser: ArgumentParser) -> None:
         help="between features that share value and slope; may be repeated",
     )
     shape.add_argument(
+        "--corner",
+        metavar="PLACE",
+        action="append",
+        default=[],
+        help="between features that share the place alone; may be repeated",
+    )
+    shape.add_argument(
         "--straight",
         metavar="K",
         type=count,
@@ -125,6 +132,21 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="FILE",
         takes_screen=True,
         help="write the polynomials as CSV; - for the screen",
+    )
+    add_output(
+        output,
+        "--compensated",
+        metavar="CSV",
+        help="write the points of the profile moved against their errors, and its corners",
+    )
+    output.add_argument(
+        "--nominal",
+        metavar="CSV",
+        type=Path,
+        help=(
+            "with --compensated: nominal points on the profile instead of the measured ones, with"
+            " columns such as nominal_x_mm and nominal_z_mm"
+        ),
     )
     add_picture(output, "--plot", help="draw points and curve (.svg, .png or .pdf)")
     add_picture(
@@ -173,6 +195,9 @@ def run(options: Namespace) -> int:
         writers[options.whiskers] = partial(
             found.plot_whiskers, magnification=options.magnification
         )
+    if options.compensated is not None:
+        moved = found.compensated(options.nominal).csv()
+        writers[options.compensated] = text_writer(lambda stream: stream.write(moved))
     polynomials = None if options.coefficients is None else found.coefficients()
     if polynomials is not None and str(options.coefficients) != "-":
         writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
@@ -199,6 +224,15 @@ def _check(options: Namespace, points: CurvePoints) -> None:
         raise UsageError(
             f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle"
         )
+    if options.compensated is not None and points.x is not None:
+        raise UsageError(
+            "--compensated needs the arc length along a profile as abscissa; add the columns"
+            " nominal_x_mm and nominal_z_mm to the file, and leave --x out"
+        )
+    if options.compensated is not None and points.y_column.kind != "length":
+        raise UsageError(f"--compensated moves points, but {points.y_column.name} is an angle")
+    if options.nominal is not None and options.compensated is None:
+        raise UsageError("--nominal is for --compensated; add that, or leave it out")
     if options.magnification is not None and not 0 < options.magnification < float("inf"):
         raise UsageError("--magnification should be above 0, such as 200")
     if options.magnification is not None and options.whiskers is None:

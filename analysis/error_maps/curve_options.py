@@ -43,6 +43,7 @@ class Asked:
     start: str = "start"
     end: str = "end"
     boundary: Sequence[str] = ()
+    corner: Sequence[str] = ()
     straight: Sequence[int] = ()
     start_value: str | None = None
     start_slope: str | None = None
@@ -57,7 +58,7 @@ class Asked:
 
 # Kinds of what is asked for that is no text.
 KINDS = {"every": int, "order": int, "periodic": bool}
-LISTS = ("boundary", "straight", "at")
+LISTS = ("boundary", "corner", "straight", "at")
 
 
 def ensure_asked(given: Mapping[str, object]) -> None:
@@ -130,6 +131,7 @@ def curve_settings(options: Asked, points: CurvePoints) -> CurveSettings:
         start=_place("--start", options.start, x),
         end=_place("--end", options.end, x),
         boundaries=tuple(_place("--boundary", text, x) for text in options.boundary),
+        corners=tuple(_place("--corner", text, x) for text in options.corner),
         straight=tuple(options.straight),
         holds=tuple(holds),
         period=period,

@@ -15,6 +15,7 @@ from ballplate.simulator.splines.read import Column, CurvePoints, choose_points,
 from ballplate.simulator.splines.spline_problems import SplineError
 
 from ..presentation.result import Result
+from .compensated_points import CompensatedPoints, compensated_points, nominal_points
 from .curve_options import Asked, curve_settings, listed, positive
 from .curve_tables import coefficients_csv, curve_data, curve_lines, shown
 from .error_curve import ErrorCurve, fit_curve
@@ -76,6 +77,21 @@ class FittedCurve(Result):
     def coefficients(self) -> str:
         """The polynomials of all pieces as CSV at full precision, in the units of the file."""
         return coefficients_csv(self.curve, self.powers)
+
+    def compensated(self, nominal: str | Path | None = None) -> CompensatedPoints:
+        """The points of the curve, or nominal points of a CSV file on the same profile, moved
+        against the errors that the curve has there, and its corners.
+
+        :raises ExperimentError: the file is wrong, or a point is not on the profile.
+        """
+        points = self.curve.points
+        try:
+            if nominal is not None:
+                return compensated_points(self.curve, *nominal_points(Path(nominal)))
+            places = np.zeros((0, 2)) if points.places is None else points.places
+            return compensated_points(self.curve, points.names, places, points.normals)
+        except SplineError as error:
+            raise _told(error, Path(nominal or self.file), points.x_column) from None
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Points, curve, its expanded uncertainty, knots and boundaries.

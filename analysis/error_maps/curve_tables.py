@@ -13,6 +13,7 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.splines.constraints import Constraint
 from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
 from ballplate.simulator.splines.read import Column
+from ballplate.simulator.splines.space import Side
 
 from ..presentation.formatting import aligned, as_data, ascii_units, micro, number, picked, records
 from .error_curve import ErrorCurve
@@ -25,6 +26,8 @@ ORDERS = {
     6: "quintic spline",
 }
 MOST_LISTED = 12
+# Of a corner, in the order of the curve.
+SIDES: tuple[Side, Side] = ("below", "above")
 NOTHING = 1e-13
 
 
@@ -62,7 +65,7 @@ def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) ->
         f"{file}: {y.words} against {x.words}, {len(fitted.x)} points, curve from"
         f" {shown(space.lower, x)} to {shown(space.upper, x)}"
     ]
-    knots = [knot for knot in space.knots if knot not in curve.boundaries]
+    knots = [knot for knot in space.knots if knot not in (*curve.boundaries, *curve.corners)]
     listed = ", ".join(f"{knot / x.factor:.6g}" for knot in knots[:MOST_LISTED])
     more = f" and {len(knots) - MOST_LISTED} more" if len(knots) > MOST_LISTED else ""
     where = f" at {listed} {micro(x.unit)}{more}" if knots else ""
@@ -76,7 +79,11 @@ def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) ->
         on = [points.names[k] for k in np.flatnonzero(fitted.x == boundary)]
         both = f"; point {', '.join(on)} there belongs to both" if on else ""
         lines.append(f"features share value and slope at {shown(boundary, x)}{both}")
-    if len(set(points.features)) > 1 and not curve.boundaries:
+    for corner in curve.corners:
+        sides = [float(fitted.values(np.array([corner]), 0, side)[0]) for side in SIDES]
+        errors = " and ".join(shown(one, y, 4) for one in sides)
+        lines.append(f"features meet at a corner at {shown(corner, x)}, with errors {errors}")
+    if len(set(points.features)) > 1 and not curve.boundaries and not curve.corners:
         names = listing(dict.fromkeys(points.features))
         lines.append(
             f"one curve over {names}: the column feature makes no boundaries; --boundary does"
@@ -211,7 +218,9 @@ def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> 
             **picked(space, "order", "knots"),
             "start": space.lower,
             "end": space.upper,
-            **picked(curve, "boundaries", "sigma", "sigma_is_estimated", "coverage_factor"),
+            **picked(
+                curve, "boundaries", "corners", "sigma", "sigma_is_estimated", "coverage_factor"
+            ),
             **picked(fitted, "degrees_of_freedom", "sum_of_squares"),
             "prescribed": [
                 {

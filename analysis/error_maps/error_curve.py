@@ -4,6 +4,7 @@ uncertainty.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -43,8 +44,8 @@ class CurveSettings:
     """What curve is wanted. Lengths and angles are in metres and radians.
 
     Knots are at every `every`-th point of each feature, or where `knots` says. At `boundaries` only
-    value and slope are continuous; `straight` are the features, counted from 1, that are straight
-    lines. `period` closes the curve.
+    value and slope are continuous, at `corners` nothing is; `straight` are the features, counted
+    from 1, that are straight lines. `period` closes the curve.
     """
 
     order: int = 4
@@ -53,6 +54,7 @@ class CurveSettings:
     start: Place = "start"
     end: Place = "end"
     boundaries: tuple[Place, ...] = ()
+    corners: tuple[Place, ...] = ()
     straight: tuple[int, ...] = ()
     holds: tuple[Hold, ...] = ()
     period: float | None = None
@@ -76,6 +78,8 @@ class ErrorCurve:
     sigma_is_estimated: bool
     has_uncertainties: bool
     profile_boundaries: Array = field(repr=False)
+    corners: tuple[float, ...] = ()
+    profile: Profile | None = field(default=None, repr=False)
 
     @property
     def coverage_factor(self) -> float:
@@ -112,7 +116,7 @@ def fit_curve(
     :raises SplineError: it cannot be fitted, all reasons found; or sigma should be given, and no
         uncertainty is.
     """
-    x, ends, boundaries, holds, on_profile = _located(points, settings)
+    x, ends, boundaries, corners, holds, on_profile, profile = _located(points, settings)
     lower, upper = ends
     if lower == upper == x.min() == x.max():
         raise SplineError(
@@ -126,27 +130,17 @@ def fit_curve(
         )
     order = np.argsort(x, kind="stable")
     x, points = x[order], points.chosen(order.tolist())
-    boundaries = tuple(sorted(set(boundaries)))
-    knots = settings.knots
-    problems = _misplaced(settings, boundaries, lower, upper)
+    boundaries, corners = tuple(sorted(set(boundaries))), tuple(sorted(set(corners)))
+    between = tuple(sorted({*boundaries, *corners}))
+    problems = [
+        *_misplaced(settings, between, lower, upper),
+        *_misplaced_corners(settings, boundaries, corners, holds, x),
+    ]
     if problems:
         raise SplineError(problems)
-    features = list(pairwise((lower, *boundaries, upper)))
+    features = list(pairwise((lower, *between, upper)))
     lines = [features[k - 1] for k in sorted(set(settings.straight))]
-    if knots is None:
-        found = at_every(x, settings.every, lower, upper, boundaries)
-        knots = tuple(
-            knot for knot in found if not any(start <= knot <= end for start, end in lines)
-        )
-    space = SplineSpace(
-        settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order)
-    )
-    if space.count > MOST_COEFFICIENTS:
-        text = (
-            f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible,"
-            " leave out knots"
-        )
-        raise SplineError([SplineProblem(text)])
+    space = _space(settings, x, ends, boundaries, corners, lines)
     constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
     for start, end in lines:
         constraints += straight(space, start, end)
@@ -169,7 +163,39 @@ def fit_curve(
         is_estimated,
         stated is not None,
         on_profile,
+        corners,
+        profile,
     )
+
+
+def _space(
+    settings: CurveSettings,
+    x: Array,
+    ends: tuple[float, float],
+    boundaries: tuple[float, ...],
+    corners: tuple[float, ...],
+    lines: Sequence[tuple[float, float]],
+) -> SplineSpace:
+    """The splines with the knots that are wanted, or at every so many of the points x (m,) that are
+    not of straight `lines`.
+
+    :raises SplineError: there are too many knots.
+    """
+    knots = settings.knots
+    if knots is None:
+        found = at_every(x, settings.every, *ends, sorted({*boundaries, *corners}))
+        knots = tuple(
+            knot for knot in found if not any(start <= knot <= end for start, end in lines)
+        )
+    every = with_boundaries(knots, boundaries, settings.order, corners)
+    space = SplineSpace(settings.order, *ends, every)
+    if space.count > MOST_COEFFICIENTS:
+        text = (
+            f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible,"
+            " leave out knots"
+        )
+        raise SplineError([SplineProblem(text)])
+    return space
 
 
 def _misplaced(
@@ -197,35 +223,87 @@ def _misplaced(
         for knot in settings.knots or ()
         if knot in boundaries
     ]
-    if settings.order < 3 and boundaries:
+    problems += [
+        SplineProblem(
+            f"the knot at {{0}} is given {times} times; give it {settings.order - 1} times at most",
+            (knot,),
+        )
+        for knot, times in Counter(settings.knots or ()).items()
+        if times >= settings.order
+    ]
+    if settings.order < 3 and settings.boundaries:
         problems.append(
             SplineProblem("broken lines share no slope at boundaries; give an order of 3 or more")
         )
     return problems
 
 
-def whole_profile(points: CurvePoints, boundaries: Array) -> tuple[Profile, Array]:
-    """The profile of all points of a file with boundaries (n, 2) on it, and the points' indices in
-    it.
+def _misplaced_corners(
+    settings: CurveSettings,
+    boundaries: tuple[float, ...],
+    corners: tuple[float, ...],
+    holds: tuple[Constraint, ...],
+    x: Array,
+) -> list[SplineProblem]:
+    """What is wrong with corners: whatever stands on one belongs to either feature."""
+    problems = []
+    for corner in corners:
+        if corner in boundaries:
+            problems.append(
+                SplineProblem("{0} is a corner and a boundary; leave one out", (corner,))
+            )
+        if (x == corner).any():
+            text = (
+                "a point is on the corner at {0}, and of which feature is not known; leave it out"
+            )
+            problems.append(SplineProblem(text, (corner,)))
+        if any(corner in hold.places for hold in holds):
+            text = "nothing can be prescribed at the corner at {0}, of two features; leave it out"
+            problems.append(SplineProblem(text, (corner,)))
+    if corners and settings.period is not None:
+        problems.append(SplineProblem("a periodic curve has no corners; leave them out"))
+    return problems
+
+
+def whole_profile(
+    points: CurvePoints, boundaries: Array, corners: int = 0
+) -> tuple[Profile, Array]:
+    """The profile of all points of a file with boundaries (n, 2) on it, the last of them `corners`,
+    and the points' indices in it.
 
     :raises SplineError: the points do not make a profile.
     """
     assert points.places is not None
     _refuse_coincident(points.places)
-    profile, own, _ = along(points.places, points.features, boundaries)
+    profile, own, _ = along(points.places, points.features, boundaries, corners=corners)
     return profile, own
 
 
 def _located(
     points: CurvePoints, settings: CurveSettings
-) -> tuple[Array, tuple[float, float], tuple[float, ...], tuple[Constraint, ...], Array]:
-    """Abscissae of points, ends, boundaries and prescribed values, and the places among them on the
-    profile (n, 2).
+) -> tuple[
+    Array,
+    tuple[float, float],
+    tuple[float, ...],
+    tuple[float, ...],
+    tuple[Constraint, ...],
+    Array,
+    Profile | None,
+]:
+    """Abscissae of points, ends, boundaries, corners and prescribed values, the places among them
+    on the profile (n, 2), and the profile.
     """
-    wanted = [*settings.boundaries, *(hold.at for hold in settings.holds)]
-    nominal = list(dict.fromkeys(place for place in wanted if isinstance(place, tuple)))
+    shared = [*settings.boundaries, *settings.corners]
+    wanted = [*(hold.at for hold in settings.holds), *settings.boundaries]
+    corners_at = [place for place in settings.corners if isinstance(place, tuple)]
+    others = [place for place in dict.fromkeys(wanted) if place not in corners_at]
+    nominal = [
+        *(place for place in others if isinstance(place, tuple)),
+        *dict.fromkeys(corners_at),
+    ]
     ends = [settings.start, settings.end]
     where: dict[Place, float] = {}
+    profile = None
     if points.x is not None:
         if nominal or any(isinstance(end, tuple) for end in ends):
             text = (
@@ -237,7 +315,7 @@ def _located(
             )
         x = points.x
     else:
-        x, where = _on_profile(points, settings, nominal)
+        x, where, profile = _on_profile(points, settings, nominal)
     lower = float(x.min()) if settings.start == "start" else _abscissa(settings.start, where)
     upper = float(x.max()) if settings.end == "end" else _abscissa(settings.end, where)
     if settings.period is not None:
@@ -259,11 +337,12 @@ def _located(
         prescribed(_abscissa(hold.at, where), hold.derivative, hold.value)
         for hold in settings.holds
     )
-    boundaries = tuple(_abscissa(place, where) for place in settings.boundaries)
-    on_profile = np.array(
-        [place for place in settings.boundaries if isinstance(place, tuple)]
-    ).reshape(-1, 2)
-    return x, (lower, upper), boundaries, holds, on_profile
+    boundaries, corners = (
+        tuple(_abscissa(place, where) for place in places)
+        for places in (settings.boundaries, settings.corners)
+    )
+    on_profile = np.array([place for place in shared if isinstance(place, tuple)]).reshape(-1, 2)
+    return x, (lower, upper), boundaries, corners, holds, on_profile, profile
 
 
 def _abscissa(place: Place, where: dict[Place, float]) -> float:
@@ -272,8 +351,8 @@ def _abscissa(place: Place, where: dict[Place, float]) -> float:
 
 def _on_profile(
     points: CurvePoints, settings: CurveSettings, nominal: Sequence[tuple[float, float]]
-) -> tuple[Array, dict[Place, float]]:
-    """Arc lengths of the points and of places by their nominal co-ordinates."""
+) -> tuple[Array, dict[Place, float], Profile]:
+    """Arc lengths of the points and of places by their nominal co-ordinates, and the profile."""
     assert points.places is not None
     start, end = (
         (
@@ -287,7 +366,12 @@ def _on_profile(
     _refuse_distant(points.places, start, end)
     try:
         profile, own, at = along(
-            points.places, points.features, np.array(nominal).reshape(-1, 2), start, end
+            points.places,
+            points.features,
+            np.array(nominal).reshape(-1, 2),
+            start,
+            end,
+            sum(isinstance(place, tuple) for place in set(settings.corners)),
         )
     except NotOnProfileError as error:
         text = (
@@ -300,7 +384,7 @@ def _on_profile(
     for place in (settings.start, settings.end):
         if isinstance(place, tuple):
             where[place] = float(lengths[(profile.places == place).all(axis=1)][0])
-    return lengths[own], where
+    return lengths[own], where, profile
 
 
 def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> None:

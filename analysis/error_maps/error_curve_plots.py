@@ -77,7 +77,9 @@ def draw_curve(curve: ErrorCurve, path: str | Path | None = None) -> Figure:
             elinewidth=1.0,
             label="measured",
         )
-        knots = np.array([knot for knot in fitted.space.knots if knot not in curve.boundaries])
+        knots = np.array(
+            [knot for knot in fitted.space.knots if knot not in (*curve.boundaries, *curve.corners)]
+        )
         if len(knots):
             axes.plot(
                 knots / x.factor,
@@ -88,7 +90,7 @@ def draw_curve(curve: ErrorCurve, path: str | Path | None = None) -> Figure:
                 linestyle="none",
                 label="knots",
             )
-        for k, boundary in enumerate(curve.boundaries):
+        for k, boundary in enumerate((*curve.boundaries, *curve.corners)):
             label = "boundary of features" if k == 0 else None
             axes.axvline(
                 boundary / x.factor, color=SERIES[1], linestyle="--", linewidth=1.0, label=label
@@ -126,7 +128,7 @@ def draw_whiskers(
     :raises SplineError: neighbouring points that stand at the same place.
     :raises OSError: the file cannot be written.
     """
-    profile, own = whole_profile(points, curve.profile_boundaries)
+    profile, own = whole_profile(points, curve.profile_boundaries, len(curve.settings.corners))
     assert points.places is not None
     # Axial co-ordinate to the right, radius upwards, as a turning centre is looked at.
     line, start = profile.places[:, ::-1], points.places[:, ::-1]

@@ -10,7 +10,7 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.machines.arrangement import AXES, Arrangement
-from ballplate.simulator.machines.curves import NAMES
+from ballplate.simulator.machines.curves import NAMES, SmoothedPoints
 from ballplate.simulator.machines.protocol import Array, Parameter
 from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
 
@@ -20,6 +20,7 @@ from ..presentation.formatting import (
     as_data,
     ascii_units,
     csv_lines,
+    fixed,
     number,
     records,
 )
@@ -69,11 +70,13 @@ def _stated_as(along: AlongAxis) -> str:
     error = along.error
     if along.values is None:
         return "random"
-    form = (
-        f"table of {len(along.measured.positions)} points"
-        if along.measured is not None
-        else "polynomial"
-    )
+    form = "polynomial"
+    if along.measured is not None:
+        form = f"table of {len(along.measured.positions)} points"
+    if isinstance(along.measured, SmoothedPoints):
+        sigma = number(1e6 * along.measured.fitted.sigma, 2)
+        curve = "spline" if along.measured.knots else "polynomial"
+        form = f"{curve} fitted to the {form}, sigma {sigma} {_unit(along)}"
     if error.line is not None and not error.is_rotation:
         others = [k for k in range(3) if k != error.axis]
         form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)
@@ -184,7 +187,7 @@ def error_lines(errors: VolumetricErrors) -> list[str]:
     ):
         cells = [_millimetres(value) for value in point]
         cells += [
-            _fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
+            fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
         ]
         rows.append(cells)
     return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(errors)]
@@ -225,7 +228,7 @@ def along_lines(along: AlongAxis) -> list[str]:
         rows.append(
             [
                 _millimetres(float(positions[k])),
-                *(_fixed(1e6 * values[k], 3) for values in given.values()),
+                *(fixed(1e6 * values[k], 3) for values in given.values()),
             ]
         )
     head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
@@ -340,11 +343,6 @@ def along_data(along: AlongAxis) -> dict[str, Any]:
         "random": along.deviation,
     }
     return dict(as_data(data))
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """A number with so many decimals; what rounds to zero has no sign."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
 def _millimetres(value: float) -> str:

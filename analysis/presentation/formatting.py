@@ -77,6 +77,15 @@ def number(value: float, digits: int = 4) -> str:
     return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
 
 
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals; what rounds to zero has no sign.
+
+    >>> fixed(-1e-9, 2), fixed(1.005e3, 1)
+    ('0.00', '1005.0')
+    """
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
+
+
 def percent(share: float) -> str:
     """A share in words, never rounded up.
 

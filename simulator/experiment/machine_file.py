@@ -21,7 +21,7 @@ from ..inputs.wording import explain
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
 from ..machines.arrangement_settings import arrangement_of
-from ..machines.curves import NAMES, Points
+from ..machines.curves import NAMES, Points, SmoothedPoints
 from ..machines.description import (
     AxisTemperature,
     MachineDescription,
@@ -31,8 +31,10 @@ from ..machines.description import (
     Three,
 )
 from ..machines.volumetric import DROOP, SQUARENESS
+from ..splines.knots import at_every
+from ..splines.spline_problems import SplineError, SplineProblem
 from .error_tables import ErrorTable, read_error_table
-from .machine_sections import DescribedMachineSettings
+from .machine_sections import DescribedMachineSettings, SmoothingSettings
 from .sections import VolumeSettings
 
 # Part of a polynomial's coefficients that is rounding.
@@ -221,9 +223,33 @@ def _errors(
                 error = replace(error, deviation=Points(table.bandwidth.positions, deviations))
             _check_table(table.on_table, machine, error.axis, (*steps, "file"), problems)
             error = replace(error, line=line, probe=table.probe, on_table=table.on_table)
-            yield replace(error, shape=table.points, criterion=table.criterion or machine.criterion)
+            points = table.points
+            if one.fit is not None:
+                points = _smoothed(points, one.fit, (*steps, "fit"), problems)
+            yield replace(error, shape=points, criterion=table.criterion or machine.criterion)
         else:
             yield error
+
+
+def _smoothed(
+    points: Points, settings: SmoothingSettings, steps: Steps, problems: Problems
+) -> Points:
+    """The least-squares spline that is wanted; the points after saying why there is none."""
+    x = np.asarray(points.positions)
+    knots = tuple(sorted(settings.knots or ()))
+    if settings.every is not None:
+        knots = at_every(x, settings.every, float(x[0]), float(x[-1]))
+    found = SmoothedPoints(points.positions, points.values, settings.order, knots)
+    try:
+        if len(x) < settings.order + len(knots):
+            text = f"{len(x)} points do not determine {settings.order + len(knots)} coefficients"
+            raise SplineError([SplineProblem(f"{text}; lower the order, or leave knots out")])
+        found.fitted  # noqa: B018
+    except SplineError as error:
+        for problem in error.problems:
+            problems.add(steps, problem.told(format_length))
+        return points
+    return found
 
 
 def _doubt_what_is_taken_off(machine: MachineDescription, problems: Problems) -> None:

@@ -56,8 +56,39 @@ class LineSettings(Settings):
     z: Length | None = Field(None, description="position of the z axis")
 
 
+class SmoothingSettings(Settings):
+    """A least-squares spline or polynomial in place of the points of a table."""
+
+    order: int = Field(
+        4,
+        ge=2,
+        le=MOST_COEFFICIENTS,
+        description=(
+            "coefficients of each polynomial, the constant included; default: 4, cubic. Without"
+            " knots there is one polynomial"
+        ),
+    )
+    every: int | None = Field(
+        None, ge=1, description="a knot at every so many points, as ballplate spline --every has"
+    )
+    knots: tuple[Length, ...] | None = Field(None, description="positions of the knots")
+
+    @model_validator(mode="after")
+    def _one_kind_of_knots(self) -> Self:
+        if self.every is not None and self.knots is not None:
+            raise ValueError('"every" and "knots" both say where knots are; leave one of them out')
+        return self
+
+
 class _ErrorSettings(Settings):
     file: Text | None = Field(None, description=FILE)
+    fit: SmoothingSettings | None = Field(
+        None,
+        description=(
+            "least-squares fit to the points of the file, to be used in their place: {order: 4} is"
+            " a cubic polynomial, {every: 5} a cubic spline"
+        ),
+    )
     sigmas: Sigmas = Field(2, description=SIGMAS)
     line: LineSettings | None = Field(None, description=LINE)
     probe: Point | None = Field(None, description=PROBE)
@@ -68,6 +99,10 @@ class _ErrorSettings(Settings):
         if polynomial is not None and self.file is not None:
             raise ValueError(
                 "a polynomial and a file cannot both be the error; leave one of them out"
+            )
+        if self.fit is not None and self.file is None:
+            raise ValueError(
+                "there is nothing to fit; name a file with measured points, or remove it"
             )
         if polynomial is None and self.file is None and bandwidth is None:
             raise ValueError(

@@ -21,6 +21,10 @@ Complex = NDArray[np.complex128]
 # How much longer the way over a place may be than the way past it, for the place to lie on the
 # profile.
 DETOUR = 0.05
+# The same of a corner, which may be sharp and nearer to one of the two places.
+CORNER_DETOUR = 1.0
+# How far from the profile a place may be that lies on it, as a part of the distance between points.
+BESIDE = 0.01
 
 
 class NotOnProfileError(ValueError):
@@ -68,11 +72,73 @@ class Profile:
         tangents = np.zeros(len(self._points), complex)
         for first, last in self.features:
             tangents[first : last + 1] = self._tangents(first, last)
-        normals = 1j * tangents / np.abs(tangents)
-        # The material is on the side of the axis.
-        if (normals.imag * self.places[:, 0]).sum() < 0:
-            normals = -normals
-        return np.stack([normals.imag, normals.real], axis=1)
+        return _as_pairs(self._outward * 1j * tangents / np.abs(tangents))
+
+    @cached_property
+    def _outward(self) -> float:
+        """Whether a tangent that is turned to the left points out of the material, 1 or -1: that
+        is on the side of the axis.
+        """
+        tangents = np.zeros(len(self._points), complex)
+        for first, last in self.features:
+            tangents[first : last + 1] = self._tangents(first, last)
+        turned = 1j * tangents / np.abs(tangents)
+        return -1.0 if (turned.imag * self.places[:, 0]).sum() < 0 else 1.0
+
+    def located(self, place: Array) -> tuple[float, Array]:
+        """Arc length of a place (2,) on the profile, and the unit normal (2,) out of the material.
+
+        A place that two features share has the normal of the latter; between two features that
+        share none there is no profile.
+
+        :raises NotOnProfileError: it is not on the profile.
+        """
+        same = np.flatnonzero((self.places == place).all(axis=1))
+        if len(same):
+            return float(self.lengths[same[0]]), self.normals[same[0]]
+        q = complex(place[1], place[0])
+        before, after = np.abs(self._points[:-1] - q), np.abs(self._points[1:] - q)
+        steps = np.abs(np.diff(self._points))
+        detour = (before + after - steps) / steps
+        k = int(np.argmin(detour)) if len(detour) else 0
+        ends = [one for one in self.features if one[0] <= k < one[1]]
+        if not ends or detour[k] > DETOUR:
+            raise NotOnProfileError
+        first, last = ends[0]
+        curvature = 0.0
+        if last - first >= 2:
+            own = _curvatures(self._points[first : last + 1])
+            curvature = 0.5 * float(own[k - first] + own[k - first + 1])
+        parts = [_arc(float(one[k]), curvature) for one in (before, after)]
+        share = parts[0] / sum(parts)
+        half = np.arcsin(np.clip(0.5 * curvature * steps[k], -1.0, 1.0))
+        chord = (self._points[k + 1] - self._points[k]) / steps[k]
+        # From the first end the chord to a point of the arc turns by half of what the arc does.
+        on_arc = self._points[k] + chord * np.exp(1j * half * (share - 1.0)) * (
+            steps[k] * (share if half == 0.0 else np.sin(half * share) / np.sin(half))
+        )
+        if abs(q - on_arc) > BESIDE * steps[k]:
+            raise NotOnProfileError
+        tangent = chord * np.exp(1j * half * (2.0 * share - 1.0))
+        length = self.lengths[k] + share * (self.lengths[k + 1] - self.lengths[k])
+        return float(length), _as_pairs(np.array([self._outward * 1j * tangent]))[0]
+
+    def beside(self, place: Array) -> tuple[Array, Array]:
+        """Unit normals out of the material and unit tangents along the profile, each (2, 2), of the
+        features before and after a place (2,) that they share.
+
+        :raises NotOnProfileError: no two features of several places share it.
+        """
+        found = []
+        for first, last in self.features:
+            for index, own in ((last, -1), (first, 0)):
+                if last > first and (self.places[index] == place).all():
+                    found.append(self._tangents(first, last)[own])
+        if len(found) != 2:
+            raise NotOnProfileError
+        tangents: Complex = np.array(found)
+        tangents /= np.abs(tangents)
+        return _as_pairs(self._outward * 1j * tangents), _as_pairs(tangents)
 
     def _tangents(self, first: int, last: int) -> Complex:
         points = self._points
@@ -92,6 +158,17 @@ class Profile:
         return np.append(chords / turns[:-1], chords[-1] * turns[-1])
 
 
+def _as_pairs(numbers: Complex) -> Array:
+    """Radius and axial co-ordinate (m, 2) of complex numbers (m,)."""
+    return np.stack([numbers.imag, numbers.real], axis=1)
+
+
+def _arc(chord: float, curvature: float) -> float:
+    """Length of the arc over a chord."""
+    bend = min(max(0.5 * chord * curvature, -1.0), 1.0)
+    return chord if bend == 0.0 else chord * float(np.arcsin(bend)) / bend
+
+
 def _curvatures(points: Complex) -> Array:
     """Signed curvature (m,) of the circle through each point and its neighbours; at the ends, that
     of the next.
@@ -107,12 +184,14 @@ def along(
     boundaries: Array,
     start: Array | None = None,
     end: Array | None = None,
+    corners: int = 0,
 ) -> tuple[Profile, Array, Array]:
     """The profile over nominal places (m, 2), and indices in it of the places (m,) and of the
     boundaries (n,).
 
     A feature ends where the labels of neighbouring places differ, and at every one of the
-    `boundaries` (n, 2), which lie between places or are places themselves. `start` and `end` (2,)
+    `boundaries` (n, 2), which lie between places or are places themselves; the way bends by any
+    angle at the last of them, as many as there are `corners`. `start` and `end` (2,)
     are places before the first and after the last.
 
     :raises NotOnProfileError: a boundary that is far from the way between neighbouring places; its
@@ -127,7 +206,8 @@ def along(
         if len(same):
             where.append(int(same[0]))
             continue
-        at = _between(np.array(found), boundary)
+        is_corner = k >= len(boundaries) - corners
+        at = _between(np.array(found), boundary, CORNER_DETOUR if is_corner else DETOUR)
         if at is None:
             raise NotOnProfileError(k)
         found.insert(at, boundary)
@@ -158,9 +238,9 @@ def along(
     )
 
 
-def _between(places: Array, boundary: Array) -> int | None:
-    """Index before which a place stands, where it lengthens the way least; None where that is
-    much.
+def _between(places: Array, boundary: Array, most: float) -> int | None:
+    """Index before which a place stands, where it lengthens the way least; None where that is more
+    than `most` of it.
     """
     if len(places) < 2:
         return None
@@ -169,4 +249,4 @@ def _between(places: Array, boundary: Array) -> int | None:
     direct = np.hypot(*np.diff(places, axis=0).T)
     detour = before + after - direct
     best = int(np.argmin(detour))
-    return None if detour[best] > DETOUR * direct[best] else best + 1
+    return None if detour[best] > most * direct[best] else best + 1

@@ -10,10 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from ..splines.pieces import pieces
+from ..splines.space import SplineSpace
+from ..splines.spline_fit import SplineFit, fit
 from .arrangement import Arrangement
 from .bases import Basis, Quoted
 from .error_names import AXIS_ERRORS
@@ -93,6 +97,63 @@ class Curve(SingleFunction):
 
         through = CubicSpline if self.interpolation == "cubic" else PchipInterpolator
         return np.asarray(through(self.t, self.y)(np.clip(t, self.t[0], self.t[-1])))[:, None]
+
+
+@dataclass(frozen=True)
+class SmoothCurve(Curve):
+    """Polynomials in place of the values, which are then those fitted: `pieces` are coefficients of
+    1, u, u^2, … with u the distance in t from each of the `breaks` but the last.
+    """
+
+    breaks: tuple[float, ...] = ()
+    pieces: tuple[tuple[float, ...], ...] = ()
+
+    kind: ClassVar[str] = "fitted"
+
+    def values(self, t: Array) -> Array:
+        """The polynomials at t (m,), as (m, 1)."""
+        held = np.clip(t, self.t[0], self.t[-1])
+        piece = np.clip(np.searchsorted(self.breaks, held, "right") - 1, 0, len(self.pieces) - 1)
+        u = held - np.asarray(self.breaks)[piece]
+        found = np.zeros(len(u))
+        for coefficients in np.asarray(self.pieces).T[::-1]:
+            found = found * u + coefficients[piece]
+        return found[:, None]
+
+
+@dataclass(frozen=True)
+class SmoothedPoints(Points):
+    """A measured curve of which the least-squares spline of an `order` (degree plus one) counts,
+    with interior `knots` in metres; without knots it is one polynomial.
+    """
+
+    order: int = 4
+    knots: tuple[float, ...] = ()
+
+    @cached_property
+    def fitted(self) -> SplineFit:
+        """The spline of the position in metres.
+
+        :raises SplineError: the points do not determine it.
+        """
+        space = SplineSpace(self.order, self.positions[0], self.positions[-1], self.knots)
+        return fit(space, np.asarray(self.positions), np.asarray(self.values))
+
+    def curve(self, interpolation: Interpolation, lower: float, upper: float) -> SmoothCurve:
+        """The function of t that is 0 at `lower` and 1 at `upper`, both in metres.
+
+        :raises SplineError: the points do not determine it.
+        """
+        found, length = pieces(self.fitted), upper - lower
+        powers = length ** np.arange(self.order)
+        plain = super().curve(interpolation, lower, upper)
+        return SmoothCurve(
+            plain.t,
+            plain.y,
+            interpolation,
+            tuple(((found.breaks - lower) / length).tolist()),
+            tuple(map(tuple, (found.coefficients * powers).tolist())),
+        )
 
 
 def curves_model(

@@ -15,7 +15,7 @@ import numpy as np
 
 from .arrangement import Arrangement
 from .bases import Basis, Polynomial, Spline
-from .curves import Curve, Interpolation, Points, SingleFunction
+from .curves import Curve, Interpolation, Points, SingleFunction, SmoothedPoints
 from .error_names import AXIS_ERRORS, ROTATIONS, SQUARENESS_ERRORS, TRANSLATIONS, AxisError
 from .kinematic import KinematicModel, carried_vectors, error_function
 from .protocol import Array, TrueMachine
@@ -385,12 +385,12 @@ def fitted_volumetric(
     """The error model that estimates what the file states, in a volume from `lower` to `upper`;
     values are not used.
 
-    Polynomials have the stated numbers of coefficients, tables become cubic splines with so many
-    interior `knots`, evenly spaced. The frame is that of the equations: functions are zero at the
-    lower corner, straightness errors at both ends; squareness errors that are not stated are zero.
-    Expansion is part of the positioning errors, and the arm's bend phi2 of its straightness where
-    that is stated; neither is a parameter then. An axis with a temperature has a positioning error
-    that is linear at least.
+    Polynomials have the stated numbers of coefficients, and fitted splines their knots; other
+    tables become cubic splines with so many interior `knots`, evenly spaced. The frame is that of
+    the equations: functions are zero at the lower corner, straightness errors at both ends;
+    squareness errors that are not stated are zero. Expansion is part of the positioning errors, and
+    the arm's bend phi2 of its straightness where that is stated; neither is a parameter then. An
+    axis with a temperature has a positioning error that is linear at least.
     """
     expanding = {f"E{axis.upper()}{axis.upper()}" for axis in machine.temperature}
     functions: dict[str, Basis] = {}
@@ -398,7 +398,14 @@ def fitted_volumetric(
         if error.shape is None:
             continue
         basis: Basis
-        if isinstance(error.shape, Points):
+        if isinstance(error.shape, SmoothedPoints):
+            low, high = lower[error.axis], upper[error.axis]
+            inside = [knot for knot in error.shape.knots if low < knot < high]
+            basis = Polynomial(error.shape.order)
+            if inside:
+                scaled = tuple((knot - low) / (high - low) for knot in inside)
+                basis = Spline(error.shape.order, scaled)
+        elif isinstance(error.shape, Points):
             basis = Spline(4, tuple((np.arange(1, knots + 1) / (knots + 1)).tolist()))
         else:
             basis = Polynomial(

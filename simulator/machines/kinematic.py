@@ -154,8 +154,14 @@ class KinematicModel:
             target[:, f.axis, f.component] += bases[f.axis, f.basis] @ a[self.slices[f.name]]
         return translation, rotation
 
+    def motions(self, x: Array, a: Array) -> tuple[Array, Array]:
+        """Displacement and rotation of every axis at positions x (m, 3), each (m, 3 axes, 3
+        components).
+        """
+        return self._motions(self._bases(x), a, len(x))
+
     def error(self, x: Array, a: Array, p: Array) -> Array:
-        translation, rotation = self._motions(self._bases(x), a, len(x))
+        translation, rotation = self.motions(x, a)
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
             return RigidChain(self.arrangement, from_origin, translation, rotation, p).error()

@@ -41,12 +41,17 @@ def at_every(
 
 
 def with_boundaries(
-    knots: Sequence[float], boundaries: Sequence[float], order: int
+    knots: Sequence[float],
+    boundaries: Sequence[float],
+    order: int,
+    corners: Sequence[float] = (),
 ) -> tuple[float, ...]:
-    """All knots in order, with those that leave only value and slope continuous at the boundaries.
+    """All knots in order, with those that leave only value and slope continuous at the boundaries,
+    and nothing at the corners.
 
     >>> with_boundaries((1.0, 3.0), (2.0,), 4)
     (1.0, 2.0, 2.0, 3.0)
     """
     doubled = [boundary for boundary in boundaries for _ in range(order - 2)]
-    return tuple(sorted([*knots, *doubled]))
+    broken = [corner for corner in corners for _ in range(order)]
+    return tuple(sorted([*knots, *doubled, *broken]))

@@ -27,7 +27,8 @@ class SplineSpace:
     ascending order.
 
     A knot that stands m times leaves order - 1 - m derivatives continuous, the value counted as one
-    of none: twice for cubic splines leaves value and slope. Abscissae are in metres or radians.
+    of none: twice for cubic splines leaves value and slope, `order` times
+    leaves nothing. Abscissae are in metres or radians.
 
     >>> SplineSpace(4, 0.0, 2.0, (0.5, 1.0, 1.0)).count
     7
@@ -57,10 +58,10 @@ class SplineSpace:
                 )
             )
         for knot, times in Counter(self.knots).items():
-            if times >= self.order:
+            if times > self.order:
                 found.append(
                     SplineProblem(
-                        f"the knot at {{0}} is given {times} times; give it {self.order - 1}"
+                        f"the knot at {{0}} is given {times} times; give it {self.order}"
                         " times at most",
                         (knot,),
                     )

@@ -61,13 +61,12 @@ def test_every_option_mistyped(capsys: pytest.CaptureFixture[str]) -> None:
             if any(known.startswith(mistyped) for known in command._option_string_actions):
                 continue
             needs = [
-                one.option_strings[-1]
+                text
                 for one in command._actions
                 if one.required and one.option_strings
+                for text in (one.option_strings[-1], *(one.choices or ["x"])[:1])
             ]
-            told = complaint(
-                capsys, name, *needed, *(text for one in needs for text in (one, "x")), mistyped
-            )
+            told = complaint(capsys, name, *needed, *needs, mistyped)
             assert (
                 told == f"ballplate {name}: error: unrecognized arguments: {mistyped}; did you mean"
                 f' "{option}"?'

@@ -143,9 +143,20 @@ WALK = {
     "map": Walk(
         {"FILE": "machine.yaml"}, {"--plot": "map.png"}, ("--grid", "2,2,2"), ("measured/exx.csv",)
     ),
+    "compensation": Walk(
+        {"FILE": "machine.yaml"},
+        {"-o": "c.csv"},
+        ("--format", "isg", "--pitch", "200 mm"),
+        ("measured/exx.csv",),
+    ),
     "spline": Walk(
-        {"FILE": "points.csv"},
-        {"--coefficients": "s.csv", "--plot": "s.pdf", "--whiskers": "w.svg"},
+        {"FILE": "points.csv", "--nominal": "nominal.csv"},
+        {
+            "--coefficients": "s.csv",
+            "--compensated": "m.csv",
+            "--plot": "s.pdf",
+            "--whiskers": "w.svg",
+        },
         ("--y", "semi_finish_error", "--points", "12-32"),
     ),
     "export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
@@ -167,7 +178,7 @@ WALK = {
 }
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
-LEFT_OUT = ("--from", "--done", "--store", "--folder", "--results", "--designs")
+LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
 LEFT_OUT += ("--tasks", "--against")
 
 
@@ -182,7 +193,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "report.dmo").write_text(sphere, encoding="utf-8")
     axes = "axes: {repeatability: {path: machine.repeatability, values: [1 um, 2 um]}}"
     (folder / "sweep.yaml").write_text(f"title: two\nbase: design.yaml\n{axes}\n", encoding="utf-8")
-    for name in ("drawn.yaml", "done.csv"):
+    for name in ("drawn.yaml", "done.csv", "nominal.csv"):
         (folder / name).write_text("is not read\n", encoding="utf-8")
     shutil.copy("designs/gilsinn/table-1.csv", folder / "points.csv")
     shutil.copy("designs/park/machines/measured-errors.yaml", folder / "machine.yaml")

@@ -32,6 +32,7 @@ from ballplate.simulator.experiment import (
 from ballplate.simulator.experiment import (
     curve_files as curves,
 )
+from ballplate.simulator.experiment.compensation import table_formats
 from ballplate.simulator.geometry import artefacts, directions
 from ballplate.simulator.inputs import messages, tables, yamltree
 from ballplate.simulator.inputs import settings as input_settings
@@ -77,6 +78,7 @@ LIMITS = {
     "`sweep` | cells": (load.MOST_CELLS,),
     "`sweep` | values": (axes.MOST_VALUES,),
     "`reach`": (search.MOST_POINTS,),
+    "`compensation` |": (table_formats.MOST_NODES, table_formats.MOST_GRID_NODES),
     "`lengths` |": (lengths.MOST_POINTS,),
     "`lengths --pairs`": (lengths_command.MOST_PAIRS,),
     "`correct --covariance`": (correction.MOST_CO_ORDINATES,),

@@ -22,6 +22,8 @@ from random import Random
 from unicodedata import category
 
 from ballplate.simulator.experiment.machine_sections import machine_schema
+from ballplate.simulator.machines.arrangement import AXES
+from ballplate.simulator.machines.error_names import AXIS_ERRORS
 
 from tests.robustness.command_lines import changed_line, drawn, grammar, parsed, quick
 from tests.robustness.experiments import SEED, SWEEP_WORDS, WORDS
@@ -57,7 +59,7 @@ MACHINES = ("machine.yaml", "gec-like.yaml")
 SWEEPS = ("sweep.yaml", "trials.yaml", "ranges.yaml", "subsets.yaml", "variants.yaml")
 
 # Options whose value is read; what other options name is written.
-READ = ("done", "earlier", "results", "designs", "folder")
+READ = ("done", "earlier", "results", "designs", "folder", "nominal")
 BESIDE_STORES = ("-wal", "-shm", "-journal", ".lock")
 STATUSES = (0, 1, 2, 3)
 ERROR = re.compile(FORM)
@@ -274,6 +276,10 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
         stores = {options.store or file.with_suffix(".sqlite")}
     elif command in ("export", "report"):
         stores = {options.store}
+    if command == "compensation":
+        # Tables of single axes, or of errors, beside what is named.
+        parts = [f"{part}{end}" for part in (*AXES, *AXIS_ERRORS) for end in (".csv", ".com")]
+        written |= {one.with_name(f"{one.stem}-{p}") for one in written if one.name for p in parts}
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
     if not getattr(options, "force", True):
         allowed -= before.keys()

@@ -87,7 +87,7 @@ title: a small machine
 volume: {x: [0 mm, 800 mm], y: [0 mm, 600 mm], z: [0 mm, 500 mm]}
 arrangement: MB2
 errors:
-  EXX: {file: exx.csv}
+  EXX: {file: exx.csv, fit: {order: 3}}
   EYX: {polynomial: [0 um, 8 um, -8 um], line: {y: 300 mm, z: 400 mm}}
   EAX: {polynomial: [0 urad, 4 urad], bandwidth: 3 urad}
 squareness: {EC0Y: 21 urad}
@@ -97,6 +97,22 @@ CURVE = "position_mm,error_um,u_um\n" + "".join(
     f"{20 * k},{error},0.2\n"
     for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
 )
+
+VOLCOMP = """\
+// errors of three axes
+X EXX EYX ECX
+0 0 0 0
+100 0.001 -0.002 0.00001
+#
+Y EXY EYY
+0 0 0
+100 0.001 0.002
+#
+Z EZZ
+-50 0.001
+0 0
+50 -0.001
+"""
 
 VARIANTS = {
     "splines": "plain",
@@ -139,6 +155,7 @@ def make_kit(folder: Path) -> None:
         "sweep.yaml": SWEEP,
         "machine.yaml": MACHINE,
         "curve.csv": CURVE,
+        "volcomp.csv": VOLCOMP,
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")

@@ -123,6 +123,14 @@ RECIPES = (
     "curves map.yaml --plot out.svg",
     "curves map.npz --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
+    "compensation machine.yaml --format isg --pitch '100 mm' -o out.csv",
+    "compensation machine.yaml --format csv --sense indication --origin '0 mm, 9 mm, 9 mm' -o out.csv",
+    "compensation gec-like.yaml --format isg --volumetric --pitch '600 mm' --json",
+    (
+        "compensation machine.yaml --format heidenhain --sense indication --without-rotations"
+        " --origin '100 mm, 0 mm, 0 mm' -o out.cma"
+    ),
+    "compensation volcomp.csv --format isg --read --sense corrections --arrangement MB2 -o out.yaml",
     "spline curve.csv --evaluate '10 mm, 50 mm' --coefficients out.csv --powers global",
     (
         "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"
@@ -133,6 +141,10 @@ RECIPES = (
     (
         "spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg"
         " --magnification 500"
+    ),
+    (
+        "spline table-1.csv --y semi_finish_error --points 1-10 --corner '44.704 mm, -114.554 mm'"
+        " --straight 1 --straight 2 --knots none --compensated out.csv"
     ),
     "reproduce npl --designs npl --experiment 5.2 --quick",
     "reproduce certified --designs certified --experiment weak --json",

@@ -382,7 +382,7 @@ def test_nothing_is_extrapolated() -> None:
         ((1, 0.0, 1.0), "order is at least 2"),
         ((4, 1.0, 1.0), "ends at 1, not above its start at 1"),
         ((4, 0.0, 1.0, (1.0, 0.5)), "the knot at 1 is not between.*out of order"),
-        ((3, 0.0, 1.0, (0.5, 0.5, 0.5)), "is given 3 times; give it 2 times at most"),
+        ((3, 0.0, 1.0, (0.5,) * 4), "is given 4 times; give it 3 times at most"),
     ],
 )
 def test_impossible_spaces_are_refused(arguments: tuple, text: str) -> None:  # type: ignore[type-arg]
