@@ -1,0 +1,267 @@
+"""The page of a fit: what was estimated from readings, how well, and whether to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .curve_sections import curves_section
+from .document import Page, Section, made, written
+from .elements import Html, element, joined, note, sentence, table
+from .quoted import Quoted
+from .residual_sections import (
+    components_section,
+    reliability_section,
+    residual_charts,
+    residual_tables,
+    residual_view,
+    suspects_section,
+)
+from .uncertainty_sections import (
+    estimates_table,
+    expansion,
+    lengths_words,
+    task_table,
+    uncertainty_table,
+)
+
+FOOT = (
+    "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
+    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit --json: its data-path says"
+    " where it stands there."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateResiduals:
+    """Readings (m,) of plates: where the scales were (m, d), what each differs by from the
+    estimate (m, d), in metres and in standard uncertainties, NaN where a co-ordinate is not read,
+    and indices of positions and probes with their names.
+    """
+
+    places: Array
+    values: Array
+    standardised: Array
+    position: Integers
+    probe: Integers
+    positions: tuple[str, ...]
+    probes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FitContents:
+    """What a page of a fit is made of: plain data of the fit and of its design's reliability, None
+    where that was left out for the reason `unreliable`; `kinds` of the estimates by name; the
+    edges (k, 2, d) of the volume; `target` in words, and what was assumed.
+    """
+
+    title: str
+    data: Mapping[str, Any]
+    kinds: Mapping[str, str]
+    reliability: Mapping[str, Any] | None
+    unreliable: str
+    residuals: PlateResiduals
+    edges: Array
+    target: str
+    facts: Sequence[tuple[str, str]]
+
+
+def fit_page(contents: FitContents) -> str:
+    """The page as a file that needs no other."""
+    fit = Quoted("/fit", contents.data)
+    has_result = contents.data["status"] == "converged"
+    sections = [_course(fit)]
+    if has_result:
+        sections = [*_results(fit, contents), *sections]
+    facts = [*contents.facts, *made()]
+    is_good = has_result and _is_good(contents.data)
+    return written(Page(contents.title, _verdict(fit, contents), is_good, facts, sections, FOOT))
+
+
+def _results(fit: Quoted, contents: FitContents) -> list[Section]:
+    """The sections of a fit that has converged."""
+    found = contents.residuals
+    of_residuals = Html()
+    if len(found.places):
+        of_residuals = joined(
+            [
+                residual_charts(
+                    found.standardised, found.position, found.probe, found.positions, found.probes
+                ),
+                residual_view(found.places, np.nan_to_num(found.values), contents.edges),
+                residual_tables(fit),
+            ]
+        )
+    reliability = note(contents.unreliable)
+    if contents.reliability is not None:
+        reliability = reliability_section(Quoted("/reliability", contents.reliability))
+    return [
+        Section("rank", "What the readings determine", _rank(fit)),
+        Section(
+            "lengths", "Uncertainties and target", joined([uncertainty_table(fit), task_table(fit)])
+        ),
+        Section("curves", "Error curves", curves_section(fit)),
+        Section("suspected", "Suspected gross errors", suspects_section(fit)),
+        Section("residuals", "Residuals", of_residuals),
+        Section("components", "Variance components", components_section(fit)),
+        Section("reliability", "Reliability", reliability),
+        Section("adjustments", "Adjustments", _adjustments(fit)),
+        Section("plate", "Plate", _plate(fit, contents.kinds)),
+        Section("estimates", "Estimates", _estimates(fit, contents.kinds)),
+    ]
+
+
+def _is_good(data: Mapping[str, Any]) -> bool:
+    """Whether nothing on the page asks for a person's attention."""
+    shares = [one.get("within_target") for one in data["quantities"].values()]
+    wrong = data["complaint"] or data["too_large"] or data.get("suspected") or data["warnings"]
+    missed = any(share is not None and share < 1.0 for share in shares)
+    missed |= any(one["within_target"] is False for one in data.get("tasks", {}).values())
+    return not wrong and not missed
+
+
+def _verdict(fit: Quoted, contents: FitContents) -> Html:
+    data = contents.data
+    if data["status"] != "converged":
+        first = sentence(f"The estimate has {data['status']}, and there are no results.")
+        return joined([first, sentence(fit.text("complaint"))])
+    rank = (
+        joined(
+            [
+                "Rank deficiency ",
+                fit.number("rank_deficiency"),
+                ", as expected" if data["as_expected"] else ", which the file does not expect",
+            ]
+        )
+        if data["rank_deficiency"]
+        else "Full rank"
+    )
+    scatter = "the residuals are no larger than stated"
+    if data["too_large"]:
+        scatter = "the residuals are larger than the stated uncertainties explain"
+    count = len(data.get("suspected", ()))
+    suspects = f", and {count} cause{'s are' if count > 1 else ' is'} suspected" if count else ""
+    estimated = "estimated from the residuals" if data["sigma_is_estimated"] else "as given"
+    first = sentence(
+        rank,
+        f"; {scatter} (sigma = ",
+        fit.number("sigma", digits=3),
+        f", {estimated})",
+        suspects,
+        ".",
+    )
+    second = sentence(lengths_words(fit, contents.target))
+    warnings = [sentence("Warning: ", one.text()) for one in fit.at("warnings").each()]
+    complaint = [sentence(fit.text("complaint"))] if data["complaint"] else []
+    return joined([first, second, *complaint, *warnings])
+
+
+def _rank(fit: Quoted) -> Html:
+    data = fit.data
+    parts = [
+        sentence(
+            fit.number("parameters"),
+            " parameters, ",
+            fit.number("observations"),
+            " observations, ",
+            fit.number("degrees_of_freedom"),
+            " degrees of freedom.",
+        )
+    ]
+    for key, title in (
+        ("undetermined", "Undetermined"),
+        ("weakly_determined", "Weakly determined"),
+    ):
+        if data[key]:
+            words = (
+                element("li", one.text() if key == "undetermined" else one.text("text"))
+                for one in fit.at(key).each()
+            )
+            parts += [element("h3", title), element("ol", *words)]
+    for key, title in (
+        ("planned_but_not_read", "Planned, but not read"),
+        ("read_but_not_planned", "Read, but not planned"),
+        ("reasons", "Reasons"),
+    ):
+        if data[key]:
+            words = (element("li", one.text()) for one in fit.at(key).each())
+            parts += [element("h3", title), element("ul", *words)]
+    return joined(parts)
+
+
+def _course(fit: Quoted) -> Section:
+    """How the iterations went."""
+    rows = [
+        [
+            str(k),
+            "" if k == 0 else one.number("step", digits=2),
+            one.number("sum_of_squares", digits=6),
+        ]
+        for k, one in enumerate(fit.at("iterations").each())
+    ]
+    heads = ["iteration", "step, m and rad", "S²"]
+    made_table = table("iterations", "Iterations", heads, rows)
+    return Section("iterations", "Course of the fit", made_table)
+
+
+def _adjustments(fit: Quoted) -> Html:
+    if "adjustments" not in fit:
+        return Html()
+    rows = []
+    for one in fit.at("adjustments").each():
+        is_angle = one.data["unit"] == "rad"
+        factor = 180.0 * 3600.0 / np.pi if is_angle else 1e6
+        names = ("value", "standard_uncertainty", "expanded_uncertainty")
+        figures = [one.number(name, factor=factor) for name in names]
+        rows.append(
+            [one.text("what"), *figures, "arcsec" if is_angle else "µm/m", one.text("words")]
+        )
+    heads = ["adjustment", "is off by", "u", "U, 95 %", "unit", "what to do"]
+    words = "Errors of scales: true length less reading; errors of angles: excess over 90°."
+    return joined([table("adjustments", "Scales and angles", heads, rows, (0, 4, 5)), note(words)])
+
+
+def _plate(fit: Quoted, kinds: Mapping[str, str]) -> Html:
+    """Co-ordinates of the balls: in the plate's own axes where there are such, and as estimated."""
+    parts = []
+    k = expansion(fit.at("quantities"))
+    for number, plate in enumerate(fit.at("plates").each() if "plates" in fit else ()):
+        name = list(fit.data["plates"])[number]
+        rows = []
+        for ball, one in zip(plate.data["balls"], plate.at("balls").each(), strict=True):
+            places = [one.at(axis).number("value", factor=1e3, digits=9) for axis in "xy"]
+            us = [one.at(axis).micro("standard_uncertainty", digits=3) for axis in "xy"]
+            expanded = [
+                one.at(axis).micro("standard_uncertainty", factor=k, digits=3) for axis in "xy"
+            ]
+            rows.append([ball, *places, *us, *expanded])
+        heads = ["ball", "x, mm", "y, mm", "u of x, µm", "of y", f"U of x, k = {k:g}", "of y"]
+        axes = plate.data["axes"]
+        caption = f"{name}, in its own axes: origin in {axes['origin']}, and " + ", ".join(
+            f"the {axis} axis through {ball}" for axis, ball in axes.items() if axis != "origin"
+        )
+        parts.append(table(f"plate-{number}", caption, heads, rows, is_long=len(rows) > 40))
+    balls = [name for name, kind in kinds.items() if kind == "ball"]
+    words = "Co-ordinates of the balls, as estimated"
+    parts.append(estimates_table(fit, balls, "balls", words))
+    return joined(parts)
+
+
+def _estimates(fit: Quoted, kinds: Mapping[str, str]) -> Html:
+    titles = {
+        "machine": "Parameters of the error model",
+        "influence": "Influence quantities",
+        "offset": "Offsets of probes",
+        "length": "Lengths of standards",
+        "rotation": "Rotations of positions",
+        "origin": "Origins of positions",
+    }
+    parts = []
+    for kind, caption in titles.items():
+        names = [name for name, one in kinds.items() if one == kind]
+        parts.append(estimates_table(fit, names, f"estimates-{kind}", caption))
+    return joined(parts)
