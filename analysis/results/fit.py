@@ -31,6 +31,7 @@ from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
     CorrectedPoints,
     EstimatedFunctions,
@@ -39,6 +40,7 @@ from .estimates import (
     estimate_rows,
     labels,
 )
+from .fit_contents import fit_contents
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -52,8 +54,6 @@ from .parts import (
     verdict_data,
     verdict_lines,
 )
-from .error_functions import EstimatedCurve, estimated_curves
-from .fit_contents import fit_contents
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals, residual_groups

@@ -7,21 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, measured
+from ballplate.simulator.design.arrays import measured
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..gross_errors.leftover import too_many_entries
 from ..gross_errors.redundancy import reliability_of
 from ..presentation.pages.fit_page import FitContents, PlateResiduals
 from ..presentation.scene import box_edges, projection
 from .estimates import ParameterEstimate, labels
-from .page_facts import assumptions, target_in_words
+from .page_facts import assumptions, target_in_words, unjudged
 from .residuals import reading_residuals
-
-# Readings of plates beyond which judging every bias takes longer than a page should.
-MOST_JUDGED = 1500
 
 
 def fit_contents(
@@ -39,7 +35,7 @@ def fit_contents(
     volume = design.machine.volume
     _, towards = projection(design.dimension)
     edges, _ = box_edges(volume.lower, volume.upper, towards)
-    reason = _unjudged(design)
+    reason = unjudged(design)
     judged = None
     if not reason and solution.status == "converged":
         is_estimated = data["sigma_is_estimated"]
@@ -61,16 +57,6 @@ def fit_contents(
         edges,
         target_in_words(experiment),
         facts,
-    )
-
-
-def _unjudged(design: Design) -> str:
-    """Why biases are not judged; empty where they are."""
-    count = len(design.plate_readings)
-    if count <= MOST_JUDGED:
-        return too_many_entries(design)
-    return (
-        f"{count} readings are too many to be judged one by one here; ballplate reliability does it"
     )
 
 

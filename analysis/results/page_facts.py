@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.settings import listing
 
 from ..error_maps.length_groups import target_words
+from ..gross_errors.leftover import too_many_entries
 from ..presentation.formatting import uncertainty_words
+
+# Readings of plates beyond which judging every bias takes longer than a page should.
+MOST_JUDGED = 1500
 
 
 def target_in_words(experiment: Experiment) -> str:
@@ -61,3 +66,13 @@ def _influences(experiment: Experiment) -> str:
     left = [kind for kind in ("temperature", "drift") if kind not in kinds]
     without = f"no effect of {' and '.join(left)} is assumed" if left else ""
     return "; ".join(filter(None, [listing(kinds), without]))
+
+
+def unjudged(design: Design) -> str:
+    """Why a page does not judge every bias; empty where it does."""
+    count = len(design.plate_readings)
+    if count <= MOST_JUDGED:
+        return too_many_entries(design)
+    return (
+        f"{count} readings are too many to be judged one by one here; ballplate reliability does it"
+    )

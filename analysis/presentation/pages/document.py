@@ -6,7 +6,7 @@ import base64
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from functools import cache
 from importlib import resources
 from importlib.metadata import version
@@ -98,8 +98,8 @@ def _head(title: str, script: str) -> Html:
 
 def made(when: datetime | None = None) -> tuple[tuple[str, str], ...]:
     """When the page was made, and with which version."""
-    moment = when or datetime.now(timezone.utc)
+    moment = when or datetime.now(UTC)
     return (
-        ("Date", f"{moment.astimezone(timezone.utc):%Y-%m-%d %H:%M} UTC"),
+        ("Date", f"{moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC"),
         ("Computed with", f"ballplate {version('ballplate')}"),
     )

@@ -1,0 +1,259 @@
+"""The page of a design: what it will determine and how well, before anything is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ballplate.simulator.estimation.linearisation import Linearisation
+
+from ...rank.motions import Motion
+from ..formatting import SHOWN
+from .design_views import ball_views, motion_view, point_view, volume_view
+from .document import Page, Section, made, written
+from .elements import Html, element, joined, note, sentence, table
+from .length_sections import lengths_section
+from .quoted import Quoted
+from .residual_sections import reliability_section
+from .uncertainty_sections import (
+    expansion,
+    lengths_words,
+    scale_section,
+    task_table,
+    uncertainty_table,
+)
+
+FOOT = (
+    "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
+    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every figure is that of"
+    " ballplate run, lengths, reliability, check --suggest or sheet with --json: its data-path says which, and where it stands"
+    " there."
+)
+
+# Directions that are drawn, of each kind; the others are told in words.
+MOST_DRAWN = 6
+
+
+@dataclass(frozen=True, eq=False)
+class DesignContents:
+    """What a page of a design is made of: plain data as the commands print them, by the command's
+    name; the linearised design with its undetermined and weak motions; `target` in words; and what
+    was assumed. `unreliable` is the reason why there is no reliability among the data.
+    """
+
+    title: str
+    data: Mapping[str, Any]
+    at: Linearisation
+    null: Sequence[Motion]
+    weak: Sequence[Motion]
+    target: str
+    unreliable: str
+    facts: Sequence[tuple[str, str]]
+
+
+def design_page(contents: DesignContents) -> str:
+    """The page as a file that needs no other."""
+    quoted = {name: Quoted(f"/{name}", data) for name, data in contents.data.items()}
+    run = quoted["run"]
+    factor = expansion(run.at("quantities"))
+    at = contents.at
+    ellipsoids = [point_view(at, factor)] if len(at.design.evaluation.points) else []
+    ellipsoids += list(ball_views(at, factor))
+    sections = [
+        Section("volume", "The volume", figures_wide([volume_view(at.design)])),
+        Section("rank", "What the readings determine", _rank(run, contents)),
+        Section("suggestions", "Suggested changes", _suggestions(quoted)),
+        Section(
+            "uncertainties",
+            "Uncertainties",
+            joined([uncertainty_table(run), task_table(run), _influences(run)]),
+        ),
+        Section("lengths", "Lengths throughout the volume", _lengths(quoted, contents.target)),
+        Section("ellipsoids", "Points and balls", figures_wide(ellipsoids)),
+        Section("scale", "Where scale comes from", scale_section(run)),
+        Section("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
+        Section("sheet", "Run sheet", _sheet(quoted["sheet"])),
+    ]
+    facts = [*contents.facts, *made()]
+    verdict = _verdict(run, contents.target)
+    return written(Page(contents.title, verdict, _is_good(run), facts, sections, FOOT))
+
+
+def figures_wide(content: Sequence[Html]) -> Html:
+    """Pictures beside one another where there is much room."""
+    return element("div", *content, class_="figures views")
+
+
+def _is_good(run: Quoted) -> bool:
+    shares = [one.get("within_target") for one in run.data["quantities"].values()]
+    missed = any(share is not None and share < 1.0 for share in shares)
+    missed |= any(one["within_target"] is False for one in run.data.get("tasks", {}).values())
+    return run.data["as_expected"] and not run.data["weakly_determined"] and not missed
+
+
+def _verdict(run: Quoted, target: str) -> Html:
+    data = run.data
+    count = len(data["weakly_determined"])
+    weak = (
+        f"; {count} direction{'s are' if count > 1 else ' is'} weakly determined" if count else ""
+    )
+    counts = joined(
+        [run.number("parameters"), " parameters from ", run.number("observations"), " observations"]
+    )
+    if data["rank_deficiency"]:
+        expected = (
+            "as the file expects" if data["as_expected"] else "which the file does not expect"
+        )
+        first = sentence(
+            "Rank deficiency ",
+            run.number("rank_deficiency"),
+            f", {expected}: the readings leave ",
+            run.number("rank_deficiency"),
+            " changes of ",
+            counts,
+            f" undetermined{weak}.",
+        )
+    else:
+        expected = "" if data["as_expected"] else ", though the file expects a deficiency"
+        first = sentence(f"Full rank{expected}: the readings determine all ", counts, f"{weak}.")
+    return joined([first, sentence(lengths_words(run, target))])
+
+
+def _rank(run: Quoted, contents: DesignContents) -> Html:
+    parts = []
+    given = (
+        (
+            "undetermined",
+            "Undetermined",
+            contents.null,
+            "These change together without changing any observation.",
+        ),
+        (
+            "weakly_determined",
+            "Weakly determined",
+            contents.weak,
+            "The observations hardly notice these; each is drawn one standard deviation long.",
+        ),
+    )
+    for key, title, motions, words in given:
+        if not run.data[key]:
+            continue
+        drawn = []
+        for k, (motion, one) in enumerate(zip(motions, run.at(key).each(), strict=True)):
+            told = one.text() if key == "undetermined" else one.text("text")
+            if k < MOST_DRAWN:
+                name = f"{key.replace('_', '-')}-{k + 1}"
+                drawn.append(motion_view(contents.at, motion, name, told, f"{title} {k + 1}"))
+            else:
+                drawn.append(sentence(f"{title} {k + 1}: ", told))
+        pictures, rest = drawn[:MOST_DRAWN], drawn[MOST_DRAWN:]
+        parts += [element("h3", title), note(words), figures_wide(pictures), *rest]
+    if run.data["reasons"]:
+        reasons = (element("li", one.text()) for one in run.at("reasons").each())
+        parts += [element("h3", "Reasons"), element("ul", *reasons)]
+    if not parts:
+        return sentence("Nothing is undetermined or weakly determined.")
+    return joined(parts)
+
+
+def _suggestions(quoted: Mapping[str, Quoted]) -> Html:
+    """What would determine the rest, and what each change would do."""
+    if quoted["check"].data.get("repairs") is None:
+        return sentence("None is needed: nothing is undetermined or weakly determined.")
+    repairs, run = quoted["check"].at("repairs"), quoted["run"]
+    before = run.data["quantities"].get("U6", {}).get("average")
+    now = (
+        joined([" U6 is ", run.at("quantities", "U6").micro("average"), " µm on average now."])
+        if before is not None
+        else ""
+    )
+    rows = []
+    for key in ("complete", "partial"):
+        for number, one in enumerate(repairs.at(key).each(), start=1):
+            changes = joined((change.text("text") for change in one.at("changes").each()), "; ")
+            of = ", ".join(map(str, one.data["removes"]))
+            name = f"repair {number}" if key == "complete" else f"of direction {of} alone"
+            edits = joined(
+                element("li", element("code", f"{edit['path']}: {edit['value']}"))
+                for edit in one.data["edits"]
+            )
+            u6 = one.micro("average_U6") if one.data["average_U6"] is not None else "-"
+            rows.append(
+                [
+                    name,
+                    changes,
+                    one.number("rank_deficiency"),
+                    one.number("weakly_determined"),
+                    u6,
+                    element("ul", edits, class_="edits"),
+                ]
+            )
+    if not rows:
+        return sentence("No changes were found that determine everything.")
+    heads = [
+        "",
+        "change",
+        "rank deficiency then",
+        "weak directions then",
+        "U6 average then, µm",
+        "in the file",
+    ]
+    made_table = table("repairs", "Changes, cheapest first, each verified", heads, rows, (0, 1, 5))
+    return joined(
+        [
+            sentence("Each of these determines what is open.", now)
+            if repairs.data["complete"]
+            else "",
+            made_table,
+        ]
+    )
+
+
+def _influences(run: Quoted) -> Html:
+    if not run.data.get("influences"):
+        return Html()
+    rows = []
+    for name, one in zip(run.data["influences"], run.at("influences").each(), strict=True):
+        stated = (
+            one.micro("stated_standard_uncertainty")
+            if one.data["stated_standard_uncertainty"] is not None
+            else "free"
+        )
+        rows.append([name, stated, one.micro("standard_uncertainty"), SHOWN[one.data["unit"]]])
+    heads = ["influence quantity", "u stated", "u after the readings", "unit"]
+    return table("influences", "Influence quantities", heads, rows, (0, 3))
+
+
+def _lengths(quoted: Mapping[str, Quoted], target: str) -> Html:
+    return lengths_section(quoted["lengths"], target)
+
+
+def _reliability(quoted: Mapping[str, Quoted], unreliable: str) -> Html:
+    if "reliability" not in quoted:
+        return note(unreliable)
+    return reliability_section(quoted["reliability"])
+
+
+def _sheet(sheet: Quoted) -> Html:
+    """The order of positions."""
+    rows = []
+    for number, step in enumerate(sheet.at("steps").each(), start=1):
+        change = step.text("change") if step.data["change"] else ""
+        name = step.text("name")
+        if step.data["description"]:
+            name = joined([name, ": ", step.text("description")])
+        rows.append(
+            [
+                str(number),
+                name,
+                step.text("set_up"),
+                ", ".join(step.data["probes"]),
+                step.text("balls"),
+                step.number("readings"),
+                change,
+            ]
+        )
+    heads = ["", "position", "set up", "probes", "balls", "readings", "first change"]
+    words = note("ballplate sheet prints it with boxes to tick off.")
+    return joined([table("steps", "Order of positions", heads, rows, (0, 1, 2, 3, 4, 6)), words])
