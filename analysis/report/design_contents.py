@@ -56,6 +56,7 @@ def page_of_design(
         weak_motions(at, experiment.target_uncertainty),
         target,
         reason,
+        experiment.source.name if experiment.name is None else experiment.label,
         assumptions(experiment, len(design.model.parameters)),
     )
     return design_page(contents)

@@ -43,9 +43,9 @@ def fit_contents(
             design, sigma_is_estimated=is_estimated, experiment=experiment
         ).to_dict()
     how = "estimated from the residuals" if data["sigma_is_estimated"] else "as given"
-    files = dict.fromkeys(Path(mark.file).name for mark in observed.marks)
+    files = list(dict.fromkeys(Path(mark.file).name for mark in observed.marks))
     facts = assumptions(experiment, len(design.model.parameters))
-    facts[1:1] = [("Readings", f"{len(observed.x)} from {', '.join(files) or 'a table'}")]
+    facts.insert(1, ("Readings", f"{len(observed.x)} from {', '.join(files) or 'a table'}"))
     facts.append(("Sigma", f"{how}: it multiplies all stated uncertainties"))
     return FitContents(
         experiment.title,
@@ -56,6 +56,7 @@ def fit_contents(
         _residuals(observed, solution, data["sigma"], has_scatter),
         edges,
         target_in_words(experiment),
+        (experiment.source.name, *files),
         facts,
     )
 

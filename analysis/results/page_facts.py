@@ -31,7 +31,7 @@ def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]
     known = {
         "File": str(experiment.source),
         "Variant": experiment.name or "",
-        "Description": experiment.description,
+        "Description": " ".join(experiment.description.split()),
         "Volume": f"{volume} mm",
         "Error model": f"{model.kind}, {parameters} parameters",
         "Repeatability": f"{', '.join(dict.fromkeys(repeatability))} µm (standard uncertainty)",

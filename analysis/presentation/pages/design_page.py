@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +12,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ...rank.motions import Motion
 from ..formatting import SHOWN
 from .design_views import ball_views, motion_view, point_view, volume_view
-from .document import Page, Section, made, written
-from .elements import Html, element, joined, note, sentence, table
+from .document import Page, Section, facts_list, origin, written
+from .elements import Html, element, folded, joined, note, sentence, table
 from .length_sections import lengths_section
 from .quoted import Quoted
 from .residual_sections import reliability_section
@@ -32,14 +33,14 @@ FOOT = (
 )
 
 # Directions that are drawn, of each kind; the others are told in words.
-MOST_DRAWN = 6
+MOST_DRAWN = 12
 
 
 @dataclass(frozen=True, eq=False)
 class DesignContents:
     """What a page of a design is made of: plain data as the commands print them, by the command's
-    name; the linearised design with its undetermined and weak motions; `target` in words; and what
-    was assumed. `unreliable` is the reason why there is no reliability among the data.
+    name; the linearised design with its undetermined and weak motions; `target` in words; the `file`
+    and what was assumed. `unreliable` is the reason why there is no reliability among the data.
     """
 
     title: str
@@ -49,6 +50,7 @@ class DesignContents:
     weak: Sequence[Motion]
     target: str
     unreliable: str
+    file: str
     facts: Sequence[tuple[str, str]]
 
 
@@ -61,7 +63,7 @@ def design_page(contents: DesignContents) -> str:
     ellipsoids = [point_view(at, factor)] if len(at.design.evaluation.points) else []
     ellipsoids += list(ball_views(at, factor))
     sections = [
-        Section("volume", "The volume", figures_wide([volume_view(at.design)])),
+        Section("volume", "The experiment", _experiment(contents)),
         Section("rank", "What the readings determine", _rank(run, contents)),
         Section("suggestions", "Suggested changes", _suggestions(quoted)),
         Section(
@@ -69,15 +71,24 @@ def design_page(contents: DesignContents) -> str:
             "Uncertainties",
             joined([uncertainty_table(run), task_table(run), _influences(run)]),
         ),
-        Section("lengths", "Lengths throughout the volume", _lengths(quoted, contents.target)),
+        Section(
+            "lengths",
+            "Lengths throughout the volume",
+            lengths_section(quoted["lengths"], contents.target),
+        ),
         Section("ellipsoids", "Points and balls", figures_wide(ellipsoids)),
         Section("scale", "Where scale comes from", scale_section(run)),
         Section("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         Section("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
-    facts = [*contents.facts, *made()]
     verdict = _verdict(run, contents.target)
-    return written(Page(contents.title, verdict, _is_good(run), facts, sections, FOOT))
+    made = origin(contents.file)
+    return written(Page(contents.title, made, verdict, _is_good(run), sections, FOOT))
+
+
+def _experiment(contents: DesignContents) -> Html:
+    """The volume with what is in it, and what was assumed."""
+    return figures_wide([volume_view(contents.at.design), facts_list(contents.facts)])
 
 
 def figures_wide(content: Sequence[Html]) -> Html:
@@ -139,16 +150,23 @@ def _rank(run: Quoted, contents: DesignContents) -> Html:
     for key, title, motions, words in given:
         if not run.data[key]:
             continue
-        drawn = []
-        for k, (motion, one) in enumerate(zip(motions, run.at(key).each(), strict=True)):
+        pictures: list[Html] = []
+        rest: list[Html] = []
+        for k, (motion, one) in enumerate(zip(motions, run.at(key).each(), strict=True), start=1):
             told = one.text() if key == "undetermined" else one.text("text")
-            if k < MOST_DRAWN:
-                name = f"{key.replace('_', '-')}-{k + 1}"
-                drawn.append(motion_view(contents.at, motion, name, told, f"{title} {k + 1}"))
+            drawn = None
+            if len(pictures) < MOST_DRAWN:
+                name = f"{key.replace('_', '-')}-{k}"
+                drawn = motion_view(contents.at, motion, name, told, f"{title} {k}")
+            if drawn is None:
+                rest.append(element("li", told, value=k))
             else:
-                drawn.append(sentence(f"{title} {k + 1}: ", told))
-        pictures, rest = drawn[:MOST_DRAWN], drawn[MOST_DRAWN:]
-        parts += [element("h3", title), note(words), figures_wide(pictures), *rest]
+                pictures.append(drawn)
+        parts += [element("h3", title), note(words), figures_wide(pictures)]
+        if rest:
+            summary = "Directions without a picture" if pictures else "Directions"
+            others = folded(summary, element("ol", *rest), is_open=len(rest) <= 20)
+            parts.append(others)
     if run.data["reasons"]:
         reasons = (element("li", one.text()) for one in run.at("reasons").each())
         parts += [element("h3", "Reasons"), element("ul", *reasons)]
@@ -175,7 +193,12 @@ def _suggestions(quoted: Mapping[str, Quoted]) -> Html:
             of = ", ".join(map(str, one.data["removes"]))
             name = f"repair {number}" if key == "complete" else f"of direction {of} alone"
             edits = joined(
-                element("li", element("code", f"{edit['path']}: {edit['value']}"))
+                element(
+                    "li",
+                    element(
+                        "code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"
+                    ),
+                )
                 for edit in one.data["edits"]
             )
             u6 = one.micro("average_U6") if one.data["average_U6"] is not None else "-"
@@ -223,10 +246,6 @@ def _influences(run: Quoted) -> Html:
         rows.append([name, stated, one.micro("standard_uncertainty"), SHOWN[one.data["unit"]]])
     heads = ["influence quantity", "u stated", "u after the readings", "unit"]
     return table("influences", "Influence quantities", heads, rows, (0, 3))
-
-
-def _lengths(quoted: Mapping[str, Quoted], target: str) -> Html:
-    return lengths_section(quoted["lengths"], target)
 
 
 def _reliability(quoted: Mapping[str, Quoted], unreliable: str) -> Html:

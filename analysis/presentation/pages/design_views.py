@@ -15,13 +15,15 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ...rank.motions import Motion, moved_balls, moved_points
 from ..scene import MOST_BALLS, box_edges, hull, projection
 from ..svg import round_number
-from .elements import Html, element
+from .elements import Html, element, joined
 from .spatial import Layer, view
 
 # Positions that are told by their names; of more, by their numbers.
 MOST_NAMES = 8
 # Of the picture's size: the longest half axis of an ellipsoid, and the largest displacement.
 LONGEST_AXIS, LARGEST_MOTION = 0.05, 0.09
+# What moves no point by more, in metres, moves none: a direction moves something by 1e-6.
+NO_MOTION = 1e-12
 # Balls in moving pictures, of all positions together, and points along a line of the grid.
 MOST_MOVING, ALONG = 600, 9
 STYLES = 6
@@ -34,11 +36,14 @@ def volume_layers(design: Design) -> list[Layer]:
     _, away = projection(d)
     edges, hidden = box_edges(lower, upper, away)
     ends, names = [], []
-    off = 0.07 * float((upper - lower).max())
+    off = 0.1 * float((upper - lower).max())
     for k in range(d):
-        # Outside the edge that the eye of still pictures sees in front, at the left or below.
-        start = np.array([lower[0], lower[1], *([lower[2]] if d == 3 else [])])
-        start[(k + 1) % d if k < 2 else 0] -= off
+        # Outside the edges that the eye of still pictures sees in front, and at the left.
+        start = lower.copy()
+        if k == 1 and d == 3:
+            start[0] = upper[0] + off
+        else:
+            start[1 if k == 0 else 0] -= off
         for share, text in ((0.0, lower[k]), (0.5, None), (1.0, upper[k])):
             place = start.copy()
             place[k] = lower[k] + share * (upper[k] - lower[k])
@@ -72,7 +77,7 @@ def volume_view(design: Design) -> Html:
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
-        labels.append(outline[0])
+        labels.append(outline[0] + 0.12 * (outline[0] - outline.mean(axis=0)))
         names.append(design.positions.names[k] if len(read) <= MOST_NAMES else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
@@ -171,47 +176,51 @@ def _ellipsoids(
     return view(layers, name, what, caption)
 
 
-def motion_view(at: Linearisation, motion: Motion, name: str, words: Html, kind: str) -> Html:
+def motion_view(
+    at: Linearisation, motion: Motion, name: str, words: Html, kind: str
+) -> Html | None:
     """A direction as an enlarged, moving picture of the machine's grid and of the balls that are
-    read.
+    read; None where it moves neither.
     """
     design = at.design
     grid, sizes = _grid(design)
-    probes = np.full(len(grid), design.evaluation.probe)
-    of_grid = moved_points(at, motion, grid, probes)
-    chosen = _moving_readings(design)
-    readings = design.readings.select(chosen)
+    of_probes = [
+        moved_points(at, motion, grid, np.full(len(grid), probe))
+        for probe in range(len(design.probes.names))
+    ]
+    # The probe of the evaluation, unless the direction shows with others only.
+    probe = design.evaluation.probe
+    if not _largest(of_probes[probe]) > NO_MOTION:
+        probe = int(np.argmax([_largest(one) > NO_MOTION for one in of_probes]))
+    readings = design.readings.select(_moving_readings(design))
     balls = locations(design, at.state, readings)
-    of_balls = moved_balls(at, motion, readings)
-    largest = max(
-        float(np.linalg.norm(one, axis=1).max(initial=0.0)) for one in (of_grid, of_balls)
-    )
-    size = float(design.machine.volume.size.max())
-    times = round_number(LARGEST_MOTION * size / largest) if largest > 0.0 else 1.0
+    of_grid, of_balls = of_probes[probe], moved_balls(at, motion, readings)
+    largest = max(_largest(of_grid), _largest(of_balls))
+    if not largest > NO_MOTION:
+        return None
+    times = round_number(LARGEST_MOTION * float(design.machine.volume.size.max()) / largest)
+    ends = np.stack([0.0 * of_balls, of_balls], axis=1).reshape(-1, design.dimension)
+    trails = np.repeat(balls, 2, axis=0)
     layers = [
         Layer("lines", "faint thin dotted", grid, sizes),
         *volume_layers(design)[2:],
         Layer("lines", "s0", grid, sizes, times * of_grid),
+        Layer("dots", "s0 fine", grid, (), times * of_grid),
         Layer("dots", "faint", balls),
-        Layer(
-            "lines",
-            "s1 thin",
-            np.repeat(balls, 2, axis=0),
-            (2,) * len(balls),
-            times * np.stack([0 * of_balls, of_balls], axis=1).reshape(-1, design.dimension),
-        ),
+        Layer("lines", "s1 thin", trails, (2,) * len(balls), times * ends),
         Layer("dots", "s1", balls, (), times * of_balls),
     ]
-    caption = Html(
-        element("strong", kind)
-        + element("span", ": ")
-        + words
-        + element(
-            "span",
-            f". The picture is enlarged {times:,.0f} times: the machine's grid (blue) and the balls (orange), as against where they are drawn (grey).",
-        )
+    told = (
+        f". Enlarged {times:,.0f} times: the grid of corrected points with the probe"
+        f" {design.probes.names[probe]} (blue) and the balls (orange), as against where they are"
+        " drawn (grey)."
     )
+    caption = joined([element("strong", kind), ": ", words, told])
     return view(layers, name, f"{kind} as a moving picture", caption)
+
+
+def _largest(moved: Array) -> float:
+    return float(np.linalg.norm(moved, axis=1).max(initial=0.0))
 
 
 def _grid(design: Design) -> tuple[Array, tuple[int, ...]]:

@@ -25,14 +25,14 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, the verdict in few words and whether it is a good one, facts by name, and
-    sections.
+    """A page: its title, what it was made of and when, the verdict in few words and whether it is a
+    good one, and sections.
     """
 
     title: str
+    origin: Html
     verdict: Html
     is_good: bool
-    facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
     foot: str
 
@@ -46,26 +46,20 @@ def shipped(name: str) -> str:
 def written(page: Page) -> str:
     """The page as a file that needs no other and asks no network for anything."""
     sections = [one for one in page.sections if one.body]
-    facts = joined(
-        joined([element("dt", name), element("dd", words)]) for name, words in page.facts
-    )
-    links = joined(
-        element("li", element("a", one.title, href=f"#{one.name}"))
-        for one in (Section("assumed", "What was assumed", Html()), *sections)
-    )
+    links = joined(element("li", element("a", one.title, href=f"#{one.name}")) for one in sections)
     kind = "verdict" if page.is_good else "verdict bad"
     head = element(
         "header",
         element("h1", page.title),
+        element("p", *page.origin, class_="note"),
         element("div", page.verdict, class_=kind),
         element("nav", element("ul", links), aria_label="Sections"),
     )
-    of_facts = Section("assumed", "What was assumed", element("dl", facts))
     body = joined(
         element(
             "section", element("h2", one.title, id=one.name), one.body, aria_labelledby=one.name
         )
-        for one in (*sections, of_facts)
+        for one in sections
     )
     script = shipped("view.js")
     parts = [
@@ -96,10 +90,13 @@ def _head(title: str, script: str) -> Html:
     )
 
 
-def made(when: datetime | None = None) -> tuple[tuple[str, str], ...]:
-    """When the page was made, and with which version."""
-    moment = when or datetime.now(UTC)
-    return (
-        ("Date", f"{moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC"),
-        ("Computed with", f"ballplate {version('ballplate')}"),
-    )
+def origin(*files: str) -> Html:
+    """What a page was made of, when, and with which version."""
+    moment = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    return joined([*filter(None, files), moment, f"ballplate {version('ballplate')}"], " · ")
+
+
+def facts_list(facts: Sequence[tuple[str, str]]) -> Html:
+    """Facts by name."""
+    rows = (joined([element("dt", name), element("dd", words)]) for name, words in facts)
+    return element("dl", *rows)

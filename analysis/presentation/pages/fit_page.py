@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .curve_sections import curves_section
-from .document import Page, Section, made, written
+from .document import Page, Section, facts_list, origin, written
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import Quoted
 from .residual_sections import (
@@ -56,7 +56,8 @@ class PlateResiduals:
 class FitContents:
     """What a page of a fit is made of: plain data of the fit and of its design's reliability, None
     where that was left out for the reason `unreliable`; `kinds` of the estimates by name; the
-    edges (k, 2, d) of the volume; `target` in words, and what was assumed.
+    edges (k, 2, d) of the volume; `target` in words; `files` that it comes from, and what was
+    assumed.
     """
 
     title: str
@@ -67,6 +68,7 @@ class FitContents:
     residuals: PlateResiduals
     edges: Array
     target: str
+    files: Sequence[str]
     facts: Sequence[tuple[str, str]]
 
 
@@ -74,12 +76,13 @@ def fit_page(contents: FitContents) -> str:
     """The page as a file that needs no other."""
     fit = Quoted("/fit", contents.data)
     has_result = contents.data["status"] == "converged"
-    sections = [_course(fit)]
+    assumed = Section("assumed", "What was assumed", facts_list(contents.facts))
+    sections = [_course(fit), assumed]
     if has_result:
         sections = [*_results(fit, contents), *sections]
-    facts = [*contents.facts, *made()]
     is_good = has_result and _is_good(contents.data)
-    return written(Page(contents.title, _verdict(fit, contents), is_good, facts, sections, FOOT))
+    made = origin(*contents.files)
+    return written(Page(contents.title, made, _verdict(fit, contents), is_good, sections, FOOT))
 
 
 def _results(fit: Quoted, contents: FitContents) -> list[Section]:

@@ -55,7 +55,9 @@ def lengths_section(lengths: Quoted, target: str) -> Html:
             f" (k = {data['coverage_factor']:g})",
         ]
     legends = note(
-        "Cells with a frame of their own are above the target." if target else "Darker is larger."
+        "Above 1 (orange) the target is missed; darker is larger. Some lengths from points with – are undetermined."
+        if target
+        else "Darker is larger. Some lengths from points with – are undetermined."
     )
     return joined(
         [
@@ -80,7 +82,8 @@ def _map(lengths: Quoted, chosen: list[int], k: float, of_target: bool, words: s
     for i, place in zip(chosen, places, strict=True):
         column, row = np.searchsorted(x, place[0]), len(y) - 1 - np.searchsorted(y, place[1])
         left, top = LEFT + CELL * column, ABOVE + ROW * row
-        value = every[i]
+        # What is known of some of its lengths would hide that others are unknown.
+        value = None if lengths.data["by_point"][i]["undetermined"] else every[i]
         kind = "open"
         if value is not None:
             # Equal values but for rounding have no order to show.
@@ -101,9 +104,9 @@ def _map(lengths: Quoted, chosen: list[int], k: float, of_target: bool, words: s
                 x=f"{left + CELL / 2:g}",
                 y=f"{top + ROW / 2 + 3.5:g}",
                 text_anchor="middle",
-                data_path=lengths.at("by_point", i, name).path,
+                data_path=None if value is None else lengths.at("by_point", i, name).path,
                 data_value=None if value is None else repr(value),
-                data_factor=repr(factor),
+                data_factor=None if value is None else repr(factor),
             )
         )
     bottom = ABOVE + ROW * len(y)
@@ -139,6 +142,7 @@ def _by_length(lengths: Quoted, target: str) -> Html:
     u = "u" if k == 1.0 else f"{k:g} u"
     traces = [Trace("line", "s0", middle, most), Trace("dots", "s0", middle, most)]
     traces += [Trace("line", "s2", middle, average), Trace("dots", "s2", middle, average)]
+    left_out = "; undetermined ones are left out" if data["all"]["undetermined"] else ""
     entries = [("line", "s0", f"largest {u}"), ("line", "s2", f"average {u}")]
     if target:
         ends = np.array([0.0, 1e3 * groups[-1]["to"]])
@@ -147,7 +151,10 @@ def _by_length(lengths: Quoted, target: str) -> Html:
         entries.append(("line", "alert dashed", "target"))
     chart = Chart(traces, "length, mm", "µm", f"{u} over the length", from_zero=True)
     return joined(
-        [legend(*entries), figures(figure(f"{u} of lengths over the length.", chart_svg(chart)))]
+        [
+            legend(*entries),
+            figures(figure(f"{u} of lengths over the length{left_out}.", chart_svg(chart))),
+        ]
     )
 
 

@@ -174,11 +174,10 @@ def reliability_section(reliability: Quoted) -> Html:
         " in all, of ",
         reliability.number("observations"),
         ". A bias of the size of the MDB (minimal detectable bias) is found with a power of ",
-        reliability.number("power", factor=100.0),
-        " % by a test with a false alarm of ",
-        reliability.number("false_alarm", factor=100.0),
-        " %; ",
-        "the change that it causes in lengths (U6) is the largest that goes unnoticed.",
+        reliability.share("power"),
+        " by a test with a false alarm of ",
+        reliability.share("false_alarm"),
+        "; the change that it causes in lengths (U6) is the largest that goes unnoticed.",
     )
     parts = [words]
     for key, title in (("observations_by_name", "Observations"), ("events", "Events")):
