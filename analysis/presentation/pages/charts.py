@@ -206,18 +206,11 @@ def figures(*content: str) -> Html:
 
 def legend(*entries: tuple[str, str, str]) -> Html:
     """What marks mean: kind and style of each, and the words."""
-    marks = {"dots": "M9 6h0", "line": "M1 6H17", "band": "M1 1H17V11H1Z", "lines": "M1 6H17"}
-    return element(
-        "ul",
-        *(
-            element(
-                "li",
-                Html(
-                    f'<svg viewBox="0 0 18 12" aria-hidden="true"><path class="{kind} {style}" d="{marks.get(kind, marks["band"])}"/></svg>'
-                ),
-                words,
-            )
-            for kind, style, words in entries
-        ),
-        class_="legend",
-    )
+    marks = {"dots": "M9 6h0", "band": "M1 1H17V11H1Z"}
+    items = []
+    for kind, style, words in entries:
+        mark = _path(marks.get(kind, "M1 6H17"), f"{kind} {style}")
+        items.append(
+            element("li", element("svg", mark, viewBox="0 0 18 12", aria_hidden="true"), words)
+        )
+    return element("ul", *items, class_="legend")

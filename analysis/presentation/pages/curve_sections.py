@@ -1,4 +1,4 @@
-"""Section on error functions: curves with their bands, and what they reach."""
+"""PageSection on error functions: curves with their bands, and what they reach."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from ..formatting import SHOWN
 from .charts import Chart, Trace, chart_svg, figure
 from .elements import Html, element, joined, note, table
-from .quoted import Quoted
+from .quoted import QuotedData
 from .uncertainty_sections import expansion
 
 
-def curves_section(fit: Quoted) -> Html:
+def curves_section(fit: QuotedData) -> Html:
     """The estimated error functions, as corrections to be added to readings."""
     if "error_functions" not in fit:
         return Html()
@@ -20,8 +20,8 @@ def curves_section(fit: Quoted) -> Html:
     curves = [one for one in functions if len(one.data["values"]) > 1]
     drawn = [figure(_name(one), _curve(one, k)) for one in curves]
     words = (
-        "An error is where the tip is, less where the scales say: the correction that is to be added to a"
-        f" reading. Bands are expanded uncertainties U, k = {k:g}; where there is no curve, the"
+        "An error is where the tip is, less where the scales say: the correction that is to be"
+        f" added to a reading. Bands are expanded uncertainties U, k = {k:g}; where there is no curve, the"
         " function is undetermined."
     )
     rows = [_row(one, k) for one in functions]
@@ -30,12 +30,12 @@ def curves_section(fit: Quoted) -> Html:
     return joined([note(words), element("div", *drawn, class_="figures curves"), made])
 
 
-def _name(one: Quoted) -> Html:
+def _name(one: QuotedData) -> Html:
     along = f", {one.data['along']}" if one.data["along"] else ""
     return joined([one.text("name"), f": {one.data['meaning']}{along}"])
 
 
-def _row(one: Quoted, k: float) -> list[str]:
+def _row(one: QuotedData, k: float) -> list[str]:
     values = one.data["values"]
     known = [i for i, value in enumerate(values) if value is not None]
     unit = SHOWN[one.data["unit"]]
@@ -49,7 +49,7 @@ def _row(one: Quoted, k: float) -> list[str]:
     return [one.text("name"), meaning, one.micro("values", top), u, unit]
 
 
-def _curve(one: Quoted, k: float) -> Html:
+def _curve(one: QuotedData, k: float) -> Html:
     data = one.data
     values, u = (1e6 * np.array(data[name], float) for name in ("values", "standard_uncertainties"))
     is_place = data["position_unit"] == "m"

@@ -12,10 +12,10 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ...rank.motions import Motion
 from ..formatting import SHOWN
 from .design_views import ball_views, motion_view, point_view, volume_view
-from .document import Page, Section, facts_list, origin, written
+from .document import Page, PageSection, facts_list, origin, written
 from .elements import Html, element, folded, joined, note, sentence, table
 from .length_sections import lengths_section
-from .quoted import Quoted
+from .quoted import QuotedData
 from .residual_sections import reliability_section
 from .uncertainty_sections import (
     expansion,
@@ -27,9 +27,9 @@ from .uncertainty_sections import (
 
 FOOT = (
     "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
-    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every figure is that of"
-    " ballplate run, lengths, reliability, check --suggest or sheet with --json: its data-path says which, and where it stands"
-    " there."
+    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every figure is"
+    " that of ballplate run, lengths, reliability, check --suggest or sheet with --json: its"
+    " data-path says which, and where it stands there."
 )
 
 # Directions that are drawn, of each kind; the others are told in words.
@@ -39,8 +39,8 @@ MOST_DRAWN = 12
 @dataclass(frozen=True, eq=False)
 class DesignContents:
     """What a page of a design is made of: plain data as the commands print them, by the command's
-    name; the linearised design with its undetermined and weak motions; `target` in words; the `file`
-    and what was assumed. `unreliable` is the reason why there is no reliability among the data.
+    name; the linearised design with its undetermined and weak motions; `target` in words; the
+    `file` and what was assumed. `unreliable` is the reason why there is no reliability among the data.
     """
 
     title: str
@@ -56,30 +56,30 @@ class DesignContents:
 
 def design_page(contents: DesignContents) -> str:
     """The page as a file that needs no other."""
-    quoted = {name: Quoted(f"/{name}", data) for name, data in contents.data.items()}
+    quoted = {name: QuotedData(f"/{name}", data) for name, data in contents.data.items()}
     run = quoted["run"]
     factor = expansion(run.at("quantities"))
     at = contents.at
     ellipsoids = [point_view(at, factor)] if len(at.design.evaluation.points) else []
     ellipsoids += list(ball_views(at, factor))
     sections = [
-        Section("volume", "The experiment", _experiment(contents)),
-        Section("rank", "What the readings determine", _rank(run, contents)),
-        Section("suggestions", "Suggested changes", _suggestions(quoted)),
-        Section(
+        PageSection("volume", "The experiment", _experiment(contents)),
+        PageSection("rank", "What the readings determine", _rank(run, contents)),
+        PageSection("suggestions", "Suggested changes", _suggestions(quoted)),
+        PageSection(
             "uncertainties",
             "Uncertainties",
             joined([uncertainty_table(run), task_table(run), _influences(run)]),
         ),
-        Section(
+        PageSection(
             "lengths",
             "Lengths throughout the volume",
             lengths_section(quoted["lengths"], contents.target),
         ),
-        Section("ellipsoids", "Points and balls", figures_wide(ellipsoids)),
-        Section("scale", "Where scale comes from", scale_section(run)),
-        Section("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
-        Section("sheet", "Run sheet", _sheet(quoted["sheet"])),
+        PageSection("ellipsoids", "Points and balls", figures_wide(ellipsoids)),
+        PageSection("scale", "Where scale comes from", scale_section(run)),
+        PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
+        PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
     verdict = _verdict(run, contents.target)
     made = origin(contents.file)
@@ -96,14 +96,14 @@ def figures_wide(content: Sequence[Html]) -> Html:
     return element("div", *content, class_="figures views")
 
 
-def _is_good(run: Quoted) -> bool:
+def _is_good(run: QuotedData) -> bool:
     shares = [one.get("within_target") for one in run.data["quantities"].values()]
     missed = any(share is not None and share < 1.0 for share in shares)
     missed |= any(one["within_target"] is False for one in run.data.get("tasks", {}).values())
     return run.data["as_expected"] and not run.data["weakly_determined"] and not missed
 
 
-def _verdict(run: Quoted, target: str) -> Html:
+def _verdict(run: QuotedData, target: str) -> Html:
     data = run.data
     count = len(data["weakly_determined"])
     weak = (
@@ -131,7 +131,7 @@ def _verdict(run: Quoted, target: str) -> Html:
     return joined([first, sentence(lengths_words(run, target))])
 
 
-def _rank(run: Quoted, contents: DesignContents) -> Html:
+def _rank(run: QuotedData, contents: DesignContents) -> Html:
     parts = []
     given = (
         (
@@ -175,7 +175,7 @@ def _rank(run: Quoted, contents: DesignContents) -> Html:
     return joined(parts)
 
 
-def _suggestions(quoted: Mapping[str, Quoted]) -> Html:
+def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
     """What would determine the rest, and what each change would do."""
     if quoted["check"].data.get("repairs") is None:
         return sentence("None is needed: nothing is undetermined or weakly determined.")
@@ -233,7 +233,7 @@ def _suggestions(quoted: Mapping[str, Quoted]) -> Html:
     )
 
 
-def _influences(run: Quoted) -> Html:
+def _influences(run: QuotedData) -> Html:
     if not run.data.get("influences"):
         return Html()
     rows = []
@@ -248,13 +248,13 @@ def _influences(run: Quoted) -> Html:
     return table("influences", "Influence quantities", heads, rows, (0, 3))
 
 
-def _reliability(quoted: Mapping[str, Quoted], unreliable: str) -> Html:
+def _reliability(quoted: Mapping[str, QuotedData], unreliable: str) -> Html:
     if "reliability" not in quoted:
         return note(unreliable)
     return reliability_section(quoted["reliability"])
 
 
-def _sheet(sheet: Quoted) -> Html:
+def _sheet(sheet: QuotedData) -> Html:
     """The order of positions."""
     rows = []
     for number, step in enumerate(sheet.at("steps").each(), start=1):

@@ -77,7 +77,10 @@ def volume_view(design: Design) -> Html:
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
-        labels.append(outline[0] + 0.12 * (outline[0] - outline.mean(axis=0)))
+        # Plates in a plane do not hide one another's middle.
+        centre = outline.mean(axis=0)
+        is_flat = design.dimension == 2
+        labels.append(centre if is_flat else outline[0] + 0.12 * (outline[0] - centre))
         names.append(design.positions.names[k] if len(read) <= MOST_NAMES else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
@@ -168,8 +171,8 @@ def _ellipsoids(
         Layer("dots", "alert", undetermined),
     ]
     caption = (
-        f"{what}: half axes are expanded uncertainties U, k = {factor:g}, enlarged {times:,.0f} times."
-        " They refer to the frame that the error model's constraints and the poses fix."
+        f"{what}: half axes are expanded uncertainties U, k = {factor:g}, enlarged"
+        f" {times:,.0f} times. They refer to the frame that the error model's constraints and the poses fix."
     )
     if len(undetermined):
         caption += f" {len(undetermined)} are undetermined: dots without an ellipsoid."

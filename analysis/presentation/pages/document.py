@@ -15,7 +15,7 @@ from .elements import Html, element, joined
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A section of a page; `name` is its id. One without a body is left out."""
 
     name: str
@@ -33,7 +33,7 @@ class Page:
     origin: Html
     verdict: Html
     is_good: bool
-    sections: Sequence[Section]
+    sections: Sequence[PageSection]
     foot: str
 
 
@@ -78,7 +78,8 @@ def written(page: Page) -> str:
 
 def _head(title: str, script: str) -> Html:
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
+    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:;"
+    policy += f" script-src 'sha256-{digest}'"
     return element(
         "head",
         element("meta", charset="utf-8"),

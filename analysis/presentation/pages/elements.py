@@ -94,6 +94,7 @@ def table(
         element("caption", caption, id=f"table-{name}"),
         element("thead", element("tr", head), class_="tall"),
         element("tbody", body),
+        class_="tight",
     )
     kind = "scroll high" if is_long else "scroll"
     return element(

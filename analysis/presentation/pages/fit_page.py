@@ -10,9 +10,9 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .curve_sections import curves_section
-from .document import Page, Section, facts_list, origin, written
+from .document import Page, PageSection, facts_list, origin, written
 from .elements import Html, element, joined, note, sentence, table
-from .quoted import Quoted
+from .quoted import QuotedData
 from .residual_sections import (
     components_section,
     reliability_section,
@@ -31,8 +31,8 @@ from .uncertainty_sections import (
 
 FOOT = (
     "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
-    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit --json: its data-path says"
-    " where it stands there."
+    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit or reliability with"
+    " --json: its data-path says which, and where it stands there."
 )
 
 
@@ -74,9 +74,9 @@ class FitContents:
 
 def fit_page(contents: FitContents) -> str:
     """The page as a file that needs no other."""
-    fit = Quoted("/fit", contents.data)
+    fit = QuotedData("/fit", contents.data)
     has_result = contents.data["status"] == "converged"
-    assumed = Section("assumed", "What was assumed", facts_list(contents.facts))
+    assumed = PageSection("assumed", "What was assumed", facts_list(contents.facts))
     sections = [_course(fit), assumed]
     if has_result:
         sections = [*_results(fit, contents), *sections]
@@ -85,7 +85,7 @@ def fit_page(contents: FitContents) -> str:
     return written(Page(contents.title, made, _verdict(fit, contents), is_good, sections, FOOT))
 
 
-def _results(fit: Quoted, contents: FitContents) -> list[Section]:
+def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
     """The sections of a fit that has converged."""
     found = contents.residuals
     of_residuals = Html()
@@ -101,20 +101,20 @@ def _results(fit: Quoted, contents: FitContents) -> list[Section]:
         )
     reliability = note(contents.unreliable)
     if contents.reliability is not None:
-        reliability = reliability_section(Quoted("/reliability", contents.reliability))
+        reliability = reliability_section(QuotedData("/reliability", contents.reliability))
     return [
-        Section("rank", "What the readings determine", _rank(fit)),
-        Section(
+        PageSection("rank", "What the readings determine", _rank(fit)),
+        PageSection(
             "lengths", "Uncertainties and target", joined([uncertainty_table(fit), task_table(fit)])
         ),
-        Section("curves", "Error curves", curves_section(fit)),
-        Section("suspected", "Suspected gross errors", suspects_section(fit)),
-        Section("residuals", "Residuals", of_residuals),
-        Section("components", "Variance components", components_section(fit)),
-        Section("reliability", "Reliability", reliability),
-        Section("adjustments", "Adjustments", _adjustments(fit)),
-        Section("plate", "Plate", _plate(fit, contents.kinds)),
-        Section("estimates", "Estimates", _estimates(fit, contents.kinds)),
+        PageSection("curves", "Error curves", curves_section(fit)),
+        PageSection("suspected", "Suspected gross errors", suspects_section(fit)),
+        PageSection("residuals", "Residuals", of_residuals),
+        PageSection("components", "Variance components", components_section(fit)),
+        PageSection("reliability", "Reliability", reliability),
+        PageSection("adjustments", "Adjustments", _adjustments(fit)),
+        PageSection("plate", "Plate", _plate(fit, contents.kinds)),
+        PageSection("estimates", "Estimates", _estimates(fit, contents.kinds)),
     ]
 
 
@@ -127,22 +127,16 @@ def _is_good(data: Mapping[str, Any]) -> bool:
     return not wrong and not missed
 
 
-def _verdict(fit: Quoted, contents: FitContents) -> Html:
+def _verdict(fit: QuotedData, contents: FitContents) -> Html:
     data = contents.data
     if data["status"] != "converged":
         first = sentence(f"The estimate has {data['status']}, and there are no results.")
         return joined([first, sentence(fit.text("complaint"))])
-    rank = (
-        joined(
-            [
-                "Rank deficiency ",
-                fit.number("rank_deficiency"),
-                ", as expected" if data["as_expected"] else ", which the file does not expect",
-            ]
-        )
-        if data["rank_deficiency"]
-        else "Full rank"
-    )
+    rank = Html("Full rank")
+    if data["rank_deficiency"]:
+        rank = joined(["Rank deficiency ", fit.number("rank_deficiency"), ", as expected"])
+    if data["complaint"]:
+        rank = fit.text("complaint")
     scatter = "the residuals are no larger than stated"
     if data["too_large"]:
         scatter = "the residuals are larger than the stated uncertainties explain"
@@ -159,11 +153,10 @@ def _verdict(fit: Quoted, contents: FitContents) -> Html:
     )
     second = sentence(lengths_words(fit, contents.target))
     warnings = [sentence("Warning: ", one.text()) for one in fit.at("warnings").each()]
-    complaint = [sentence(fit.text("complaint"))] if data["complaint"] else []
-    return joined([first, second, *complaint, *warnings])
+    return joined([first, second, *warnings])
 
 
-def _rank(fit: Quoted) -> Html:
+def _rank(fit: QuotedData) -> Html:
     data = fit.data
     parts = [
         sentence(
@@ -196,7 +189,7 @@ def _rank(fit: Quoted) -> Html:
     return joined(parts)
 
 
-def _course(fit: Quoted) -> Section:
+def _course(fit: QuotedData) -> PageSection:
     """How the iterations went."""
     rows = [
         [
@@ -208,10 +201,10 @@ def _course(fit: Quoted) -> Section:
     ]
     heads = ["iteration", "step, m and rad", "S²"]
     made_table = table("iterations", "Iterations", heads, rows)
-    return Section("iterations", "Course of the fit", made_table)
+    return PageSection("iterations", "Course of the fit", made_table)
 
 
-def _adjustments(fit: Quoted) -> Html:
+def _adjustments(fit: QuotedData) -> Html:
     if "adjustments" not in fit:
         return Html()
     rows = []
@@ -228,7 +221,7 @@ def _adjustments(fit: Quoted) -> Html:
     return joined([table("adjustments", "Scales and angles", heads, rows, (0, 4, 5)), note(words)])
 
 
-def _plate(fit: Quoted, kinds: Mapping[str, str]) -> Html:
+def _plate(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
     """Co-ordinates of the balls: in the plate's own axes where there are such, and as estimated."""
     parts = []
     k = expansion(fit.at("quantities"))
@@ -254,7 +247,7 @@ def _plate(fit: Quoted, kinds: Mapping[str, str]) -> Html:
     return joined(parts)
 
 
-def _estimates(fit: Quoted, kinds: Mapping[str, str]) -> Html:
+def _estimates(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
     titles = {
         "machine": "Parameters of the error model",
         "influence": "Influence quantities",

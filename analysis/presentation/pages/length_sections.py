@@ -1,4 +1,4 @@
-"""Section on lengths throughout the volume: against the target, by place, length and direction."""
+"""PageSection on lengths throughout the volume: against the target, by place, length and direction."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import numpy as np
 from ..formatting import number
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, table
-from .quoted import Quoted
+from .quoted import QuotedData
 
 SHADES = 8
 # Of a map: width of a cell, its height, and the room around.
 CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 6.0
 
 
-def lengths_section(lengths: Quoted, target: str) -> Html:
+def lengths_section(lengths: QuotedData, target: str) -> Html:
     """Maps of the largest uncertainty of lengths from each point, by level, and by length; without
     a `target` of them themselves.
     """
@@ -54,11 +54,8 @@ def lengths_section(lengths: Quoted, target: str) -> Html:
             whole.share("share_expanded_within"),
             f" (k = {data['coverage_factor']:g})",
         ]
-    legends = note(
-        "Above 1 (orange) the target is missed; darker is larger. Some lengths from points with – are undetermined."
-        if target
-        else "Darker is larger. Some lengths from points with – are undetermined."
-    )
+    above = "Above 1 (orange) the target is missed; darker" if target else "Darker"
+    legends = note(f"{above} is larger. Some lengths from points with – are undetermined.")
     return joined(
         [
             element("p", *head, "."),
@@ -70,7 +67,7 @@ def lengths_section(lengths: Quoted, target: str) -> Html:
     )
 
 
-def _map(lengths: Quoted, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
+def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
     """Cells of a level, each with its figure."""
     name, factor = ("maximum_ratio", k) if of_target else ("maximum", 1e6 * k)
     every = [one[name] for one in lengths.data["by_point"]]
@@ -130,7 +127,7 @@ def _label(x: float, y: float, text: str, anchor: str) -> Html:
     return element("text", text, x=f"{x:g}", y=f"{y:g}", text_anchor=anchor)
 
 
-def _by_length(lengths: Quoted, target: str) -> Html:
+def _by_length(lengths: QuotedData, target: str) -> Html:
     """Uncertainties over the length, with the target."""
     data = lengths.data
     k = data["target_coverage_factor"] if target else data["coverage_factor"]
@@ -158,7 +155,7 @@ def _by_length(lengths: Quoted, target: str) -> Html:
     )
 
 
-def _by_direction(lengths: Quoted, of_target: bool) -> Html:
+def _by_direction(lengths: QuotedData, of_target: bool) -> Html:
     k = lengths.data["coverage_factor"]
     rows = []
     for one in lengths.at("by_direction").each():

@@ -19,19 +19,19 @@ UNDETERMINED = "undetermined"
 
 
 @dataclass(frozen=True)
-class Quoted:
+class QuotedData:
     """A part of the plain data of a result, with its `path` there."""
 
     path: str
     data: Any
 
-    def at(self, *steps: str | int) -> Quoted:
+    def at(self, *steps: str | int) -> QuotedData:
         """A part of it."""
         path, data = self.path, self.data
         for step in steps:
             path += "/" + str(step).replace("~", "~0").replace("/", "~1")
             data = data[step]
-        return Quoted(path, data)
+        return QuotedData(path, data)
 
     def __contains__(self, key: str) -> bool:
         return bool(self.data.get(key))
@@ -39,7 +39,7 @@ class Quoted:
     def __len__(self) -> int:
         return len(self.data)
 
-    def each(self) -> Iterator[Quoted]:
+    def each(self) -> Iterator[QuotedData]:
         """The parts of a list, or of a mapping."""
         keys = self.data if isinstance(self.data, dict) else range(len(self.data))
         for key in keys:

@@ -4,7 +4,8 @@ reliability.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.machines.protocol import Array, Integers
@@ -13,14 +14,21 @@ from ..formatting import SHOWN
 from ..svg import round_number
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, sentence, table
-from .quoted import Quoted
+from .quoted import QuotedData
 from .spatial import Layer, view
 
 AXES = "xyz"
 # Of the volume's size, the longest residual takes this part at most.
 LONGEST = 0.12
+# Readings whose residuals have room for large dots.
+FEW = 400
 # Biases that a table names.
 MOST = 12
+
+
+def _size(values: Array) -> str:
+    """Class of dots: small where there are many."""
+    return "" if len(values) <= FEW else "fine"
 
 
 def dots_by_group(values: Array, group: Integers, names: Sequence[str], across: str) -> Html:
@@ -29,7 +37,7 @@ def dots_by_group(values: Array, group: Integers, names: Sequence[str], across: 
     traces = []
     for k in range(d):
         shift = 0.22 * (k - 0.5 * (d - 1))
-        traces.append(Trace("dots", f"fine s{k}", group + shift, values[:, k]))
+        traces.append(Trace("dots", f"{_size(values)} s{k}", group + shift, values[:, k]))
     words = f"standardised residuals by {across}"
     chart = Chart(traces, across, "standardised residual", words, tuple(enumerate(names)))
     return chart_svg(chart)
@@ -38,7 +46,9 @@ def dots_by_group(values: Array, group: Integers, names: Sequence[str], across: 
 def dots_in_order(values: Array) -> Html:
     """Standardised residuals (m, d) in the order of the readings."""
     order = np.arange(1.0, len(values) + 1.0)
-    traces = [Trace("dots", f"fine s{k}", order, values[:, k]) for k in range(values.shape[1])]
+    traces = [
+        Trace("dots", f"{_size(values)} s{k}", order, values[:, k]) for k in range(values.shape[1])
+    ]
     words = "standardised residuals in the order of the readings"
     return chart_svg(Chart(traces, "number of the reading", "standardised residual", words))
 
@@ -51,7 +61,7 @@ def residual_charts(
     probes: Sequence[str],
 ) -> Html:
     """Standardised residuals against position, order and direction."""
-    axes = [("dots", f"fine s{k}", f"along {AXES[k]}") for k in range(values.shape[1])]
+    axes = [("dots", f"s{k}", f"along {AXES[k]}") for k in range(values.shape[1])]
     told = "Positions are numbered as in the table below." if len(positions) > 6 else ""
     return joined(
         [
@@ -91,7 +101,7 @@ def residual_view(places: Array, residuals: Array, edges: Array) -> Html:
     return view(layers, "residual-vectors", "Residuals as vectors in the volume", caption)
 
 
-def residual_tables(fit: Quoted) -> Html:
+def residual_tables(fit: QuotedData) -> Html:
     """Root mean squares by position, probe and direction, and the largest residuals."""
     parts = []
     for kind, words in (("position", "position"), ("probe", "probe"), ("axis", "direction")):
@@ -123,7 +133,7 @@ def residual_tables(fit: Quoted) -> Html:
     return joined(parts)
 
 
-def suspects_section(fit: Quoted) -> Html:
+def suspects_section(fit: QuotedData) -> Html:
     """What the residuals make suspect."""
     if "suspected" not in fit:
         return sentence("None: no test of the residuals exceeds its limit.")
@@ -131,7 +141,7 @@ def suspects_section(fit: Quoted) -> Html:
     return element("ol", *items)
 
 
-def components_section(fit: Quoted) -> Html:
+def components_section(fit: QuotedData) -> Html:
     """Variance components, where these were asked for."""
     if fit.data.get("variance_components") is None:
         return Html()
@@ -165,7 +175,7 @@ def components_section(fit: Quoted) -> Html:
     return joined([made, note(words) if fit.data.get("reweighted") else Html()])
 
 
-def reliability_section(reliability: Quoted) -> Html:
+def reliability_section(reliability: QuotedData) -> Html:
     """Which biases would be noticed, and what those change that would not."""
     data = reliability.data
     words = sentence(
@@ -177,44 +187,43 @@ def reliability_section(reliability: Quoted) -> Html:
         reliability.share("power"),
         " by a test with a false alarm of ",
         reliability.share("false_alarm"),
-        "; the change that it causes in lengths (U6) is the largest that goes unnoticed.",
+        "; the change that it causes in lengths is the largest that goes unnoticed.",
     )
     parts = [words]
+    symbol = "U6" if any("U6" in one["effects"] for one in data["events"]) else "U5"
     for key, title in (("observations_by_name", "Observations"), ("events", "Events")):
         every = list(enumerate(data[key]))
         # What cannot be detected and does harm first, then by what it changes.
-        every.sort(key=lambda pair: (-_harm(pair[1]), pair[0]))
-        rows = [_bias(reliability.at(key, k)) for k, _ in every[:MOST]]
+        every.sort(key=lambda pair: (-_harm(pair[1], symbol), pair[0]))
+        rows = [_bias(reliability.at(key, k), symbol) for k, _ in every[:MOST]]
         if rows:
-            heads = ["bias", "MDB", "found by fit from", "unit", "changes U6 by, µm", "at"]
+            heads = ["bias", "MDB", "found by fit from", "unit", f"changes {symbol} by, µm", "at"]
             caption = f"{title} that matter most"
             parts.append(table(f"reliability-{key}", caption, heads, rows, (0, 3, 5)))
             left = len(every) - len(rows)
-            parts.append(
-                note(f"{left} others are told by ballplate reliability --json.") if left else Html()
-            )
+            told = f"{left} others are told by ballplate reliability --json."
+            parts.append(note(told) if left else Html())
     return joined(parts)
 
 
-def _harm(bias: dict) -> float:  # type: ignore[type-arg]
+def _harm(bias: Mapping[str, Any], symbol: str) -> float:
+    """What a bias that goes unnoticed changes at most; infinite where it can never be noticed."""
     if bias["minimal_detectable"] is None:
         return -1.0 if bias.get("harmless") else np.inf
-    effect = bias["effects"].get("U6") or bias["effects"].get("U5") or {}
     # Equal effects stay in their order, whatever the rounding.
-    return float(f"{effect.get('change', 0.0):.6g}")
+    return float(f"{bias['effects'].get(symbol, {}).get('change', 0.0):.6g}")
 
 
-def _bias(one: Quoted) -> list[str]:
+def _bias(one: QuotedData, symbol: str) -> list[str]:
     found = one.data["minimal_detectable"] is not None
-    u6 = one.data["effects"].get("U6")
+    effect = one.at("effects", symbol) if found and symbol in one.data["effects"] else None
     harmless = "never; harmless" if one.data.get("harmless") else "never"
-    change = one.at("effects", "U6").micro("change", digits=3) if found and u6 else Html("-")
     fit = one.micro("found_by_fit", digits=3) if one.data["found_by_fit"] is not None else "-"
     return [
         one.text("name"),
         one.micro("minimal_detectable", digits=3) if found else harmless,
         fit,
         SHOWN[one.data["unit"]],
-        change,
-        one.at("effects", "U6").text("at") if found and u6 else "",
+        effect.micro("change", digits=3) if effect is not None else "-",
+        effect.text("at") if effect is not None else "",
     ]

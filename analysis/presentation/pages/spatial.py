@@ -148,7 +148,8 @@ def _ellipse(at: Sequence[float], root: Array) -> str:
     x, y = (axes[:, 0] * sizes[0] * [1.0, -1.0]).tolist()
     angle = np.degrees(np.arctan2(y, x))
     arc = f"a{sizes[0]:.1f} {sizes[1]:.1f} {angle:.0f} 1 0"
-    return f"M{at[0] - x:.1f} {at[1] - y:.1f}{arc} {2 * x:.1f} {2 * y:.1f}{arc} {-2 * x:.1f} {-2 * y:.1f}"
+    there, back = (f"{arc} {2 * way * x:.1f} {2 * way * y:.1f}" for way in (1, -1))
+    return f"M{at[0] - x:.1f} {at[1] - y:.1f}{there}{back}"
 
 
 def _data(one: Layer) -> dict[str, Any]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from ..formatting import shown_unit, uncertainty_words
 from .elements import Html, folded, joined, note, sentence, table
-from .quoted import UNDETERMINED, Quoted
+from .quoted import UNDETERMINED, QuotedData
 
 
-def expansion(quantities: Quoted) -> float:
-    """The factor of expanded uncertainties on a page: the one that the target is meant for, or 2."""
+def expansion(quantities: QuotedData) -> float:
+    """The factor of expanded uncertainties on a page: that of the target, or 2."""
     stated = [one.data.get("target_coverage_factor") for one in quantities.each()]
     return next((one for one in stated if one is not None and one != 1.0), 2.0)
 
 
-def uncertainty_table(result: Quoted) -> Html:
+def uncertainty_table(result: QuotedData) -> Html:
     """U1 to U6 with their expanded uncertainties."""
     quantities = result.at("quantities")
     k = expansion(quantities)
@@ -58,7 +58,7 @@ def uncertainty_table(result: Quoted) -> Html:
     return joined([table("quantities", caption, heads, rows, (0, 1, 6, 8)), *notes])
 
 
-def task_table(result: Quoted) -> Html:
+def task_table(result: QuotedData) -> Html:
     """Measuring tasks one by one."""
     if "tasks" not in result:
         return Html()
@@ -81,7 +81,7 @@ def task_table(result: Quoted) -> Html:
     return table("tasks", "Measuring tasks", heads, rows, (0, 6))
 
 
-def lengths_words(result: Quoted, target: str) -> Html:
+def lengths_words(result: QuotedData, target: str) -> Html:
     """In a sentence, how the lengths that the corrected machine measures compare with the
     target, or how uncertain they are where none is stated.
     """
@@ -119,7 +119,7 @@ def lengths_words(result: Quoted, target: str) -> Html:
     return joined([share, told, amounts, "."])
 
 
-def scale_section(result: Quoted) -> Html:
+def scale_section(result: QuotedData) -> Html:
     """Where scale comes from."""
     if result.data.get("scale") is None:
         return sentence("Scale is not determined, or nothing carries it.")
@@ -144,7 +144,8 @@ def scale_section(result: Quoted) -> Html:
     if scale.data["rests_on_exact_offsets"]:
         parts.append(
             sentence(
-                "Warning: the scale rests on probe offsets that are held exact; calibrate a distance, or state the standard uncertainty of the offsets."
+                "Warning: the scale rests on probe offsets that are held exact; calibrate a"
+                " distance, or state the standard uncertainty of the offsets."
             )
         )
     if scale.data["with_uncertain_offsets"] is not None:
@@ -163,7 +164,7 @@ def scale_section(result: Quoted) -> Html:
     return joined(parts)
 
 
-def estimates_table(result: Quoted, names: list[str], name: str, caption: str) -> Html:
+def estimates_table(result: QuotedData, names: list[str], name: str, caption: str) -> Html:
     """Estimates with standard and expanded uncertainties."""
     k = expansion(result.at("quantities"))
     rows = []
