@@ -1,4 +1,4 @@
-"""PageSection on error functions: curves with their bands, and what they reach."""
+"""Section on error functions: curves with their bands, and what they reach."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def curves_section(fit: QuotedData) -> Html:
     drawn = [figure(_name(one), _curve(one, k)) for one in curves]
     words = (
         "An error is where the tip is, less where the scales say: the correction that is to be"
-        f" added to a reading. Bands are expanded uncertainties U, k = {k:g}; where there is no curve, the"
-        " function is undetermined."
+        f" added to a reading. Bands are expanded uncertainties U, k = {k:g}; where there is"
+        " no curve, the function is undetermined."
     )
     rows = [_row(one, k) for one in functions]
     heads = ["error", "meaning", "largest, either sign", f"U there, k = {k:g}", "unit"]

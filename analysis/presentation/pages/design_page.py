@@ -40,7 +40,8 @@ MOST_DRAWN = 12
 class DesignContents:
     """What a page of a design is made of: plain data as the commands print them, by the command's
     name; the linearised design with its undetermined and weak motions; `target` in words; the
-    `file` and what was assumed. `unreliable` is the reason why there is no reliability among the data.
+    `file` and what was assumed. `unreliable` is the reason why there is no reliability among the
+    data.
     """
 
     title: str

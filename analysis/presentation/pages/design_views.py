@@ -172,7 +172,8 @@ def _ellipsoids(
     ]
     caption = (
         f"{what}: half axes are expanded uncertainties U, k = {factor:g}, enlarged"
-        f" {times:,.0f} times. They refer to the frame that the error model's constraints and the poses fix."
+        f" {times:,.0f} times. They refer to the frame that the error model's constraints"
+        " and the poses fix."
     )
     if len(undetermined):
         caption += f" {len(undetermined)} are undetermined: dots without an ellipsoid."

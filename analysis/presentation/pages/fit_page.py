@@ -31,8 +31,8 @@ from .uncertainty_sections import (
 
 FOOT = (
     "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
-    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit or reliability with"
-    " --json: its data-path says which, and where it stands there."
+    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit or reliability"
+    " with --json: its data-path says which, and where it stands there."
 )
 
 

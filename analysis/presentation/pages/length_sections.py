@@ -1,4 +1,4 @@
-"""PageSection on lengths throughout the volume: against the target, by place, length and direction."""
+"""Section on lengths throughout the volume: against the target, by place, length and direction."""
 
 from __future__ import annotations
 
