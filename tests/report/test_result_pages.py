@@ -145,7 +145,7 @@ def test_what_a_person_wrote_is_escaped(tmp_path: Path) -> None:
         description="<u>one</u>\n& two",
         artefacts={"<b>&amp;": grid},
         positions=positions,
-        probes={"down": {"offset": ["0 mm"] * 3}, "<s>": {"offset": ["50 mm", "0 mm", "0 mm"]}},
+        probes={"down": {"offset": ["0 mm"] * 3}, "<s>": {"offset": ["-50 mm", "0 mm", "0 mm"]}},
     )
     table = tmp_path / "<em>.csv"
     readings = bp.simulate(experiment, seed=1)
