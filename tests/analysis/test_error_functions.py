@@ -8,7 +8,6 @@ import pytest
 from ballplate.simulator.design.arrays import locations
 from ballplate.simulator.estimation.corrections import corrected_points
 
-
 SQUARE = "designs/park/plate.yaml"
 
 
