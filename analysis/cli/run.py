@@ -69,6 +69,8 @@ def run(options: Namespace) -> int:
         raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
     for experiment in chosen:
         plans.append(predict(experiment, with_scale=True))
+        if options.report:
+            _write_page(options, experiment, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
         data: dict[str, Any] = plans[-1].to_dict()
@@ -87,8 +89,6 @@ def run(options: Namespace) -> int:
                 f"{options.interruption.word}: the figures are those of the data sets done so far"
             )
             break
-    if options.report and not interrupted:
-        _write_page(options, chosen[0], plans[0])
     if options.json:
         print_json(found)
     if interrupted:
