@@ -97,9 +97,9 @@ def _agrees(text: str, value: float) -> bool:
     digits = re.fullmatch(r"-?(\d+)(?:\.(\d+))?(?:e([+-]\d+))?", number)
     assert digits is not None, text
     last = 10.0 ** (int(digits[3] or 0) - len(digits[2] or ""))
-    if last == 1.0 and abs(value) > 1e4:
+    if last == 1.0 and len(digits[1]) > 3:
         # Digits beyond those that count are zeros.
-        last = 10.0 ** (len(digits[1]) - 4)
+        last = 10.0 ** (len(digits[1]) - len(digits[1].rstrip("0")))
     off = value - float(number)
     if number != text:
         return -1e-9 <= off < 0.01 + 1e-9
