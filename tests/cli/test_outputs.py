@@ -80,7 +80,7 @@ WALK = {
     ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
-        {"--plot": "fit.svg", "--report": "fit.html"},
+        {"--plot": "fit.svg", "-o": "map.yaml", "--report": "fit.html"},
         also=("balls.csv",),
     ),
     "plan": Walk(
