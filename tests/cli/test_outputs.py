@@ -80,7 +80,7 @@ WALK = {
     ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
-        {"--plot": "fit.svg", "-o": "map.yaml", "--report": "fit.html"},
+        {"--plot": "fit.svg", "-o": "fit.npz", "--report": "fit.html"},
         also=("balls.csv",),
     ),
     "plan": Walk(
