@@ -32,15 +32,17 @@ if TYPE_CHECKING:
 # What expanded uncertainties have where the experiment does not say.
 COVERAGE_FACTOR = 2.0
 
+_AXES_FIXED = (
+    "errors are zero at the lower corner of the volume, and straightnesses EYX, EZX and EZY at the"
+    " other end of their axis too"
+)
 FRAMES = {
-    "kinematic": "errors are zero at the lower corner of the volume, and the lines of EYX, EZX and"
-    " EZY along their axes",
-    "machine": "errors are zero at the lower corner of the volume, and the lines of EYX, EZX and"
-    " EZY along their axes",
-    "empirical": "six displacements and three rotations of the probe are zero at corners of the"
-    " volume",
-    "metric": "the axes meet in the origin of the scales; the x axis, and the xy plane, are as they"
-    " are",
+    "kinematic": _AXES_FIXED,
+    "machine": _AXES_FIXED,
+    "empirical": (
+        "six displacements and three rotations of the probe are zero at corners of the volume"
+    ),
+    "metric": "the x axis is that of the machine, and the y axis lies in its plane of x and y",
     "python": "that of the model itself",
 }
 
