@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from .api import (
+        adjust,
         certificate,
         check,
         compare,
@@ -50,6 +51,7 @@ __all__ = [
     "GROUPINGS",
     "OtherSweepError",
     "StoreError",
+    "adjust",
     "certificate",
     "check",
     "compare",

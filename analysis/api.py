@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
+    from .results.adjusted_machine import AdjustedMachine
     from .results.correction import Correction
     from .results.fit import Fit
     from .results.imported import ReadReport
@@ -758,6 +759,43 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
     map_files.write_map(fitted, path)
 
 
+def adjust(
+    fitted: FittedMap | PathLike,
+    scale: str | Iterable[str] = (),
+    turn: str | Iterable[str] = (),
+    after: FittedMap | PathLike | None = None,
+    share: float = 0.0,
+) -> AdjustedMachine:
+    """What adjustments leave of a fitted machine's errors, and what a campaign `after` them says;
+    both are maps, or files of maps.
+
+    Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
+    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". The standard uncertainty of each is
+    the `share` of it.
+
+    :raises ValueError: a text that is no change, or a change that the error model cannot follow.
+
+    >>> machine = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> adjust(machine, scale="x=20 um/m")
+    <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
+    """
+    from .results.adjusted_machine import adjusted_machine
+    from .results.machine_changes import guideway_turn, scale_change
+    from .simulator.maps.fitted_map import FittedMap
+
+    first, second = (
+        one if one is None or isinstance(one, FittedMap) else load_map(one)
+        for one in (fitted, after)
+    )
+    if first is None:
+        raise TypeError("fitted=None; give what to_map() of a fit gives, or its file")
+    if not 0.0 <= share <= 1.0:
+        raise ValueError(f"share={share!r}; give a part of each change, from 0 to 1")
+    changes = [scale_change(text) for text in _texts("scale", scale)]
+    changes += [guideway_turn(text) for text in _texts("turn", turn)]
+    return adjusted_machine(first.title, first, changes, second, share)
+
+
 def correct(
     fitted: FittedMap | PathLike,
     points: Any,
@@ -893,6 +931,14 @@ def _several(name: str, given: Any) -> tuple[int, ...]:
         return tuple(given)
     ensure_whole(2, None, **{name: given})
     return (given,)
+
+
+def _texts(name: str, given: str | Iterable[str]) -> tuple[str, ...]:
+    """One text or several."""
+    found = (given,) if isinstance(given, str) else tuple(given)
+    for text in found:
+        ensure_type(str, 'a text such as "x=22 um/m"', **{name: text})
+    return found
 
 
 def _argument(option: re.Match[str]) -> str:

@@ -23,19 +23,8 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
     *("check", "run", "plan", "sheet", "reach", "lengths", "reliability", "simulate", "import"),
-    *(
-        "fit",
-        "correct",
-        "compare",
-        "sweep",
-        "export",
-        "report",
-        "map",
-        "spline",
-        "reproduce",
-        "schema",
-    ),
-    "init",
+    *("fit", "certificate", "correct", "adjust", "compare", "sweep", "export", "report", "map"),
+    *("spline", "reproduce", "schema", "init"),
 )
 
 

@@ -15,11 +15,11 @@ from ..estimators.estimator_choice import (
     takers,
 )
 from ..results.variance_components.groupings import GROUPINGS
-from .common import add_file, add_json, add_page, add_picture, day, map_path
+from .common import add_json, add_page, add_picture, day, map_path
 from .compare import add_pairs
 from .outputs import UsageError, Writer, add_force, add_output, write
-from .table_options import add_tables
-from .telling import complain, note, warn
+from .reading_options import add_readings, observed_readings
+from .telling import complain, warn
 
 HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
@@ -30,35 +30,7 @@ DESCRIPTION = (
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add_file(parser)
-    readings = parser.add_argument(
-        "readings",
-        metavar="READINGS",
-        nargs="+",
-        type=Path,
-        default=[],
-        help="readings: one table or several; default: readings.files of the experiment file",
-    )
-    # With nargs="*" none would be looked for behind the first option.
-    readings.required = False
-    add_tables(parser)
-    parser.add_argument(
-        "--certificate",
-        metavar="CSV",
-        type=Path,
-        help=(
-            "values of certificates, priors and probe offsets in place of the experiment file's, as"
-            " simulate --certificate writes them"
-        ),
-    )
-    parser.add_argument(
-        "--sigma",
-        choices=("estimated", "given"),
-        help=(
-            "scale the uncertainties by the residuals, or take them as stated; default: what the"
-            " file says"
-        ),
-    )
+    add_readings(parser)
     parser.add_argument(
         "--monomials",
         action="store_true",
@@ -138,28 +110,14 @@ def _add_components(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
-    from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.experiment.map_files import write_map
-    from ballplate.simulator.readings.certificate_files import read_certificate
-    from ballplate.simulator.readings.reading_files import read_readings
 
     from ..results.correction import left_out_words
     from ..results.fit import Fit
-    from .common import show, single
-    from .table_options import named_sources, with_options
+    from .common import show
 
     _refuse_misused(options)
-    experiment = single(options)
-    if options.certificate:
-        experiment = read_certificate(options.certificate, experiment)
-    experiment = with_options(options, experiment)
-    sources = options.readings or named_sources(experiment)
-    observed = read_readings(sources, lay_out(experiment), settings=experiment.readings)
-    for remark in observed.told:
-        note(options, remark)
-    for remark in observed.remarks[len(observed.told) :]:
-        complain(f"{', '.join(map(str, sources))}: {remark}")
-    warn(observed.doubts)
+    experiment, observed = observed_readings(options)
     result = fit_readings(
         experiment,
         observed,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.inputs.arguments import ensure_one_of
+from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
+    from .certificates.plate_certificate import PlateCertificate
     from .variance_components.components import VarianceComponents
 
 REWEIGHTED = (
@@ -384,6 +385,36 @@ class Fit(FitResult):
         <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
         """
         return map_of(self, date)
+
+    def certificate(
+        self,
+        plate: str | None = None,
+        datum: str | Sequence[str] = (),
+        coverage_factor: float | None = None,
+        about: Mapping[str, str] | None = None,
+    ) -> PlateCertificate:
+        """The co-ordinates of a plate's balls in its own axes with their full covariance, to be
+        written as a page, tables, a digital calibration certificate or a GTC archive.
+
+        `datum` names the ball at the origin, one on an axis and, in space, one in the xy plane, or
+        is "all"; by default corners of the plate. The coverage factor is by default that of the
+        experiment, or 2. `about` has texts about date, country, laboratory and so on.
+
+        :raises ExperimentError: nothing calibrated determines the plate's lengths.
+        :raises ValueError: the fit has not converged; wrong balls, plate, factor or keys.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.certificate(datum=("r1c1", "r5c1", "r1c5")).datum
+        'origin: ball r1c1, y axis through ball r5c1, xy plane through ball r1c5'
+        """
+        from .certificates.plate_certificate import plate_certificate
+
+        names = (datum,) if isinstance(datum, str) else datum
+        ensure_type(Iterable, 'names of balls, or "all"', datum=names)
+        if coverage_factor is not None:
+            ensure_positive("a coverage factor above 0", coverage_factor=coverage_factor)
+        return plate_certificate(self, plate, tuple(names), coverage_factor, about)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
         """Residuals of a fit that has converged, for each position; in three dimensions as they are

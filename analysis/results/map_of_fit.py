@@ -106,7 +106,7 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         frame=FRAMES[experiment.error_model.kind],
         temperatures=_temperatures(fit.observed, experiment),
         left_out=tuple(_left_out(one) for one in fit.estimates if one.kind == "influence"),
-        data=_data(fit.observed),
+        data=data_of(fit.observed),
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,
@@ -119,7 +119,7 @@ def _left_out(one: ParameterEstimate) -> LeftOut:
     return LeftOut(one.name, one.kind, one.unit, value, uncertainty)
 
 
-def _data(observed: ObservedReadings) -> MapData:
+def data_of(observed: ObservedReadings) -> MapData:
     """What the readings say, however they were written."""
     design, readings = observed.design, observed.design.readings
     found = hashlib.sha256()

@@ -109,6 +109,19 @@ def fixes_pose(points: Array) -> bool:
     return bool(extent[d - 2] > ACROSS * extent[0])
 
 
+def rigid_motions(places: Array) -> Array:
+    """Displacements (n, d, m) of places (n, d) by unit shifts along all axes and unit turns, to
+    first order.
+    """
+    n, d = places.shape
+    motions = np.zeros((n, d, d * (d + 1) // 2))
+    motions[:, range(d), range(d)] = 1.0
+    planes = [(0, 1), (1, 2), (2, 0)] if d == 3 else [(0, 1)]
+    for column, (i, j) in enumerate(planes, start=d):
+        motions[:, i, column], motions[:, j, column] = -places[:, j], places[:, i]
+    return motions
+
+
 def without_rigid_motion(places: Array, errors: Array) -> Array:
     """Errors (n, d, r) less the small rigid motion of all places (n, d) that each column contains.
 
@@ -118,11 +131,7 @@ def without_rigid_motion(places: Array, errors: Array) -> Array:
     n, d = places.shape
     if n == 0 or errors.shape[2] == 0:
         return errors
-    motions = np.zeros((n, d, d * (d + 1) // 2))
-    motions[:, range(d), range(d)] = 1.0
-    planes = [(0, 1), (1, 2), (2, 0)] if d == 3 else [(0, 1)]
-    for column, (i, j) in enumerate(planes, start=d):
-        motions[:, i, column], motions[:, j, column] = -places[:, j], places[:, i]
+    motions = rigid_motions(places)
     basis, sizes, _ = np.linalg.svd(motions.reshape(n * d, -1), full_matrices=False)
     basis = basis[:, sizes > 1e-12 * sizes.max()]
     flat = errors.reshape(n * d, -1)

@@ -83,6 +83,19 @@ WALK = {
         {"--plot": "fit.svg", "-o": "fit.npz", "--report": "fit.html"},
         also=("balls.csv",),
     ),
+    "certificate": Walk(
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
+        {"-o": "p.html"},
+        also=("balls.csv",),
+        prints=False,
+    ),
+    "adjust": Walk(
+        EXPERIMENT
+        | {"READINGS": "readings.csv", "--certificate": "certificate.csv", "--after": "again.csv"},
+        {"-o": "after.yaml"},
+        ("--turn", "y-x=1 urad", "--uncertainty", "2%"),
+        also=("balls.csv",),
+    ),
     "correct": Walk(
         {
             "MAP": "map.yaml",
@@ -179,6 +192,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(certificate),
     ]
     assert main(arguments) == 0
+    shutil.copy(readings, folder / "again.csv")
     (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
     (folder / "pairs.csv").write_text("first,second\nA,B\n", encoding="utf-8")
     fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]

@@ -55,6 +55,18 @@ RECIPES = (
         " --no-offsets"
     ),
     "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
+    "certificate small.yaml small-readings.csv --sigma given -o out.html",
+    (
+        "certificate small.yaml small-readings.csv -o out.xml --about date=2026-11-02 --about"
+        " country=DE --json"
+    ),
+    "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
+    (
+        "adjust bar-bell.yaml bar-bell-readings.csv --variant 'length known' --scale 'x=22 um/m'"
+        " --turn 'y+x=0.02 turns of 1 mm at 400 mm' --after bar-bell-readings.csv -o out.yaml"
+    ),
+    "adjust small.yaml small-readings.csv --scale 'x=2 um/m' --uncertainty 2% --json",
+    "adjust map.yaml --turn 'y-x=2 arcsec' --after map.npz --force -o out.npz",
     "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
     "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",

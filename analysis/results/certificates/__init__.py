@@ -1,0 +1,1 @@
+"""Certificates of plates: what a fit says of their balls, in forms that others can use."""
