@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from ..estimators.estimator_choice import (
 from ..results.variance_components.groupings import GROUPINGS
 from .common import (
     add_json,
+    add_page,
     add_picture,
     add_workers,
     day,
@@ -72,6 +74,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="DAY",
         help="with -o: day of the campaign, such as 2026-11-22, which the map is to state",
     )
+    add_page(parser, "write the fit as a page of HTML that needs no other file and no network")
     add_force(parser)
     add_json(parser)
 
@@ -166,9 +169,11 @@ def run(options: Namespace) -> int:
     writers: dict[Path, Writer] = {}
     if options.plot and result.converged:
         writers[options.plot] = result.plot
+    if options.report:
+        writers[options.report] = result.report
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
-        writers[options.output] = lambda path: write_map(fitted, path)
+        writers[options.output] = partial(write_map, fitted)
     if writers:
         write(options, writers)
     if options.output in writers and fitted.left_out:
@@ -224,3 +229,5 @@ def _refuse_misused(options: Namespace) -> None:
         raise UsageError("--date goes with -o; leave it out")
     if options.plot and options.estimator not in DRAWN:
         raise UsageError("--plot draws residuals by the full estimator or reversal; leave it out")
+    if options.report and options.estimator != "full":
+        raise UsageError("--report writes the page of the full estimator; leave it out")

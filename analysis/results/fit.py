@@ -20,7 +20,9 @@ from ballplate.simulator.readings.point_files import ensure_points, probe_places
 from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
+from ..presentation.files import write_file
 from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
+from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
@@ -28,6 +30,7 @@ from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
     CorrectedPoints,
     EstimatedFunctions,
@@ -36,6 +39,7 @@ from .estimates import (
     estimate_rows,
     labels,
 )
+from .fit_contents import fit_contents
 from .map_of_fit import map_of
 from .parts import (
     adjustment_data,
@@ -52,7 +56,7 @@ from .parts import (
 )
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
-from .residuals import Residual, reading_residuals
+from .residuals import Residual, reading_residuals, residual_groups
 from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
@@ -220,6 +224,7 @@ class Fit(FitResult):
                 }
                 for one in self.largest
             ],
+            **self._pictured(),
             **suspected,
             **(
                 {}
@@ -258,6 +263,49 @@ class Fit(FitResult):
         if self.estimated is None or not self.converged:
             raise ValueError(f"the estimate has {self.solution.status}; its uncertainty is unknown")
         return self.estimated
+
+    @property
+    def error_functions(self) -> tuple[EstimatedCurve, ...]:
+        """Curves of the error functions with their standard uncertainties; none of a model that
+        offers no lines.
+
+        :raises ValueError: the estimate has not converged.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.error_functions[0].name, fit.error_functions[0].values.shape
+        ('EXX', (21,))
+        """
+        return estimated_curves(self.functions.at, self.sigma)
+
+    def report(self, path: str | Path) -> None:
+        """Write the page of the fit, a file of HTML that needs no other.
+
+        :raises OSError: the file cannot be written.
+        """
+        write_file(path, self.page().encode("utf-8", "replace"))
+
+    def page(self) -> str:
+        """The page of the fit as text: verdict, curves, residuals, reliability, plate, what was
+        assumed.
+
+        :raises ValueError: the fit does not know its experiment.
+        """
+        if self.experiment is None:
+            raise ValueError(
+                "the fit does not know its experiment, which a page names; fit it anew"
+            )
+        return fit_page(
+            fit_contents(
+                self.experiment,
+                self.observed,
+                self.solution,
+                self.to_dict(),
+                self.estimates,
+                not self.without_scatter,
+                self.untested,
+            )
+        )
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
@@ -502,6 +550,20 @@ class Fit(FitResult):
     def without_scatter(self) -> bool:
         """Whether sigma is estimated from residuals that are zero but for rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    def _pictured(self) -> dict[str, Any]:
+        """Error functions along lines, and residuals by group, as plain data; none without
+        results.
+        """
+        if not self.converged:
+            return {}
+        sigma = float("nan") if self.without_scatter else self.sigma
+        curves = [one.to_dict() for one in self.error_functions]
+        found: dict[str, Any] = {"error_functions": curves} if curves else {}
+        if len(self.design.plate_readings):
+            groups = residual_groups(self.design, self.solution, self.observed.x, sigma)
+            found["residuals"] = groups
+        return found
 
     def _standardised(self, one: Residual) -> float:
         """A residual in its standard uncertainties; NaN where there is nothing but rounding."""
