@@ -22,7 +22,18 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *("check", "run", "plan", "sheet", "reach", "lengths", "reliability", "simulate", "import"),
+    *(
+        "check",
+        "run",
+        "studio",
+        "plan",
+        "sheet",
+        "reach",
+        "lengths",
+        "reliability",
+        "simulate",
+        "import",
+    ),
     *("fit", "compare", "sweep", "export", "report", "map", "spline", "reproduce", "schema"),
     "init",
 )

@@ -181,7 +181,7 @@ def verdict(
     for where there are any.
     """
     design, layout, found = at.design, at.layout, at.spectrum
-    weak, effect = _weak_roots(at, target)
+    weak, effect = weak_roots(at, target)
     limit = weak_limit(design, target)
     open_ = np.concatenate([at.shared_null, weak], axis=1)
     return Verdict(
@@ -214,7 +214,7 @@ def independent_mixture(at: Linearisation) -> Array:
     return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])
 
 
-def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
+def weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
     """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to
     corrected points.
     """
