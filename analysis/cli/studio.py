@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import webbrowser
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from importlib.resources import files
 
 from .common import add_file, whole
 from .outputs import Needed, UsageError
@@ -15,7 +16,8 @@ HELP = "open a design in the browser, to move and change it and see its uncertai
 DESCRIPTION = (
     "Serve a page, to this machine only, on which the positions of a design are dragged, turned,"
     " added and switched off, and its settings changed, with rank, uncertainties and map after"
-    " every move. It is served until Ctrl-C; the file is written when Save is pressed."
+    " every move. A file that is not there yet begins as init writes it. The page is served until"
+    " Ctrl-C; the file is written when Save is pressed."
 )
 
 
@@ -46,7 +48,10 @@ def run(options: Namespace) -> int:
     from ..studio.session import Session
 
     (path,) = options.files
-    session = Session(path, options.variant[0] if options.variant else None)
+    template = files(__package__).joinpath("template.yaml").read_text(encoding="utf-8")
+    session = Session(path, options.variant[0] if options.variant else None, template)
+    if not path.exists():
+        note(options, f"{path} is new: it begins as ballplate init writes it")
 
     def tell(address: str) -> None:
         print(address, flush=True)

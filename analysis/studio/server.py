@@ -137,7 +137,9 @@ def _page(page: str, token: str, port: int) -> Callable[[Request], Awaitable[Res
 def _answering(
     work: Callable[[Request, dict[str, Any]], Any],
 ) -> Callable[[Request], Awaitable[Response]]:
-    """A request that is answered with plain data, or with what is wrong with it."""
+    """A request that is answered with plain data, or with the `error` that a person has made: an
+    answer like any other, which a browser does not count among its own failures.
+    """
 
     async def respond(request: Request) -> Response:
         body: Any = {}
@@ -156,11 +158,11 @@ def _answering(
             text = "; ".join(
                 f"{one.path}: {one.text}" if one.path else one.text for one in error.messages
             )
-            return JSONResponse({"error": text}, 422)
+            return JSONResponse({"error": text})
         except (ActionError, KeyError, TypeError, ValueError) as error:
-            return JSONResponse({"error": str(error)}, 422)
+            return JSONResponse({"error": str(error)})
         except RefusedError as error:
-            return JSONResponse({"error": str(error)}, 409)
+            return JSONResponse({"error": str(error)})
         return JSONResponse(found)
 
     return respond

@@ -44,6 +44,7 @@ def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
             log_level="warning",
             access_log=False,
             server_header=False,
+            lifespan="off",
             timeout_graceful_shutdown=LAST_ANSWERS,
         )
         tell(f"http://{ADDRESS}:{number}/?token={token}")

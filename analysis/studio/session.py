@@ -41,11 +41,17 @@ class Session:
     models in Python run only from files that the command itself has named.
     """
 
-    def __init__(self, path: Path, variant: str | None = None, with_modules: bool = True) -> None:
+    def __init__(self, path: Path, variant: str | None = None, beginning: str = "") -> None:
+        """Open a file; where there is none yet, begin with a text that is not saved.
+
+        :raises ExperimentError: the file cannot be read, or there is none and no text either.
+        """
         self._lock = RLock()
         self._first = path.resolve()
-        self._with_modules = with_modules
-        self._document = opened(path, variant, with_modules)
+        is_new = bool(beginning) and not path.exists()
+        self._document = (
+            Document(path, variant, beginning, None) if is_new else opened(path, variant)
+        )
         if variant is None:
             names = variants_of(self._document)
             self._document = replace(self._document, variant=names[0] if names else None)
@@ -200,7 +206,7 @@ class Session:
         path = self._inside(str(action.get("name", "")))
         if not self._document.is_saved and not action.get("discard"):
             raise RefusedError(f"{self._document.path.name} has changes that are not saved")
-        trusted = self._with_modules and path.resolve() == self._first
+        trusted = path.resolve() == self._first
         document = opened(path, None, trusted)
         names = variants_of(document)
         self._kept = None

@@ -1,7 +1,7 @@
 // Forms for the sections of a design, made from the schema of its file.
 
 const SECTIONS = [
-  "title", "machine", "error_model", "probes", "artefacts", "calibration", "influences", "evaluation",
+  "title", "machine", "error_model", "probes", "artefacts", "positions", "calibration", "influences", "evaluation",
   "target_uncertainty", "coverage_factor", "expected_rank_deficiency",
 ];
 
@@ -94,7 +94,7 @@ function fields(into, path, data, part, root, messages, onSet, label) {
   if (isList) {
     data.forEach((value, k) => {
       const below = possible.find((one) => one.items)?.items ?? {};
-      fields(into, [...path, k], value, below, root, messages, onSet, path.length > 1 ? `${label}[${k + 1}]` : `${k + 1}`);
+      fields(into, [...path, k], value, below, root, messages, onSet, path.length > 1 ? `${label}[${k + 1}]` : value?.name ?? `${k + 1}`);
     });
     return;
   }

@@ -30,7 +30,7 @@ async function ask(path, body) {
   } catch {
     throw new Error(text.trim());
   }
-  if (!response.ok) throw new Error(data.error);
+  if (!response.ok || data.error !== undefined) throw new Error(data.error);
   return data;
 }
 
