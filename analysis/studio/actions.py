@@ -27,7 +27,7 @@ from ..planning.repair.mending import changes_of, with_experiment, with_text_cha
 from ..planning.repair.placing import middle_of
 from ..planning.repair.positions import with_added
 from ..planning.repair.written import Edit, position_settings
-from .document import Document, changed, experiment_of
+from .document import DesignDocument, changed, experiment_of
 
 Arguments = Mapping[str, Any]
 
@@ -39,7 +39,7 @@ class ActionError(ValueError):
     """An action is unknown, or lacks something; the text says what it needs."""
 
 
-def done(document: Document, action: Arguments) -> Document:
+def done(document: DesignDocument, action: Arguments) -> DesignDocument:
     """The document after an action.
 
     :raises ActionError: the action is unknown or incomplete.
@@ -54,7 +54,7 @@ def done(document: Document, action: Arguments) -> Document:
         raise ActionError(f"{name} needs {error}") from None
 
 
-def _moved(document: Document, action: Arguments) -> str:
+def _moved(document: DesignDocument, action: Arguments) -> str:
     """A position by so many metres along each axis."""
     by = _vector(action["by"])
 
@@ -66,7 +66,7 @@ def _moved(document: Document, action: Arguments) -> str:
     return _posed(document, str(action["position"]), move)
 
 
-def _turned(document: Document, action: Arguments) -> str:
+def _turned(document: DesignDocument, action: Arguments) -> str:
     """A position by quarter-turns about the middle of its balls, in their own plane."""
     turns = int(action.get("quarter_turns", 1)) % 4
 
@@ -78,7 +78,7 @@ def _turned(document: Document, action: Arguments) -> str:
     return _posed(document, str(action["position"]), turn)
 
 
-def _stood(document: Document, action: Arguments) -> str:
+def _stood(document: DesignDocument, action: Arguments) -> str:
     """A position across another axis, its middle where it was."""
     axis = str(action["across"])
     if axis not in ("x", "y", "z"):
@@ -92,7 +92,7 @@ def _stood(document: Document, action: Arguments) -> str:
     return _posed(document, str(action["position"]), stand)
 
 
-def _posed(document: Document, name: str, pose: Callable[[Experiment, Position], Pose]) -> str:
+def _posed(document: DesignDocument, name: str, pose: Callable[[Experiment, Position], Pose]) -> str:
     experiment = experiment_of(document, planning=True)
     place = _position(experiment, name)
     found = pose(experiment, place)
@@ -108,20 +108,20 @@ def _about_middle(experiment: Experiment, place: Position, rotation: Array) -> P
     return Pose(rotation, centre - rotation @ middle)
 
 
-def _copied(document: Document, action: Arguments) -> str:
+def _copied(document: DesignDocument, action: Arguments) -> str:
     """A position once more, where it stands."""
     experiment = experiment_of(document, planning=True)
     new = with_added(experiment, _position(experiment, str(action["position"])))
     return with_experiment(document.text, document.path, experiment, new)
 
 
-def _added(document: Document, action: Arguments) -> str:
+def _added(document: DesignDocument, action: Arguments) -> str:
     """A position as a file states it, such as a suggestion or one that was switched off."""
     settings = _plain(action["settings"])
     return _with(document, [TextChange(("positions",), settings, "append")])
 
 
-def _repaired(document: Document, action: Arguments) -> str:
+def _repaired(document: DesignDocument, action: Arguments) -> str:
     """A suggested repair, as the edits of the file that it was told with."""
     text = document.text
     experiment = experiment_of(document, planning=True)
@@ -133,19 +133,19 @@ def _repaired(document: Document, action: Arguments) -> str:
     return with_text_changes(text, document.path, document.variant, changes)
 
 
-def _removed(document: Document, action: Arguments) -> str:
+def _removed(document: DesignDocument, action: Arguments) -> str:
     """The design without a position."""
     steps = _place_of(document, str(action["position"]))
     return _with(document, [TextChange(steps, kind="remove")])
 
 
-def _read_with(document: Document, action: Arguments) -> str:
+def _read_with(document: DesignDocument, action: Arguments) -> str:
     """Everything of a position read with other probes."""
     probes = tuple(str(one) for one in action["probes"])
     return _with_groups(document, action, lambda group: replace(group, probes=probes))
 
 
-def _read_balls(document: Document, action: Arguments) -> str:
+def _read_balls(document: DesignDocument, action: Arguments) -> str:
     """Other balls of a position read, all with the same probes."""
     names = tuple(str(one) for one in action["balls"])
     experiment = experiment_of(document, planning=True)
@@ -162,7 +162,7 @@ def _read_balls(document: Document, action: Arguments) -> str:
 
 
 def _with_groups(
-    document: Document, action: Arguments, change: Callable[[ReadingGroup], ReadingGroup]
+    document: DesignDocument, action: Arguments, change: Callable[[ReadingGroup], ReadingGroup]
 ) -> str:
     experiment = experiment_of(document, planning=True)
     place = _position(experiment, str(action["position"]))
@@ -174,7 +174,7 @@ def _with_groups(
     return with_experiment(document.text, document.path, experiment, new)
 
 
-def _set(document: Document, action: Arguments) -> str:
+def _set(document: DesignDocument, action: Arguments) -> str:
     """A value at a path, as a file states it; nothing takes it away."""
     steps = _steps(action["path"])
     said = str(action["value"])
@@ -197,12 +197,12 @@ def value_of(said: str) -> Any:
         raise ActionError(f"{said} is no value of a file") from None
 
 
-def _written(document: Document, action: Arguments) -> str:
+def _written(document: DesignDocument, action: Arguments) -> str:
     """Another text."""
     return str(action["text"])
 
 
-def _with(document: Document, changes: Sequence[TextChange]) -> str:
+def _with(document: DesignDocument, changes: Sequence[TextChange]) -> str:
     return with_text_changes(document.text, document.path, document.variant, changes)
 
 
@@ -213,7 +213,7 @@ def _position(experiment: Experiment, name: str) -> Position:
     raise ActionError(f'no position "{name}"')
 
 
-def _place_of(document: Document, name: str) -> Steps:
+def _place_of(document: DesignDocument, name: str) -> Steps:
     said = to_python(experiment_of(document, planning=True).tree)
     for i, one in enumerate(said["positions"]):
         if str(one["name"]) == name:
@@ -221,7 +221,7 @@ def _place_of(document: Document, name: str) -> Steps:
     raise ActionError(f'no position "{name}"')
 
 
-def settings_of(document: Document, name: str) -> dict[str, Any]:
+def settings_of(document: DesignDocument, name: str) -> dict[str, Any]:
     """What a file would say of a position.
 
     :raises ActionError: there is no such position.
@@ -253,7 +253,7 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-ACTIONS: Mapping[str, Callable[[Document, Arguments], str]] = {
+ACTIONS: Mapping[str, Callable[[DesignDocument, Arguments], str]] = {
     "move": _moved,
     "turn": _turned,
     "stand": _stood,

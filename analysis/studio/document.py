@@ -24,7 +24,7 @@ class ChangedOnDiskError(Exception):
 
 
 @dataclass(frozen=True)
-class Document:
+class DesignDocument:
     """A design file and its text, which need not be saved.
 
     `content` is what the file held when it was read or written last, None where there was none
@@ -46,16 +46,16 @@ class Document:
         return self.content is not None and self.content == encoded(self)
 
 
-def opened(path: Path, variant: str | None = None, with_modules: bool = True) -> Document:
+def opened(path: Path, variant: str | None = None, with_modules: bool = True) -> DesignDocument:
     """The document of a file.
 
     :raises ExperimentError: the file cannot be read as text.
     """
     text = read_text(path)
-    return Document(path, variant, text, read_bytes(path), with_modules)
+    return DesignDocument(path, variant, text, read_bytes(path), with_modules)
 
 
-def experiment_of(document: Document, planning: bool = False) -> Experiment:
+def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:
     """The experiment that the text says.
 
     :raises ExperimentError: the text is wrong, or has no such variant.
@@ -68,7 +68,7 @@ def experiment_of(document: Document, planning: bool = False) -> Experiment:
     raise refused(document.path, f"choose one of the variants: {names}", "variants")
 
 
-def data_of(document: Document) -> Any:
+def data_of(document: DesignDocument) -> Any:
     """What the text says, as plain data with what the variant changes; None where it is no YAML."""
     try:
         return to_python(experiment_of(document, planning=True).tree)
@@ -80,7 +80,7 @@ def data_of(document: Document) -> Any:
         return None
 
 
-def variants_of(document: Document) -> tuple[str, ...]:
+def variants_of(document: DesignDocument) -> tuple[str, ...]:
     """The names of the variants that the text has, none where it is wrong."""
     try:
         found = load(document.path, True, document.with_modules, document.text)
@@ -89,7 +89,7 @@ def variants_of(document: Document) -> tuple[str, ...]:
     return tuple(one.name for one in found if one.name is not None)
 
 
-def changed(document: Document, text: str) -> Document:
+def changed(document: DesignDocument, text: str) -> DesignDocument:
     """The document with another text, and the present one a step back."""
     if text == document.text:
         return document
@@ -97,7 +97,7 @@ def changed(document: Document, text: str) -> Document:
     return replace(document, text=text, back=back, forward=())
 
 
-def undone(document: Document) -> Document:
+def undone(document: DesignDocument) -> DesignDocument:
     """One step back; the same where there is none."""
     if not document.back:
         return document
@@ -105,7 +105,7 @@ def undone(document: Document) -> Document:
     return replace(document, text=document.back[-1], back=document.back[:-1], forward=forward)
 
 
-def redone(document: Document) -> Document:
+def redone(document: DesignDocument) -> DesignDocument:
     """One step forward; the same where there is none."""
     if not document.forward:
         return document
@@ -113,14 +113,14 @@ def redone(document: Document) -> Document:
     return replace(document, text=document.forward[-1], back=back, forward=document.forward[:-1])
 
 
-def encoded(document: Document) -> bytes:
+def encoded(document: DesignDocument) -> bytes:
     """What the file is to hold, with the byte order mark that it had."""
     mark = BYTE_ORDER_MARK.encode()
     starts = document.content is not None and document.content.startswith(mark)
     return (mark if starts else b"") + document.text.encode()
 
 
-def ensure_as_read(document: Document) -> None:
+def ensure_as_read(document: DesignDocument) -> None:
     """Make sure that saving takes away nothing that others wrote.
 
     :raises ChangedOnDiskError: the file holds something else than what was read or written last.
@@ -138,13 +138,13 @@ def ensure_as_read(document: Document) -> None:
         )
 
 
-def reopened(document: Document) -> Document:
+def reopened(document: DesignDocument) -> DesignDocument:
     """The document as it is on disk now, with the present text a step back."""
     found = opened(document.path, document.variant, document.with_modules)
     return replace(changed(document, found.text), content=found.content)
 
 
-def saved(document: Document, path: Path | None = None) -> Document:
+def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:
     """Write the text into its file, or into a new one; what others wrote meanwhile stays.
 
     :raises ChangedOnDiskError: the file holds something else than what was read or written last,

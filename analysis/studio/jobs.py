@@ -7,7 +7,7 @@ import multiprocessing
 import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.steps import ProgressStep, Report, counted
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from ..presentation.formatting import finite
 from .actions import value_of
-from .document import Document, experiment_of
+from .document import DesignDocument, experiment_of
 
-Work = Callable[[Document, Mapping[str, Any], Report], Any]
+Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
 
 # Most computations beside one another.
 MOST_RUNNING = 2
@@ -30,41 +31,41 @@ MOST_RUNNING = 2
 TRIALS = 256
 
 
-def _suggest(document: Document, settings: Mapping[str, Any], report: Report) -> Any:
+def _suggest(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from .suggestions import suggested_repairs
 
     return suggested_repairs(document, report)
 
 
-def _next(document: Document, settings: Mapping[str, Any], report: Report) -> Any:
+def _next(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from .suggestions import next_positions
 
     return next_positions(document, report)
 
 
-def _monte_carlo(document: Document, settings: Mapping[str, Any], report: Report) -> Any:
-    from .. import api
+def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from ..montecarlo.experiments import trials
+    from ..results.study import predict
 
-    trials = int(settings.get("trials", TRIALS))
-    found = api.run(experiment_of(document), trials=trials, report=report)
-    return {"lines": found.lines(), "data": found.to_dict().get("monte_carlo")}
-
-
-def _plan(document: Document, settings: Mapping[str, Any], report: Report) -> Any:
-    from .. import api
-
-    asked = {name: int(settings[name]) for name in ("positions", "readings") if settings.get(name)}
-    found = api.plan(experiment_of(document, planning=True), report=report, **asked)
-    return {"lines": found.lines()}
+    experiment = experiment_of(document)
+    found = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
+    return {"lines": replace(predict(experiment), monte_carlo=found).lines()}
 
 
-def _sweep(document: Document, settings: Mapping[str, Any], report: Report) -> Any:
+def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from ..planning.campaign import Request, campaign
+
+    experiment = experiment_of(document, planning=True)
+    return {"lines": campaign(experiment, Request(), report=report).lines()}
+
+
+def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     """U6 and the rank for several values of one key."""
     from ..results.study import planned_uncertainty
 
     experiment, path = experiment_of(document), str(settings["path"])
     values = [str(one) for one in settings["values"]]
-    found = []
+    found: list[dict[str, Any]] = []
     for value in counted(values, "values", len(values), report):
         try:
             planned = planned_uncertainty(experiment.with_({path: value_of(value)}))
@@ -84,15 +85,19 @@ def _sweep(document: Document, settings: Mapping[str, Any], report: Report) -> A
     return found
 
 
-def _fit(document: Document, settings: Mapping[str, Any], report: Report) -> Any:
+def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     """The fit of readings that were dropped on the page, with their residuals at the balls."""
-    from .. import api
-    from ..results.residuals import reading_residuals
+    from ballplate.simulator.readings.reading_files import read_readings
 
+    from ..results.residuals import reading_residuals
+    from ..results.study import fit
+
+    experiment = experiment_of(document)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / (Path(str(settings["name"])).name or "readings.csv")
         file.write_bytes(base64.b64decode(str(settings["content"])))
-        found = api.fit(experiment_of(document), file)
+        observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
+    found = fit(experiment, observed)
     data: dict[str, Any] = {"lines": found.lines(), "notes": list(found.notes)}
     if found.converged:
         design = found.design
@@ -164,7 +169,7 @@ class Job:
         }
 
 
-def started(name: str, document: Document, settings: Mapping[str, Any], revision: int) -> Job:
+def started(name: str, document: DesignDocument, settings: Mapping[str, Any], revision: int) -> Job:
     """Start a computation with the document as it is now.
 
     :raises KeyError: there is no such job.
@@ -181,7 +186,7 @@ def started(name: str, document: Document, settings: Mapping[str, Any], revision
 
 
 def _work(
-    connection: Connection, name: str, document: Document, settings: Mapping[str, Any]
+    connection: Connection, name: str, document: DesignDocument, settings: Mapping[str, Any]
 ) -> None:
     def report(step: ProgressStep) -> None:
         connection.send(("step", str(step)))

@@ -14,7 +14,7 @@ from .actions import ActionError, done, settings_of
 from .answers import answer
 from .document import (
     ChangedOnDiskError,
-    Document,
+    DesignDocument,
     data_of,
     experiment_of,
     opened,
@@ -50,7 +50,7 @@ class Session:
         self._first = path.resolve()
         is_new = bool(beginning) and not path.exists()
         self._document = (
-            Document(path, variant, beginning, None) if is_new else opened(path, variant)
+            DesignDocument(path, variant, beginning, None) if is_new else opened(path, variant)
         )
         if variant is None:
             names = variants_of(self._document)
@@ -165,7 +165,7 @@ class Session:
             "reopen": lambda action: self._become(reopened(self._document)),
         }
 
-    def _become(self, document: Document) -> None:
+    def _become(self, document: DesignDocument) -> None:
         self._document = document
         self.revision += 1
         self._judge()

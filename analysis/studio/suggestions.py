@@ -18,13 +18,13 @@ from ..planning.repair.repair_tables import changes_in_words
 from ..planning.repair.written import Edit, position_settings
 from ..results.study import planned_uncertainty
 from .answers import place_data
-from .document import Document, experiment_of
+from .document import DesignDocument, experiment_of
 
 # Positions more that are told.
 MOST_TOLD = 5
 
 
-def suggested_repairs(document: Document, report: Report = unreported) -> list[dict[str, Any]]:
+def suggested_repairs(document: DesignDocument, report: Report = unreported) -> list[dict[str, Any]]:
     """Changes that leave nothing undetermined, in words, with the positions that they add or move,
     as plain data.
 
@@ -62,7 +62,7 @@ def _edit_data(edit: Edit) -> dict[str, Any]:
     return {"path": list(edit.steps), "value": edit.value, "is_new": edit.is_new}
 
 
-def next_positions(document: Document, report: Report = unreported) -> list[dict[str, Any]]:
+def next_positions(document: DesignDocument, report: Report = unreported) -> list[dict[str, Any]]:
     """Positions more, of the pool where there is one, with U6 if each is added; the best first.
 
     A position that leaves U6 undetermined comes after those that determine it.

@@ -142,7 +142,7 @@ function options(select, names, chosen) {
 function legend() {
   const range = view.mapRange();
   $("legend").replaceChildren();
-  if (!range || !$("show-map").checked) return;
+  if (!range || !range[1] || !$("show-map").checked) return;
   $("legend").append(
     `standard uncertainty of a corrected co-ordinate: ${micro(range[0])} µm `,
     make("span", { class: "ramp" }), ` ${micro(range[1])} µm; grey: undetermined`,
@@ -156,13 +156,13 @@ function figures(design, messages) {
   const box = $("verdict");
   box.classList.toggle("bad", messages.length > 0 || rank.deficiency > 0);
   box.classList.toggle("warn", !messages.length && !rank.deficiency && within !== null && within < 1);
-  box.replaceChildren(
+  box.replaceChildren(...[
     make("p", {}, make("strong", {}, messages.length ? "The text is wrong; these are the figures before it." : rank.words), messages.length || expected ? "" : ` (the file expects ${rank.expected ?? 0})`),
     make("p", {}, `${rank.parameters} parameters, ${rank.observations} observations`),
     design.headline.length ? make("p", {}, design.headline.join(", ")) : null,
     ...design.target.map((text) => make("p", {}, text)),
     ...rank.reasons.map((text) => make("p", {}, text)),
-  );
+  ].filter((one) => one !== null));
   $("messages").replaceChildren(...messages.map((one) => make("li", {}, `line ${one.line}${one.path ? `, ${one.path}` : ""}: ${one.text}`)), ...design.doubts.map((text) => make("li", {}, text)));
   quantities(design);
   $("scale").textContent = design.scale.join(" ");

@@ -144,7 +144,8 @@ export class View {
     // Uncertainty of corrected points on levels of the volume, as a transparent sheet of colours.
     const map = this.design.map;
     const values = map.slices.flatMap((slice) => slice.values.flat()).filter((v) => v !== null);
-    if (!values.length) return;
+    // Where everything is undetermined there is nothing to compare.
+    if (!values.length || Math.max(...values) === 0) return;
     const low = Math.min(...values);
     const high = Math.max(...values);
     for (const slice of map.slices) {
@@ -279,6 +280,8 @@ export class View {
     }
     const colour = this.dark() ? 0xff8a80 : 0xb3261e;
     this.lines = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour }));
+    // Its bounds change with every picture.
+    this.lines.frustumCulled = false;
     this.scene.add(this.lines);
     const animate = (now) => {
       if (this.motion !== index || !this.lines) return;
