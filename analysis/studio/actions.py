@@ -92,7 +92,9 @@ def _stood(document: DesignDocument, action: Arguments) -> str:
     return _posed(document, str(action["position"]), stand)
 
 
-def _posed(document: DesignDocument, name: str, pose: Callable[[Experiment, Position], Pose]) -> str:
+def _posed(
+    document: DesignDocument, name: str, pose: Callable[[Experiment, Position], Pose]
+) -> str:
     experiment = experiment_of(document, planning=True)
     place = _position(experiment, name)
     found = pose(experiment, place)

@@ -24,7 +24,9 @@ from .document import DesignDocument, experiment_of
 MOST_TOLD = 5
 
 
-def suggested_repairs(document: DesignDocument, report: Report = unreported) -> list[dict[str, Any]]:
+def suggested_repairs(
+    document: DesignDocument, report: Report = unreported
+) -> list[dict[str, Any]]:
     """Changes that leave nothing undetermined, in words, with the positions that they add or move,
     as plain data.
 

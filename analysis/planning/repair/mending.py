@@ -62,7 +62,7 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
         if experiment.expected_rank_deficiency
         else []
     )
-    new = with_experiment(text, source, experiment, changed, extra)
+    new = with_experiment(text, source, experiment, changed, repair.edits, extra)
     (checked,) = (one for one in load(source, text=new) if one.name == variant)
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
@@ -76,10 +76,13 @@ def with_experiment(
     source: Path,
     experiment: Experiment,
     changed: Experiment,
+    needed: Iterable[Edit] | None = None,
     extra: Iterable[TextChange] = (),
 ) -> str:
     """The text of an experiment's file that says what has changed of it; what a variant does not
-    say itself is changed for that variant alone. `extra` changes are made besides.
+    say itself is changed for that variant alone.
+
+    `needed` are the edits where these are known, and `extra` changes are made besides.
 
     :raises ExperimentError: this cannot be written without changing what stands about it, or what
         others refer to.
@@ -87,7 +90,10 @@ def with_experiment(
     before = {one.name: one for one in load(source, planning=True, text=text)}
     # A variant with more entries of a list has a list of its own, in which the others are changed.
     changes = sorted(
-        [*changes_of(experiment, edits(experiment, changed)), *extra],
+        [
+            *changes_of(experiment, edits(experiment, changed) if needed is None else needed),
+            *extra,
+        ],
         key=lambda one: len(one.steps),
     )
     new = with_text_changes(text, source, experiment.name, changes)
