@@ -139,6 +139,17 @@ def _picture(text: str) -> Path:
     return Path(text)
 
 
+def add_page(parser: Any, help: str) -> None:
+    """Add an option that names a page to be written."""
+    add_output(parser, "--report", metavar="FILE", type=_page, help=f"{help} (.html)")
+
+
+def _page(text: str) -> Path:
+    if Path(text).suffix.lower() not in (".html", ".htm"):
+        raise ArgumentTypeError(f'a page\'s name ends in .html, unlike "{text}"')
+    return Path(text)
+
+
 def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
     """Experiments of all files, every variant one of its own, less those not chosen; with pools for
     `planning`.

@@ -14,9 +14,9 @@ from ..estimators.estimator_choice import (
     takers,
 )
 from ..results.variance_components.groupings import GROUPINGS
-from .common import add_file, add_json, add_picture
+from .common import add_file, add_json, add_page, add_picture
 from .compare import add_pairs
-from .outputs import UsageError, add_force, write
+from .outputs import UsageError, Writer, add_force, write
 from .table_options import add_tables
 from .telling import complain, note, warn
 
@@ -70,6 +70,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--plot",
         help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
     )
+    add_page(parser, "write the fit as a page of HTML that needs no other file and no network")
     add_force(parser)
     add_json(parser)
 
@@ -154,8 +155,13 @@ def run(options: Namespace) -> int:
         options.components,
         options.reweight,
     )
+    writers: dict[Path, Writer] = {}
     if options.plot and result.converged:
-        write(options, {options.plot: result.plot})
+        writers[options.plot] = result.plot
+    if options.report:
+        writers[options.report] = result.report
+    if writers:
+        write(options, writers)
     show(options, result)
     warn(result.cautions)
     if result.complaint:
@@ -188,3 +194,5 @@ def _refuse_misused(options: Namespace) -> None:
             )
     if options.plot and options.estimator not in DRAWN:
         raise UsageError("--plot draws residuals by the full estimator or reversal; leave it out")
+    if options.report and options.estimator != "full":
+        raise UsageError("--report writes the page of the full estimator; leave it out")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, add_workers, percentage, trial_count, whole
-from .outputs import UsageError
+from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
+from .outputs import UsageError, add_force, text_writer, write
 from .telling import complain
 
 if TYPE_CHECKING:
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
     from ..montecarlo.experiments import Trials
+    from ..results.prediction import Prediction
 
 
 HELP = "predict the uncertainties U1 to U6 that a design will achieve"
@@ -40,6 +41,8 @@ def add_options(parser: ArgumentParser) -> None:
     )
     group.add_argument("--seed", type=whole, help="seed of the data sets, instead of the file's")
     add_workers(group)
+    add_page(parser, "write the design as a page of HTML that needs no other file and no network")
+    add_force(parser)
     add_json(parser)
 
 
@@ -60,8 +63,14 @@ def run(options: Namespace) -> int:
     if not with_trials and (options.seed is not None or options.workers is not None):
         raise UsageError("--seed and --workers go with --trials or --until only; leave them out")
     kept = options.interruption.kept
-    for experiment in experiments(options):
+    chosen = experiments(options)
+    if options.report and len(chosen) > 1:
+        names = ", ".join(str(one.name or one.label) for one in chosen)
+        raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
+    for experiment in chosen:
         plans.append(predict(experiment, with_scale=True))
+        if options.report:
+            _write_page(options, experiment, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
         data: dict[str, Any] = plans[-1].to_dict()
@@ -85,6 +94,15 @@ def run(options: Namespace) -> int:
     if interrupted:
         return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1
+
+
+def _write_page(options: Namespace, experiment: Experiment, prediction: Prediction) -> None:
+    from ..report.design_contents import page_of_design
+    from .progress import progress
+
+    with progress(options) as shown:
+        text = page_of_design(experiment, prediction, shown.show)
+    write(options, {options.report: text_writer(lambda stream: stream.write(text))})
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:

@@ -179,6 +179,14 @@ class FitResult(Result):
         """
         raise ValueError("residuals are drawn by the full estimator and reversal only")
 
+    def report(self, path: str | Path) -> None:
+        """Write the result as a page, a file of HTML that needs no other.
+
+        :raises ValueError: it is not of the full estimator.
+        :raises OSError: the file cannot be written.
+        """
+        raise ValueError("a page is written of fits by the full estimator only")
+
     def __repr__(self) -> str:
         count = len(self.warnings)
         words = f"; {count} warning{'s' if count > 1 else ''}>" if count else ">"

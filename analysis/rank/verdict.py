@@ -181,7 +181,7 @@ def verdict(
     for where there are any.
     """
     design, layout, found = at.design, at.layout, at.spectrum
-    weak, effect = weak_roots(at, target)
+    weak, effect = _weak_roots(at, target)
     limit = weak_limit(design, target)
     open_ = np.concatenate([at.shared_null, weak], axis=1)
     return Verdict(
@@ -199,12 +199,27 @@ def verdict(
 
 def null_directions(at: Linearisation) -> tuple[Direction, ...]:
     """The undetermined directions, in a basis in which each involves as little as possible."""
+    return tuple(_told(at.design, at.layout, *change) for change in null_changes(at))
+
+
+def null_changes(at: Linearisation) -> list[tuple[Array, Array]]:
+    """Each undetermined direction as it is told: changes (s,) of the shared parameters, and (n, d)
+    of the balls, the part that moves points most by one micrometre.
+    """
     found = []
     for mixture in independent_mixture(at).T:
         shared, balls = at.shared_null @ mixture, at.ball_null @ mixture
         size = _largest(at.layout, shared, balls) / 1e-6
-        found.append(_describe(at.design, at.layout, shared / size, balls / size))
-    return tuple(found)
+        found.append(_signed(at.design, at.layout, shared / size, balls / size))
+    return found
+
+
+def weak_changes(at: Linearisation, target: Target | None = None) -> list[Array]:
+    """Each weak direction as it is told, weakest first: changes (s,) of the shared parameters, one
+    standard deviation long.
+    """
+    still = np.zeros_like(at.design.balls.places)
+    return [_signed(at.design, at.layout, root, still)[0] for root in _weak_roots(at, target)[0].T]
 
 
 def independent_mixture(at: Linearisation) -> Array:
@@ -214,7 +229,7 @@ def independent_mixture(at: Linearisation) -> Array:
     return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])
 
 
-def weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
+def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
     """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to
     corrected points.
     """
@@ -264,7 +279,8 @@ def _weak_directions(
     of_points = np.sqrt(2.0 * (relative_changes(design, layout, roots) ** 2).mean(axis=1))
     beyond = above(of_points, limit).sum(axis=0)
     for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
-        description = _describe(design, layout, root, np.zeros_like(design.balls.places))
+        still = np.zeros_like(design.balls.places)
+        description = _told(design, layout, *_signed(design, layout, root, still))
         weak = replace(
             description, artefacts=(), standard_deviation=size, points=len(design.evaluation.points)
         )
@@ -272,8 +288,12 @@ def _weak_directions(
     return tuple(directions)
 
 
-def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
-    """A direction in words, with the sign that makes the first of its changes a positive one."""
+def _signed(
+    design: Design, layout: SharedLayout, shared: Array, balls: Array
+) -> tuple[Array, Array]:
+    """A direction less rounding, with the sign that makes the first of its changes a positive
+    one.
+    """
     shared, balls = _less_rounding(layout, shared, balls)
     told = _told(design, layout, shared, balls)
     if told.functions:
@@ -283,7 +303,7 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
     else:
         every = np.concatenate([shared / layout.scale, balls.ravel()])
         first = float(every[comparable(np.abs(every)).argmax()])
-    return told if first >= 0.0 else _told(design, layout, -shared, -balls)
+    return (shared, balls) if first >= 0.0 else (-shared, -balls)
 
 
 def _largest(layout: SharedLayout, shared: Array, balls: Array) -> float:

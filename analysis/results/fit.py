@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_type
 from ballplate.simulator.inputs.settings import hint, shorten
@@ -20,7 +21,9 @@ from ballplate.simulator.readings.reading_files import far_outside
 from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
+from ..presentation.files import write_file
 from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
+from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
@@ -28,6 +31,7 @@ from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
     CorrectedPoints,
     EstimatedFunctions,
@@ -36,6 +40,7 @@ from .estimates import (
     estimate_rows,
     labels,
 )
+from .fit_contents import fit_contents
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -51,7 +56,7 @@ from .parts import (
 )
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
-from .residuals import Residual, reading_residuals
+from .residuals import Residual, reading_residuals, residual_groups
 from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
@@ -87,7 +92,8 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated.
+    estimates had been stated. `experiment` is what was fitted, and is what a page of the fit
+    names its assumptions from.
     """
 
     label: str
@@ -108,6 +114,7 @@ class Fit(FitResult):
     estimated: EstimatedFunctions | None = None
     variance_components: VarianceComponents | None = None
     is_reweighted: bool = False
+    experiment: Experiment | None = None
 
     @property
     def design(self) -> Design:
@@ -214,6 +221,7 @@ class Fit(FitResult):
                 }
                 for one in self.largest
             ],
+            **self._pictured(),
             **suspected,
             **(
                 {}
@@ -251,6 +259,48 @@ class Fit(FitResult):
         if self.estimated is None or not self.converged:
             raise ValueError(f"the estimate has {self.solution.status}; its uncertainty is unknown")
         return self.estimated
+
+    @property
+    def error_functions(self) -> tuple[EstimatedCurve, ...]:
+        """Curves of the error functions with their standard uncertainties; none of a model that
+        offers no lines.
+
+        :raises ValueError: the estimate has not converged.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.error_functions[0].name, fit.error_functions[0].values.shape
+        ('EXX', (21,))
+        """
+        return estimated_curves(self.functions.at, self.sigma)
+
+    def report(self, path: str | Path) -> None:
+        """Write the page of the fit, a file of HTML that needs no other.
+
+        :raises OSError: the file cannot be written.
+        """
+        write_file(path, self.page().encode("utf-8", "replace"))
+
+    def page(self) -> str:
+        """The page of the fit as text: verdict, curves, residuals, reliability, plate, what was
+        assumed.
+
+        :raises ValueError: the fit does not know its experiment.
+        """
+        if self.experiment is None:
+            raise ValueError(
+                "the fit does not know its experiment, which a page names; fit it anew"
+            )
+        return fit_page(
+            fit_contents(
+                self.experiment,
+                self.observed,
+                self.solution,
+                self.to_dict(),
+                self.estimates,
+                not self.without_scatter,
+            )
+        )
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
@@ -449,6 +499,20 @@ class Fit(FitResult):
     def without_scatter(self) -> bool:
         """Whether sigma is estimated from residuals that are zero but for rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    def _pictured(self) -> dict[str, Any]:
+        """Error functions along lines, and residuals by group, as plain data; none without
+        results.
+        """
+        if not self.converged:
+            return {}
+        sigma = float("nan") if self.without_scatter else self.sigma
+        curves = [one.to_dict() for one in self.error_functions]
+        found: dict[str, Any] = {"error_functions": curves} if curves else {}
+        if len(self.design.plate_readings):
+            groups = residual_groups(self.design, self.solution, self.observed.x, sigma)
+            found["residuals"] = groups
+        return found
 
     def _standardised(self, one: Residual) -> float:
         """A residual in its standard uncertainties; NaN where there is nothing but rounding."""

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.design.arrays import Design, Readings, reading_noise
+from ballplate.simulator.design.arrays import Design, Readings, measured, reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from ..presentation.formatting import finite
 
 # Residuals that a fit names.
 LARGEST = 10
@@ -74,3 +79,34 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
             )
         )
     return tuple(found)
+
+
+def residual_groups(
+    design: Design, solution: Solution, x: Array, sigma: float
+) -> dict[str, list[dict[str, Any]]]:
+    """Root mean squares of the readings' residuals by position, by probe and by axis, as plain
+    data in metres and in standard uncertainties, which `sigma` multiplies; NaN makes the latter
+    None.
+    """
+    readings, values, standardised = reading_residuals(design, solution, x)
+    is_read = measured(design, readings)
+    axis = np.broadcast_to(np.arange(design.dimension), values.shape)
+    groups: tuple[tuple[str, Integers, Sequence[str]], ...] = (
+        ("position", readings.position[:, None] + 0 * axis, design.positions.names),
+        ("probe", readings.probe[:, None] + 0 * axis, design.probes.names),
+        ("axis", axis, AXIS_NAMES),
+    )
+    found = {}
+    for word, of_group, names in groups:
+        found[f"by_{word}"] = [
+            {
+                "name": names[k],
+                "count": int(own.sum()),
+                "root_mean_square": float(np.sqrt((values[own] ** 2).mean())),
+                "standardised": finite(float(np.sqrt((standardised[own] ** 2).mean())) / sigma),
+            }
+            for k in np.unique(of_group).tolist()
+            for own in [(of_group == k) & is_read]
+            if own.any()
+        ]
+    return found

@@ -127,7 +127,9 @@ def fit(
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
-        return Fit(*names, observed, solution, judged, 1.0, False, 0, {}, (), ())
+        return Fit(
+            *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
+        )
     at = linearised_fit(design, solution)
     found = None
     if components is not None:
@@ -161,6 +163,7 @@ def fit(
         untested,
         functions,
         found,
+        experiment=experiment,
     )
 
 

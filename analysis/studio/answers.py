@@ -9,22 +9,26 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.design.arrays import locations
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.geometry.positions import ball_coordinates
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.quantities import Target
 
 from ..planning.repair.written import plane_of
 from ..presentation.formatting import finite
-from ..rank.motion import NODES, motions
-from ..rank.verdict import verdict
+from ..rank.motions import moved_balls, moved_points, null_motions, weak_motions
+from ..rank.verdict import Verdict, verdict
 from ..results.parts import scale_lines, target_lines
 from ..results.prediction import length_headline, rank_words
 from ..uncertainty.error_map import error_map
 from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, uncertainties
+
+# Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
+NODES = 9
 
 # Nodes of the map along each axis: few enough to answer while a plate is dragged.
 MAP_NODES = 11
@@ -60,7 +64,7 @@ def answer(experiment: Experiment) -> dict[str, Any]:
         "target": [] if target is None else target_lines(lengths),
         "within": None if lengths is None else lengths.within_target,
         "scale": scale_lines(scale),
-        "motions": _motions_data(design, [*motions(at, judged, target)]),
+        "motions": _motions(at, judged, target),
         "map": _map(experiment),
         "doubts": list(experiment.doubts),
         "engine": engine,
@@ -114,33 +118,42 @@ def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
     }
 
 
-def _motions_data(design: Design, found: list[Any]) -> dict[str, Any]:
-    """Displacements per unit of the largest; `readings` name the position and ball of each."""
-    if not found:
-        return {"nodes": NODES, "directions": []}
-    balls = design.balls
-    first = np.array([int(balls.of(int(one)).min()) for one in balls.artefact])
-    of_ball = np.arange(len(first)) - first
+def _motions(at: Linearisation, judged: Verdict, target: Target | None) -> dict[str, Any]:
+    """How each undetermined and each weak direction moves a lattice through the volume, nodes of x
+    running slowest, and the balls that are read, per unit of the largest displacement.
+
+    Their common rigid motion, which no distance shows, is taken out.
+    """
+    design = at.design
+    volume, read, offsets = design.machine.volume, design.readings, design.probes.offsets
+    sides = [np.linspace(*ends, NODES) for ends in zip(volume.lower, volume.upper, strict=True)]
+    nodes = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(sides))
+    of_nodes = np.full(len(nodes), design.evaluation.probe)
+    of_plates = read.select(design.plate_readings)
+    places = np.concatenate([nodes + offsets[of_nodes], locations(design, at.state, of_plates)])
+    told = (*judged.null, *judged.weak)
+    found = []
+    for k, motion in enumerate((*null_motions(at), *weak_motions(at, target))):
+        by = [moved_points(at, motion, nodes, of_nodes), moved_balls(at, motion, of_plates)]
+        moved = without_rigid_motion(places, np.concatenate(by)[:, :, None])[:, :, 0]
+        largest = float(np.linalg.norm(moved, axis=1).max())
+        rounded = np.round(moved / (largest or 1.0), 4).tolist()
+        found.append(
+            {
+                "words": str(told[k]),
+                "weak": k >= len(judged.null),
+                "nodes": rounded[: len(nodes)],
+                "readings": rounded[len(nodes) :],
+            }
+        )
+    first = np.array([design.balls.of(int(one)).min() for one in design.balls.artefact])
+    numbers = np.arange(len(first)) - first
     return {
         "nodes": NODES,
-        "position": design.readings.position.tolist(),
-        "ball": of_ball[design.readings.ball].tolist(),
-        "directions": [
-            {
-                "words": one.words,
-                "weak": one.is_weak,
-                "largest": one.largest,
-                "nodes": _unit(one.nodes, one.largest),
-                "readings": _unit(one.readings, one.largest),
-            }
-            for one in found
-        ],
+        "position": of_plates.position.tolist(),
+        "ball": numbers[of_plates.ball].tolist(),
+        "directions": found,
     }
-
-
-def _unit(displacement: Array, largest: float) -> list[list[float]]:
-    size = largest if largest > 0.0 else 1.0
-    return [[round(v, 4) for v in one] for one in (displacement / size).tolist()]
 
 
 def _map(experiment: Experiment) -> dict[str, Any]:

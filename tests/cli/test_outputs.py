@@ -80,7 +80,7 @@ WALK = {
     ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
-        {"--plot": "fit.svg"},
+        {"--plot": "fit.svg", "--report": "fit.html"},
         also=("balls.csv",),
     ),
     "plan": Walk(
@@ -111,7 +111,7 @@ WALK = {
     "export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
     "report": Walk({"STORE": "store.sqlite"}, {"-o": "t.md"}, prints=False),
     "check": Walk(EXPERIMENT, {}),
-    "run": Walk(EXPERIMENT, {}),
+    "run": Walk(EXPERIMENT, {"--report": "design.html"}, also=("balls.csv",)),
     "reach": Walk(EXPERIMENT, {}, ("--by", "repeatability")),
     "compare": Walk(EXPERIMENT, {}, ("--trials", "2", "--points", "5")),
     # A store is no file that is replaced; what it refuses is tested with it.

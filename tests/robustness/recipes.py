@@ -12,7 +12,7 @@ RECIPES = (
     "check --goal 'U6 average 1 um' --goal tasks small.yaml",
     "check --variant 'radius known' bryan-gauge.yaml",
     "check 'sm*.yaml'",
-    "run tables.yaml",
+    "run tables.yaml --report out.html",
     "run --json small.yaml",
     "run small.yaml --trials 4 --seed 3 --workers 1",
     "run bar-bell.yaml --variant 'length known' --until 30% --trials 20 --workers 1",
@@ -38,7 +38,7 @@ RECIPES = (
     "simulate small.yaml -o out.csv --certificate certificate.csv --seed 4",
     "simulate tables.yaml -o - --exact",
     "simulate splines.yaml --variant plain -o old.csv --force",
-    "fit small.yaml small-readings.csv --certificate small-certificate.csv",
+    "fit small.yaml small-readings.csv --certificate small-certificate.csv --report out.html",
     (
         "fit tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma estimated"
         " --json"

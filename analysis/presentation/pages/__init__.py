@@ -1,0 +1,1 @@
+"""Pages of results: self-contained HTML, made of sections that are functions of results."""

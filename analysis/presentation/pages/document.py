@@ -1,0 +1,103 @@
+"""The page that sections stand on: head, list of sections, style, and what its script may do."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from importlib import resources
+from importlib.metadata import version
+
+from .elements import Html, element, joined
+
+
+@dataclass(frozen=True)
+class PageSection:
+    """A section of a page; `name` is its id. One without a body is left out."""
+
+    name: str
+    title: str
+    body: Html
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page: its title, what it was made of and when, the verdict in few words and whether it is a
+    good one, and sections.
+    """
+
+    title: str
+    origin: Html
+    verdict: Html
+    is_good: bool
+    sections: Sequence[PageSection]
+    foot: str
+
+
+@cache
+def shipped(name: str) -> str:
+    """Text of a file that stands beside this module."""
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def written(page: Page) -> str:
+    """The page as a file that needs no other and asks no network for anything."""
+    sections = [one for one in page.sections if one.body]
+    links = joined(element("li", element("a", one.title, href=f"#{one.name}")) for one in sections)
+    kind = "verdict" if page.is_good else "verdict bad"
+    head = element(
+        "header",
+        element("h1", page.title),
+        element("p", *page.origin, class_="note"),
+        element("div", page.verdict, class_=kind),
+        element("nav", element("ul", links), aria_label="Sections"),
+    )
+    body = joined(
+        element(
+            "section", element("h2", one.title, id=one.name), one.body, aria_labelledby=one.name
+        )
+        for one in sections
+    )
+    script = shipped("view.js")
+    parts = [
+        element("a", "Skip to the results", class_="skip", href="#main"),
+        head,
+        element("main", body, id="main"),
+        element("footer", element("p", page.foot)),
+        # A script that a person wrote would have another sum, and is not run.
+        Html(f"<script>{script}</script>"),
+    ]
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n{_head(page.title, script)}\n'
+        f"{element('body', *parts)}\n</html>\n"
+    )
+
+
+def _head(title: str, script: str) -> Html:
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:;"
+    policy += f" script-src 'sha256-{digest}'"
+    return element(
+        "head",
+        element("meta", charset="utf-8"),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        Html(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
+        element("link", rel="icon", href="data:,"),
+        element("title", title),
+        Html(f"<style>\n{shipped('page.css')}</style>"),
+    )
+
+
+def origin(*files: str) -> Html:
+    """What a page was made of, when, and with which version."""
+    moment = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    return joined([*filter(None, files), moment, f"ballplate {version('ballplate')}"], " · ")
+
+
+def facts_list(facts: Sequence[tuple[str, str]]) -> Html:
+    """Facts by name."""
+    rows = (joined([element("dt", name), element("dd", words)]) for name, words in facts)
+    return element("dl", *rows)

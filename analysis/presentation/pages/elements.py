@@ -1,0 +1,112 @@
+"""Elements of a page: what a person wrote is escaped, what is HTML already is marked as such."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+from ballplate.simulator.inputs.messages import in_one_line
+
+
+class Html(str):
+    """A text that is HTML already."""
+
+    __slots__ = ()
+
+
+def as_html(content: str) -> Html:
+    """HTML as it is, and any other text in one line and with its special characters escaped.
+
+    >>> as_html("a < b"), as_html(Html("<b>"))
+    ('a &lt; b', '<b>')
+    """
+    return content if isinstance(content, Html) else Html(escape(in_one_line(content)))
+
+
+def joined(parts: Iterable[str], between: str = "") -> Html:
+    """Parts behind one another, with a text between them."""
+    return Html(as_html(between).join(map(as_html, parts)))
+
+
+def element(tag: str, *content: str, **attributes: str | float | bool | None) -> Html:
+    """An element of a page.
+
+    A name of an attribute may end in an underscore, and has hyphens in the place of others. What
+    is None or False is left out.
+
+    >>> element("p", "a < b", element("br"), class_="note", data_path="/a", hidden=False)
+    '<p class="note" data-path="/a">a &lt; b<br></p>'
+    """
+    written = [tag]
+    for key, value in attributes.items():
+        name = key.removesuffix("_").replace("_", "-")
+        if value is True:
+            written.append(name)
+        elif value is not None and value is not False:
+            written.append(f'{name}="{escape(in_one_line(str(value)))}"')
+    start = f"<{' '.join(written)}>"
+    if tag in ("br", "link", "meta", "input"):
+        return Html(start)
+    return Html(f"{start}{joined(content)}</{tag}>")
+
+
+def sentence(*parts: str) -> Html:
+    """A paragraph."""
+    return element("p", *parts)
+
+
+def note(*parts: str) -> Html:
+    """A paragraph in small letters below what it explains."""
+    return element("p", *parts, class_="note")
+
+
+def table(
+    name: str,
+    caption: str,
+    heads: Iterable[str],
+    rows: Iterable[Iterable[str]],
+    words: Iterable[int] = (0,),
+    is_long: bool = False,
+) -> Html:
+    """A table of cells; the columns `words` are texts, all others numbers.
+
+    `name` is an id that the page has once; a table that `is_long` scrolls by itself on screens.
+    """
+    texts = set(words)
+    head = joined(
+        element("th", one, scope="col", class_="words" if k in texts else None)
+        for k, one in enumerate(heads)
+    )
+    body = joined(
+        element(
+            "tr",
+            *(
+                element("th", one, scope="row")
+                if k == 0
+                else element("td", one, class_=_cell_class(one) if k in texts else None)
+                for k, one in enumerate(row)
+            ),
+        )
+        for row in rows
+    )
+    inner = element(
+        "table",
+        element("caption", caption, id=f"table-{name}"),
+        element("thead", element("tr", head), class_="tall"),
+        element("tbody", body),
+        class_="tight",
+    )
+    kind = "scroll high" if is_long else "scroll"
+    return element(
+        "div", inner, class_=kind, role="region", tabindex="0", aria_labelledby=f"table-{name}"
+    )
+
+
+def _cell_class(text: str) -> str:
+    """Class of a cell with words, which may go over several lines where they are many."""
+    return "words long" if len(text) > 40 else "words"
+
+
+def folded(summary: str, *content: str, is_open: bool = False) -> Html:
+    """What is shown on demand, and in print."""
+    return element("details", element("summary", summary), *content, open=is_open)

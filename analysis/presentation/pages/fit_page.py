@@ -1,0 +1,263 @@
+"""The page of a fit: what was estimated from readings, how well, and whether to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .curve_sections import curves_section
+from .document import Page, PageSection, facts_list, origin, written
+from .elements import Html, element, joined, note, sentence, table
+from .quoted import QuotedData
+from .residual_sections import (
+    components_section,
+    reliability_section,
+    residual_charts,
+    residual_tables,
+    residual_view,
+    suspects_section,
+)
+from .uncertainty_sections import (
+    estimates_table,
+    expansion,
+    lengths_words,
+    task_table,
+    uncertainty_table,
+)
+
+FOOT = (
+    "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
+    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit or reliability"
+    " with --json: its data-path says which, and where it stands there."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateResiduals:
+    """Readings (m,) of plates: where the scales were (m, d), what each differs by from the
+    estimate (m, d), in metres and in standard uncertainties, NaN where a co-ordinate is not read,
+    and indices of positions and probes with their names.
+    """
+
+    places: Array
+    values: Array
+    standardised: Array
+    position: Integers
+    probe: Integers
+    positions: tuple[str, ...]
+    probes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FitContents:
+    """What a page of a fit is made of: plain data of the fit and of its design's reliability, None
+    where that was left out for the reason `unreliable`; `kinds` of the estimates by name; the
+    edges (k, 2, d) of the volume; `target` in words; `files` that it comes from, and what was
+    assumed.
+    """
+
+    title: str
+    data: Mapping[str, Any]
+    kinds: Mapping[str, str]
+    reliability: Mapping[str, Any] | None
+    unreliable: str
+    residuals: PlateResiduals
+    edges: Array
+    target: str
+    files: Sequence[str]
+    facts: Sequence[tuple[str, str]]
+
+
+def fit_page(contents: FitContents) -> str:
+    """The page as a file that needs no other."""
+    fit = QuotedData("/fit", contents.data)
+    has_result = contents.data["status"] == "converged"
+    assumed = PageSection("assumed", "What was assumed", facts_list(contents.facts))
+    sections = [_course(fit), assumed]
+    if has_result:
+        sections = [*_results(fit, contents), *sections]
+    is_good = has_result and _is_good(contents.data)
+    made = origin(*contents.files)
+    return written(Page(contents.title, made, _verdict(fit, contents), is_good, sections, FOOT))
+
+
+def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
+    """The sections of a fit that has converged."""
+    found = contents.residuals
+    of_residuals = Html()
+    if len(found.places):
+        of_residuals = joined(
+            [
+                residual_charts(
+                    found.standardised, found.position, found.probe, found.positions, found.probes
+                ),
+                residual_view(found.places, np.nan_to_num(found.values), contents.edges),
+                residual_tables(fit),
+            ]
+        )
+    reliability = note(contents.unreliable)
+    if contents.reliability is not None:
+        reliability = reliability_section(QuotedData("/reliability", contents.reliability))
+    return [
+        PageSection("rank", "What the readings determine", _rank(fit)),
+        PageSection(
+            "lengths", "Uncertainties and target", joined([uncertainty_table(fit), task_table(fit)])
+        ),
+        PageSection("curves", "Error curves", curves_section(fit)),
+        PageSection("suspected", "Suspected gross errors", suspects_section(fit)),
+        PageSection("residuals", "Residuals", of_residuals),
+        PageSection("components", "Variance components", components_section(fit)),
+        PageSection("reliability", "Reliability", reliability),
+        PageSection("adjustments", "Adjustments", _adjustments(fit)),
+        PageSection("plate", "Plate", _plate(fit, contents.kinds)),
+        PageSection("estimates", "Estimates", _estimates(fit, contents.kinds)),
+    ]
+
+
+def _is_good(data: Mapping[str, Any]) -> bool:
+    """Whether nothing on the page asks for a person's attention."""
+    shares = [one.get("within_target") for one in data["quantities"].values()]
+    wrong = data["complaint"] or data["too_large"] or data.get("suspected") or data["warnings"]
+    missed = any(share is not None and share < 1.0 for share in shares)
+    missed |= any(one["within_target"] is False for one in data.get("tasks", {}).values())
+    return not wrong and not missed
+
+
+def _verdict(fit: QuotedData, contents: FitContents) -> Html:
+    data = contents.data
+    if data["status"] != "converged":
+        first = sentence(f"The estimate has {data['status']}, and there are no results.")
+        return joined([first, sentence(fit.text("complaint"))])
+    rank = Html("Full rank")
+    if data["rank_deficiency"]:
+        rank = joined(["Rank deficiency ", fit.number("rank_deficiency"), ", as expected"])
+    if data["complaint"]:
+        rank = fit.text("complaint")
+    scatter = "the residuals are no larger than stated"
+    if data["too_large"]:
+        scatter = "the residuals are larger than the stated uncertainties explain"
+    count = len(data.get("suspected", ()))
+    suspects = f", and {count} cause{'s are' if count > 1 else ' is'} suspected" if count else ""
+    estimated = "estimated from the residuals" if data["sigma_is_estimated"] else "as given"
+    first = sentence(
+        rank,
+        f"; {scatter} (sigma = ",
+        fit.number("sigma", digits=3),
+        f", {estimated})",
+        suspects,
+        ".",
+    )
+    second = sentence(lengths_words(fit, contents.target))
+    warnings = [sentence("Warning: ", one.text()) for one in fit.at("warnings").each()]
+    return joined([first, second, *warnings])
+
+
+def _rank(fit: QuotedData) -> Html:
+    data = fit.data
+    parts = [
+        sentence(
+            fit.number("parameters"),
+            " parameters, ",
+            fit.number("observations"),
+            " observations, ",
+            fit.number("degrees_of_freedom"),
+            " degrees of freedom.",
+        )
+    ]
+    for key, title in (
+        ("undetermined", "Undetermined"),
+        ("weakly_determined", "Weakly determined"),
+    ):
+        if data[key]:
+            words = (
+                element("li", one.text() if key == "undetermined" else one.text("text"))
+                for one in fit.at(key).each()
+            )
+            parts += [element("h3", title), element("ol", *words)]
+    for key, title in (
+        ("planned_but_not_read", "Planned, but not read"),
+        ("read_but_not_planned", "Read, but not planned"),
+        ("reasons", "Reasons"),
+    ):
+        if data[key]:
+            words = (element("li", one.text()) for one in fit.at(key).each())
+            parts += [element("h3", title), element("ul", *words)]
+    return joined(parts)
+
+
+def _course(fit: QuotedData) -> PageSection:
+    """How the iterations went."""
+    rows = [
+        [
+            str(k),
+            "" if k == 0 else one.number("step", digits=2),
+            one.number("sum_of_squares", digits=6),
+        ]
+        for k, one in enumerate(fit.at("iterations").each())
+    ]
+    heads = ["iteration", "step, m and rad", "S²"]
+    made_table = table("iterations", "Iterations", heads, rows)
+    return PageSection("iterations", "Course of the fit", made_table)
+
+
+def _adjustments(fit: QuotedData) -> Html:
+    if "adjustments" not in fit:
+        return Html()
+    rows = []
+    for one in fit.at("adjustments").each():
+        is_angle = one.data["unit"] == "rad"
+        factor = 180.0 * 3600.0 / np.pi if is_angle else 1e6
+        names = ("value", "standard_uncertainty", "expanded_uncertainty")
+        figures = [one.number(name, factor=factor) for name in names]
+        rows.append(
+            [one.text("what"), *figures, "arcsec" if is_angle else "µm/m", one.text("words")]
+        )
+    heads = ["adjustment", "is off by", "u", "U, 95 %", "unit", "what to do"]
+    words = "Errors of scales: true length less reading; errors of angles: excess over 90°."
+    return joined([table("adjustments", "Scales and angles", heads, rows, (0, 4, 5)), note(words)])
+
+
+def _plate(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
+    """Co-ordinates of the balls: in the plate's own axes where there are such, and as estimated."""
+    parts = []
+    k = expansion(fit.at("quantities"))
+    for number, plate in enumerate(fit.at("plates").each() if "plates" in fit else ()):
+        name = list(fit.data["plates"])[number]
+        rows = []
+        for ball, one in zip(plate.data["balls"], plate.at("balls").each(), strict=True):
+            places = [one.at(axis).number("value", factor=1e3, digits=9) for axis in "xy"]
+            us = [one.at(axis).micro("standard_uncertainty", digits=3) for axis in "xy"]
+            expanded = [
+                one.at(axis).micro("standard_uncertainty", factor=k, digits=3) for axis in "xy"
+            ]
+            rows.append([ball, *places, *us, *expanded])
+        heads = ["ball", "x, mm", "y, mm", "u of x, µm", "of y", f"U of x, k = {k:g}", "of y"]
+        axes = plate.data["axes"]
+        caption = f"{name}, in its own axes: origin in {axes['origin']}, and " + ", ".join(
+            f"the {axis} axis through {ball}" for axis, ball in axes.items() if axis != "origin"
+        )
+        parts.append(table(f"plate-{number}", caption, heads, rows, is_long=len(rows) > 40))
+    balls = [name for name, kind in kinds.items() if kind == "ball"]
+    words = "Co-ordinates of the balls, as estimated"
+    parts.append(estimates_table(fit, balls, "balls", words))
+    return joined(parts)
+
+
+def _estimates(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
+    titles = {
+        "machine": "Parameters of the error model",
+        "influence": "Influence quantities",
+        "offset": "Offsets of probes",
+        "length": "Lengths of standards",
+        "rotation": "Rotations of positions",
+        "origin": "Origins of positions",
+    }
+    parts = []
+    for kind, caption in titles.items():
+        names = [name for name, one in kinds.items() if one == kind]
+        parts.append(estimates_table(fit, names, f"estimates-{kind}", caption))
+    return joined(parts)

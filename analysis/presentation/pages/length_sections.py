@@ -1,0 +1,172 @@
+"""Section on lengths throughout the volume: against the target, by place, length and direction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..formatting import number
+from .charts import Chart, Trace, chart_svg, figure, figures, legend
+from .elements import Html, element, joined, note, table
+from .quoted import QuotedData
+
+SHADES = 8
+# Of a map: width of a cell, its height, and the room around.
+CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 6.0
+
+
+def lengths_section(lengths: QuotedData, target: str) -> Html:
+    """Maps of the largest uncertainty of lengths from each point, by level, and by length; without
+    a `target` of them themselves.
+    """
+    data = lengths.data
+    k = data["target_coverage_factor"] if target else data["coverage_factor"]
+    points = np.array([one["point"] for one in data["by_point"]])
+    levels = np.unique(points[:, 2]) if points.shape[1] == 3 else np.zeros(1)
+    u = "u" if k == 1.0 else f"{k:g} u"
+    what = f"Largest ratio of {u} to the target" if target else f"Largest {k:g} u, µm,"
+    maps = []
+    for level in levels.tolist():
+        chosen = (
+            np.flatnonzero(points[:, 2] == level)
+            if points.shape[1] == 3
+            else np.arange(len(points))
+        )
+        at = f", z = {1e3 * level:.6g} mm" if points.shape[1] == 3 else ""
+        words = f"{what} of the lengths from each point{at}"
+        maps.append(figure(f"{words}.", _map(lengths, chosen.tolist(), k, bool(target), words)))
+    whole = lengths.at("all")
+    head = [
+        whole.number("lengths"),
+        " lengths between the points of a grid, with the probe ",
+        lengths.text("probe"),
+    ]
+    if whole.data["undetermined"]:
+        head += [", ", whole.number("undetermined"), " of them undetermined"]
+    if target:
+        head += [
+            ": the standard uncertainty u is within the target ",
+            target,
+            " for ",
+            whole.share("share_within"),
+        ]
+        head += [
+            ", the expanded uncertainty U for ",
+            whole.share("share_expanded_within"),
+            f" (k = {data['coverage_factor']:g})",
+        ]
+    above = "Above 1 (orange) the target is missed; darker" if target else "Darker"
+    legends = note(f"{above} is larger. Some lengths from points with – are undetermined.")
+    return joined(
+        [
+            element("p", *head, "."),
+            figures(*maps),
+            legends,
+            _by_length(lengths, target),
+            _by_direction(lengths, bool(target)),
+        ]
+    )
+
+
+def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
+    """Cells of a level, each with its figure."""
+    name, factor = ("maximum_ratio", k) if of_target else ("maximum", 1e6 * k)
+    every = [one[name] for one in lengths.data["by_point"]]
+    known = [factor * one for one in every if one is not None]
+    low, high = (min(known), max(known)) if known else (0.0, 1.0)
+    places = np.array([lengths.data["by_point"][i]["point"][:2] for i in chosen])
+    x, y = np.unique(places[:, 0]), np.unique(places[:, 1])
+    parts = []
+    for i, place in zip(chosen, places, strict=True):
+        column, row = np.searchsorted(x, place[0]), len(y) - 1 - np.searchsorted(y, place[1])
+        left, top = LEFT + CELL * column, ABOVE + ROW * row
+        # What is known of some of its lengths would hide that others are unknown.
+        value = None if lengths.data["by_point"][i]["undetermined"] else every[i]
+        kind = "open"
+        if value is not None:
+            # Equal values but for rounding have no order to show.
+            share = (factor * value - low) / (high - low) if high - low > 1e-9 * high else 0.0
+            kind = f"heat-{min(int(SHADES * (share + 1e-9)), SHADES - 1)}"
+            kind = "over" if of_target and factor * value > 1.0 else kind
+        parts.append(
+            Html(
+                f'<rect class="{kind}" x="{left:g}" y="{top:g}" width="{CELL:g}" height="{ROW:g}"/>'
+            )
+        )
+        shown = "–" if value is None else number(factor * value, 3)
+        parts.append(
+            element(
+                "text",
+                shown,
+                class_="place" if value is not None else None,
+                x=f"{left + CELL / 2:g}",
+                y=f"{top + ROW / 2 + 3.5:g}",
+                text_anchor="middle",
+                data_path=None if value is None else lengths.at("by_point", i, name).path,
+                data_value=None if value is None else repr(value),
+                data_factor=None if value is None else repr(factor),
+            )
+        )
+    bottom = ABOVE + ROW * len(y)
+    for j, value in enumerate(x.tolist()):
+        parts.append(_label(LEFT + CELL * (j + 0.5), bottom + 12, f"{1e3 * value:.5g}", "middle"))
+    for j, value in enumerate(y.tolist()):
+        parts.append(_label(LEFT - 5, bottom - ROW * (j + 0.5) + 3.5, f"{1e3 * value:.5g}", "end"))
+    parts.append(_label(LEFT + CELL * len(x) / 2, bottom + 26, "x, mm", "middle"))
+    parts.append(_label(4, ABOVE + 8, "y", "start"))
+    return element(
+        "svg",
+        joined(parts),
+        class_="map",
+        viewBox=f"0 0 {LEFT + CELL * len(x) + 6:g} {bottom + BELOW:g}",
+        role="img",
+        aria_label=words,
+    )
+
+
+def _label(x: float, y: float, text: str, anchor: str) -> Html:
+    return element("text", text, x=f"{x:g}", y=f"{y:g}", text_anchor=anchor)
+
+
+def _by_length(lengths: QuotedData, target: str) -> Html:
+    """Uncertainties over the length, with the target."""
+    data = lengths.data
+    k = data["target_coverage_factor"] if target else data["coverage_factor"]
+    groups = [one for one in data["by_length"] if one["lengths"]]
+    middle = np.array([500.0 * (one["from"] + one["to"]) for one in groups])
+    most, average = (
+        1e6 * k * np.array([one[name] for one in groups], float) for name in ("maximum", "average")
+    )
+    u = "u" if k == 1.0 else f"{k:g} u"
+    traces = [Trace("line", "s0", middle, most), Trace("dots", "s0", middle, most)]
+    traces += [Trace("line", "s2", middle, average), Trace("dots", "s2", middle, average)]
+    left_out = "; undetermined ones are left out" if data["all"]["undetermined"] else ""
+    entries = [("line", "s0", f"largest {u}"), ("line", "s2", f"average {u}")]
+    if target:
+        ends = np.array([0.0, 1e3 * groups[-1]["to"]])
+        limit = 1e6 * data["target"]["constant"] + 1e3 * data["target"]["slope"] * ends
+        traces.append(Trace("line", "alert dashed", ends, limit))
+        entries.append(("line", "alert dashed", "target"))
+    chart = Chart(traces, "length, mm", "µm", f"{u} over the length", from_zero=True)
+    return joined(
+        [
+            legend(*entries),
+            figures(figure(f"{u} of lengths over the length{left_out}.", chart_svg(chart))),
+        ]
+    )
+
+
+def _by_direction(lengths: QuotedData, of_target: bool) -> Html:
+    k = lengths.data["coverage_factor"]
+    rows = []
+    for one in lengths.at("by_direction").each():
+        if not one.data["lengths"]:
+            continue
+        row: list[str] = [one.text("direction"), one.number("lengths"), one.number("undetermined")]
+        row += [one.micro("average"), one.micro("maximum"), one.micro("maximum", factor=k)]
+        if of_target:
+            row += [one.share("share_within"), one.share("share_expanded_within")]
+        rows.append(row)
+    heads = ["direction", "lengths", "undetermined", "u average, µm", "u maximum"]
+    heads += [f"U maximum, k = {k:g}"]
+    heads += ["u within target", f"U within target, k = {k:g}"] if of_target else []
+    return table("directions", "Lengths by direction", heads, rows)

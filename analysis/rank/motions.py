@@ -1,0 +1,73 @@
+"""What undetermined and weakly determined directions do to machine, plates and positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Readings
+from ballplate.simulator.estimation.corrections import correction_rows
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.geometry.motions import cross_matrices
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .verdict import null_changes, weak_changes
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A change of all parameters: `shared` (s,) and `balls` (n, d) of all balls, in metres and
+    radians, with the size and the sign that the rank report tells it with.
+    """
+
+    shared: Array
+    balls: Array
+
+
+@single_threaded
+def null_motions(at: Linearisation) -> tuple[Motion, ...]:
+    """The undetermined directions, in the order of the rank report."""
+    return tuple(Motion(*one) for one in null_changes(at))
+
+
+@single_threaded
+def weak_motions(at: Linearisation, target: Target | None) -> tuple[Motion, ...]:
+    """The weakly determined directions, one standard deviation long, weakest first; balls go with
+    them as the observations make them.
+    """
+    found = []
+    for shared in weak_changes(at, target):
+        # By the same standard normal variables that make this of the shared parameters.
+        made, *_ = np.linalg.lstsq(at.shared, shared, rcond=None)
+        found.append(Motion(shared, at.balls.common[:, :, : at.rank] @ made))
+    return tuple(found)
+
+
+def moved_points(at: Linearisation, motion: Motion, points: Array, probes: Integers) -> Array:
+    """By how much (m, d) corrected points for scale readings `points` (m, d) with probes of indices
+    (m,) change, in metres.
+    """
+    rows = correction_rows(at.design, at.layout, at.state, points, probes)
+    return np.asarray(rows @ motion.shared)
+
+
+def moved_balls(at: Linearisation, motion: Motion, readings: Readings) -> Array:
+    """By how much (m, d) the places of balls of plates that are read change, in metres.
+
+    With T(y) = R y + t, and R turned by a small rotation w about the machine's axes, it is
+    dt + w x R y + R dy.
+    """
+    state, d = at.state, at.design.dimension
+    columns = at.layout.pose_columns[readings.position]
+    poses = np.where(columns >= 0, motion.shared[np.maximum(columns, 0)], 0.0)
+    rotation = state.rotations[readings.position]
+    arms = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
+    turned = (
+        np.einsum("mij,mj->mi", cross_matrices(arms), poses[:, d:])
+        if d == 3
+        else poses[:, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    )
+    own = np.einsum("mij,mj->mi", rotation, motion.balls[readings.ball])
+    return np.asarray(poses[:, :d] + turned + own)
