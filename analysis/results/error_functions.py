@@ -15,7 +15,7 @@ from ..presentation.formatting import as_data
 
 # Points of a curve.
 POINTS = 21
-# Lines of a function that are told; of more, those through the middle of the volume.
+# Lines of a function that are told; of more the last, which are inside the volume.
 MOST_LINES = 3
 
 

@@ -299,6 +299,7 @@ class Fit(FitResult):
                 self.to_dict(),
                 self.estimates,
                 not self.without_scatter,
+                self.untested,
             )
         )
 

@@ -27,9 +27,10 @@ def fit_contents(
     data: Mapping[str, Any],
     estimates: Sequence[ParameterEstimate],
     has_scatter: bool,
+    untested: str,
 ) -> FitContents:
     """The contents for a fit of an experiment with its plain `data`; without scatter residuals are
-    mere rounding, and none are drawn.
+    mere rounding, and none are drawn. `untested` says why there was no test for gross errors.
     """
     design = observed.design
     volume = design.machine.volume
@@ -53,6 +54,7 @@ def fit_contents(
         {name: one.kind for name, one in zip(labels(estimates), estimates, strict=True)},
         judged,
         reason,
+        untested or ("" if data["degrees_of_freedom"] > 0 else "there is no redundancy"),
         _residuals(observed, solution, data["sigma"], has_scatter),
         edges,
         target_in_words(experiment),

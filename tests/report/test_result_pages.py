@@ -187,6 +187,16 @@ def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:
         replace(fitted, experiment=None).page()
 
 
+def test_a_page_does_not_call_good_what_was_not_tested(fitted: bp.Fit) -> None:
+    assert 'class="verdict"' in fitted.page() and "no test of the residuals" in fitted.page()
+    untested = replace(fitted, untested="too many entries").page()
+    assert "Not tested: too many entries." in untested
+    exact = replace(fitted, degrees_of_freedom=0, sigma_is_estimated=False, sigma=1.0)
+    page = exact.page()
+    assert "no test of the residuals" not in page and "no larger than stated" not in page
+    assert 'class="verdict bad"' in page and "there is no redundancy" in page
+
+
 def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, readings = "designs/certified/two-dimensions.yaml", tmp_path / "readings.csv"
     bp.simulate(path, seed=1).to_csv(readings, index=False)

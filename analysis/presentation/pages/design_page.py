@@ -122,7 +122,7 @@ def _verdict(run: QuotedData, target: str) -> Html:
             run.number("rank_deficiency"),
             f", {expected}: the readings leave ",
             run.number("rank_deficiency"),
-            " changes of ",
+            f" {'change' if data['rank_deficiency'] == 1 else 'changes'} of ",
             counts,
             f" undetermined{weak}.",
         )

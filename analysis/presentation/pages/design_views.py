@@ -214,11 +214,10 @@ def motion_view(
         Layer("lines", "s1 thin", trails, (2,) * len(balls), times * ends),
         Layer("dots", "s1", balls, (), times * of_balls),
     ]
-    told = (
-        f". Enlarged {times:,.0f} times: the grid of corrected points with the probe"
-        f" {design.probes.names[probe]} (blue) and the balls (orange), as against where they are"
-        " drawn (grey)."
-    )
+    what = f"the grid of corrected points with the probe {design.probes.names[probe]} (blue)"
+    if len(balls):
+        what = f"{what} and the balls (orange)"
+    told = f". Enlarged {times:,.0f} times: {what}, as against where they are drawn (grey)."
     caption = joined([element("strong", kind), ": ", words, told])
     return view(layers, name, f"{kind} as a moving picture", caption)
 

@@ -55,7 +55,8 @@ class PlateResiduals:
 @dataclass(frozen=True, eq=False)
 class FitContents:
     """What a page of a fit is made of: plain data of the fit and of its design's reliability, None
-    where that was left out for the reason `unreliable`; `kinds` of the estimates by name; the
+    where that was left out for the reason `unreliable`; why residuals were not tested for gross
+    errors, empty where they were; `kinds` of the estimates by name; the
     edges (k, 2, d) of the volume; `target` in words; `files` that it comes from, and what was
     assumed.
     """
@@ -65,6 +66,7 @@ class FitContents:
     kinds: Mapping[str, str]
     reliability: Mapping[str, Any] | None
     unreliable: str
+    untested: str
     residuals: PlateResiduals
     edges: Array
     target: str
@@ -108,7 +110,9 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
             "lengths", "Uncertainties and target", joined([uncertainty_table(fit), task_table(fit)])
         ),
         PageSection("curves", "Error curves", curves_section(fit)),
-        PageSection("suspected", "Suspected gross errors", suspects_section(fit)),
+        PageSection(
+            "suspected", "Suspected gross errors", suspects_section(fit, contents.untested)
+        ),
         PageSection("residuals", "Residuals", of_residuals),
         PageSection("components", "Variance components", components_section(fit)),
         PageSection("reliability", "Reliability", reliability),
@@ -121,7 +125,13 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
 def _is_good(data: Mapping[str, Any]) -> bool:
     """Whether nothing on the page asks for a person's attention."""
     shares = [one.get("within_target") for one in data["quantities"].values()]
-    wrong = data["complaint"] or data["too_large"] or data.get("suspected") or data["warnings"]
+    wrong = (
+        data["degrees_of_freedom"] <= 0
+        or data["complaint"]
+        or data["too_large"]
+        or data.get("suspected")
+        or data["warnings"]
+    )
     missed = any(share is not None and share < 1.0 for share in shares)
     missed |= any(one["within_target"] is False for one in data.get("tasks", {}).values())
     return not wrong and not missed
@@ -138,7 +148,9 @@ def _verdict(fit: QuotedData, contents: FitContents) -> Html:
     if data["complaint"]:
         rank = fit.text("complaint")
     scatter = "the residuals are no larger than stated"
-    if data["too_large"]:
+    if data["degrees_of_freedom"] <= 0:
+        scatter = "there is no redundancy, so that residuals show nothing"
+    elif data["too_large"]:
         scatter = "the residuals are larger than the stated uncertainties explain"
     count = len(data.get("suspected", ()))
     suspects = f", and {count} cause{'s are' if count > 1 else ' is'} suspected" if count else ""

@@ -133,8 +133,10 @@ def residual_tables(fit: QuotedData) -> Html:
     return joined(parts)
 
 
-def suspects_section(fit: QuotedData) -> Html:
-    """What the residuals make suspect."""
+def suspects_section(fit: QuotedData, untested: str) -> Html:
+    """What the residuals make suspect, or why they were not tested."""
+    if untested:
+        return sentence(f"Not tested: {untested}.")
     if "suspected" not in fit:
         return sentence("None: no test of the residuals exceeds its limit.")
     items = (element("li", one.text("words")) for one in fit.at("suspected").each())

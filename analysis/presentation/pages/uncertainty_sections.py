@@ -116,7 +116,7 @@ def lengths_words(result: QuotedData, target: str) -> Html:
     told = (
         f" of the distances between corrected points are within the target {target} ({by}); u is "
     )
-    return joined([share, told, amounts, "."])
+    return joined([open_, share, told, amounts, "."])
 
 
 def scale_section(result: QuotedData) -> Html:
