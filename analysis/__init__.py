@@ -15,11 +15,13 @@ if TYPE_CHECKING:
         certificate,
         check,
         compare,
+        correct,
         experiment,
         fit,
         lengths,
         load,
         load_all,
+        load_map,
         map,
         plan,
         quickstart,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
         sheet,
         simulate,
         spline,
+        write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
     from .results.variance_components.groupings import GROUPINGS
@@ -50,11 +53,13 @@ __all__ = [
     "certificate",
     "check",
     "compare",
+    "correct",
     "experiment",
     "fit",
     "lengths",
     "load",
     "load_all",
+    "load_map",
     "map",
     "plan",
     "quickstart",
@@ -70,6 +75,7 @@ __all__ = [
     "stored",
     "sweep",
     "sweep_report",
+    "write_map",
 ]
 
 _PLACES = {

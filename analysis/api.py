@@ -59,9 +59,11 @@ if TYPE_CHECKING:
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
+    from .results.correction import Correction
     from .results.fit import Fit
     from .results.imported import ReadReport
     from .results.prediction import Prediction
+    from .simulator.maps.fitted_map import FittedMap
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -719,6 +721,97 @@ def map(
         counts = several[0], several[1], several[2]
     places = parse_places(line) if isinstance(line, str) else line
     return machine_errors(Path(machine), counts, places, error, points)
+
+
+def load_map(path: PathLike) -> FittedMap:
+    """The map of a file that a fit left behind, YAML or .npz.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = f"{folder}/map.yaml"
+    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
+    ...     load_map(path)
+    <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
+    """
+    from .simulator.experiment.map_files import read_map
+
+    ensure_path("path", path)
+    return read_map(path)
+
+
+def write_map(fitted: FittedMap, path: PathLike) -> None:
+    """Write what `to_map()` of a fit gives into a file: YAML, or arrays of NumPy where its name
+    ends in .npz. Numbers keep all their digits; a file of that name is overwritten.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = f"{folder}/map.npz"
+    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
+    ...     load_map(path).degrees_of_freedom
+    580
+    """
+    from .simulator.experiment import map_files
+    from .simulator.maps.fitted_map import FittedMap
+
+    ensure_type(FittedMap, "what to_map() of a fit gives", fitted=fitted)
+    ensure_path("path", path)
+    map_files.write_map(fitted, path)
+
+
+def correct(
+    fitted: FittedMap | PathLike,
+    points: Any,
+    probe: str | Sequence[str] | None = None,
+    lengths: Sequence[Sequence[str | int]] = (),
+    coordinates: Literal["scale readings", "ball centres"] = "scale readings",
+    coverage_factor: float | None = None,
+    with_repeatability: bool = False,
+) -> Correction:
+    """Points corrected by a map, or the file of one, with their uncertainty.
+
+    `points` are an array (n, d) in metres, or a table as `ballplate correct` reads it, with a
+    `probe` for those that name none; without any it is that of the map. They are `coordinates`
+    of the scales, or of centres of balls, which have the stated offset of the probe added.
+    `lengths` are pairs of names or of indices. The coverage factor is that of the map, or the one
+    given; `with_repeatability` the scatter of the readings that are corrected counts, too.
+
+    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> ends = [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]
+    >>> correct(fitted, ends)
+    <Correction of quickstart: 2 points; U = 2 u = 0.4325 µm at most>
+    >>> found = correct(fitted, ends, lengths=[(0, 1)])
+    >>> found.points.shape, found.blocks.shape, found.covariance().shape
+    ((2, 3), (2, 3, 3), (6, 6))
+    >>> f"{1e6 * found.lengths[0].standard_uncertainty:.3f} µm"
+    '0.080 µm'
+    """
+    import pandas
+
+    from .results.correction import correction
+    from .results.wanted_lengths import between_named
+    from .simulator.maps.fitted_map import FittedMap
+    from .simulator.readings import point_files
+
+    ensure_one_of(("scale readings", "ball centres"), coordinates=coordinates)
+    ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
+    ensure_type(bool, "True or False", with_repeatability=with_repeatability)
+    chosen = fitted if isinstance(fitted, FittedMap) else load_map(fitted)
+    names = chosen.probes.names
+    offsets = chosen.drawn_offsets if coordinates == "ball centres" else None
+    if isinstance(points, str | os.PathLike | pandas.DataFrame):
+        one = chosen.probe if probe is None else probe
+        if one not in names:
+            raise ValueError(f"no probe {one!r}; {hint(str(one), names)}")
+        table = _table("points", points)
+        given = point_files.read_points(table, names, str(one), chosen.volume, offsets)
+    else:
+        x = point_files.ensure_points(points, chosen.volume)
+        asked = chosen.probe if probe is None else probe
+        probes = point_files.probe_places(asked, names, len(x))
+        x = x if offsets is None else x - offsets[probes]
+        given = point_files.GivenPoints(x, ("",) * len(x), probes)
+    wanted = between_named(given, lengths)
+    return correction(chosen, given, wanted, coverage_factor, with_repeatability)
 
 
 def spline(

@@ -28,6 +28,7 @@ ROOMS = (
     "simulator/machines",
     "simulator/computing",
     "simulator/design",
+    "simulator/maps",
     "simulator/experiment",
     "simulator/estimation",
     "simulator/readings",

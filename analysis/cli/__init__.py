@@ -22,19 +22,9 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *(
-        "check",
-        "run",
-        "studio",
-        "plan",
-        "sheet",
-        "reach",
-        "lengths",
-        "reliability",
-        "simulate",
-        "import",
-    ),
-    *("fit", "compare", "sweep", "export", "report", "map", "spline", "reproduce", "schema"),
+    *("check", "run", "studio", "plan", "sheet", "reach", "lengths", "reliability"),
+    *("simulate", "import", "fit", "correct", "compare"),
+    *("sweep", "export", "report", "map", "spline", "reproduce", "schema"),
     "init",
 )
 

@@ -85,6 +85,32 @@ def number(text: str, unit: str = "") -> float:
         return math.nan
 
 
+def day(text: str) -> str:
+    """Argument type: a day such as 2026-11-22."""
+    from ballplate.simulator.inputs.days import stated_day
+
+    try:
+        return stated_day(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
+
+
+def map_path(text: str) -> Path:
+    """Argument type: a map file to be written, whose name says how."""
+    path = Path(text)
+    if path.suffix.lower() not in (".yaml", ".yml", ".npz"):
+        raise ArgumentTypeError(f'the name of a map ends in .yaml or .npz, unlike "{text}"')
+    return path
+
+
+def coverage_factor(text: str) -> float:
+    """Argument type: a coverage factor."""
+    value = number(text)
+    if not 0.0 < value <= 100.0:
+        raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
+    return value
+
+
 def percentage(text: str) -> float:
     """Read a percentage above zero from the command line, as a ratio."""
     value = number(text, "%")

@@ -14,9 +14,9 @@ from ..estimators.estimator_choice import (
     takers,
 )
 from ..results.variance_components.groupings import GROUPINGS
-from .common import add_file, add_json, add_page, add_picture
+from .common import add_file, add_json, add_page, add_picture, day, map_path
 from .compare import add_pairs
-from .outputs import UsageError, Writer, add_force, write
+from .outputs import UsageError, Writer, add_force, add_output, write
 from .table_options import add_tables
 from .telling import complain, note, warn
 
@@ -71,6 +71,20 @@ def add_options(parser: ArgumentParser) -> None:
         help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
     )
     add_page(parser, "write the fit as a page of HTML that needs no other file and no network")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="MAP",
+        type=map_path,
+        help="write the map of the machine, with its covariance (.yaml, or .npz)",
+    )
+    parser.add_argument(
+        "--date",
+        type=day,
+        metavar="DAY",
+        help="with -o: day of the campaign, such as 2026-11-22, which the map is to state",
+    )
     add_force(parser)
     add_json(parser)
 
@@ -124,9 +138,12 @@ def _add_components(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.experiment.map_files import write_map
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
+    from ..results.correction import left_out_words
+    from ..results.fit import Fit
     from .common import show, single
     from .table_options import named_sources, with_options
 
@@ -160,6 +177,10 @@ def run(options: Namespace) -> int:
         writers[options.plot] = result.plot
     if options.report:
         writers[options.report] = result.report
+    if options.output and isinstance(result, Fit) and result.converged:
+        fitted = result.to_map(options.date)
+        writers[options.output] = lambda path: write_map(fitted, path)
+        warn([left_out_words(fitted)] if fitted.left_out else [])
     if writers:
         write(options, writers)
     show(options, result)
@@ -192,6 +213,10 @@ def _refuse_misused(options: Namespace) -> None:
             raise UsageError(
                 f"the experiment file comes first, then the readings: fit {second} {first}"
             )
+    if options.output and options.estimator != "full":
+        raise UsageError("-o writes the map of the full estimator; leave it out")
+    if options.date and not options.output:
+        raise UsageError("--date goes with -o; leave it out")
     if options.plot and options.estimator not in DRAWN:
         raise UsageError("--plot draws residuals by the full estimator or reversal; leave it out")
     if options.report and options.estimator != "full":

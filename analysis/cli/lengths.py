@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from . import common
-from .common import add_file, add_json, add_picture, number, show, single
+from .common import add_file, add_json, add_picture, coverage_factor, show, single
 from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 
 # Lines of a table of all lengths.
@@ -49,7 +49,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--coverage-factor",
         metavar="K",
-        type=_factor,
+        type=coverage_factor,
         help="coverage factor of the expanded uncertainty; default: that of the file, or 2",
     )
     parser.add_argument(
@@ -76,13 +76,6 @@ def _grid(text: str) -> tuple[int, ...]:
             f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
         )
     return counts
-
-
-def _factor(text: str) -> float:
-    value = number(text)
-    if not 0.0 < value <= 100.0:
-        raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
-    return value
 
 
 def run(options: Namespace) -> int:

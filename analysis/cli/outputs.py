@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 EXISTS = "exists already; name a new file, or overwrite it with --force"
 FORCE = "overwrite existing files"
 
-# Options that name files which name others, as experiment and machine files do.
-NAMING = ("files", "file", "earlier")
+# Options that name files which name others, as experiment, machine and map files do.
+NAMING = ("files", "file", "earlier", "map", "tasks")
 
 # Names of files that a process has open; the group is the number of one of this process.
 OPEN_FILE = re.compile(

@@ -1,4 +1,4 @@
-"""`ballplate schema`: the JSON Schema of experiment, sweep and machine files."""
+"""`ballplate schema`: the JSON Schema of experiment, sweep, machine and map files."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import json
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-HELP = "print the JSON Schema of experiment, sweep or machine files"
+HELP = "print the JSON Schema of experiment, sweep, machine or map files"
 DESCRIPTION = (
-    "Print the JSON Schema of experiment files, or of sweep or machine files, for editors"
+    "Print the JSON Schema of experiment files, or of sweep, machine or map files, for editors"
     " that complete and check as you type."
 )
 
@@ -44,4 +44,10 @@ def _machine() -> dict[str, Any]:
     return machine_schema()
 
 
-SCHEMAS = {"experiment": _experiment, "sweep": _sweep, "machine": _machine}
+def _map() -> dict[str, Any]:
+    from ballplate.simulator.experiment.map_sections import map_schema
+
+    return map_schema()
+
+
+SCHEMAS = {"experiment": _experiment, "sweep": _sweep, "machine": _machine, "map": _map}

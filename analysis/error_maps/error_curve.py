@@ -186,7 +186,7 @@ def _misplaced(
     ]
     problems += [
         SplineProblem(
-            "the boundary at {0} is not between the ends of the curve, {1} and {2}",
+            "the boundary at {0} is not between the ends of the curve, {1} and {2}; give one there",
             (place, lower, upper),
         )
         for place in boundaries

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,12 +11,11 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_type
-from ballplate.simulator.inputs.settings import hint, shorten
+from ballplate.simulator.inputs.arguments import ensure_one_of
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.reading_files import far_outside
+from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
 from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
@@ -41,6 +40,7 @@ from .estimates import (
     labels,
 )
 from .fit_contents import fit_contents
+from .map_of_fit import map_of
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -61,6 +61,8 @@ from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
     from .variance_components.components import VarianceComponents
@@ -72,9 +74,6 @@ REWEIGHTED = (
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
-
-# An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
-LEAST_SIGMA = 1e-6
 
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3
@@ -92,8 +91,8 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated. `experiment` is what was fitted, and is what a page of the fit
-    names its assumptions from.
+    estimates had been stated. `experiment` is that which was fitted, from which a page of the fit
+    names its assumptions.
     """
 
     label: str
@@ -370,31 +369,23 @@ class Fit(FitResult):
         >>> fit.correct([[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], "down").covariance.shape
         (6, 6)
         """
-        design = self.design
-        try:
-            given = np.asarray(points, float)
-        except (TypeError, ValueError):
-            words = f"numbers in metres, {design.dimension} for each point"
-            raise ValueError(f"points={shorten(repr(points))}; give {words}") from None
-        if given.ndim != 2 or given.shape[1] != design.dimension:
-            raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
-        for i, axis in np.argwhere(far_outside(given, design)).tolist():
-            told = (
-                f"{AXIS_NAMES[axis]} = {given[i, axis]:.6g} m of points[{i}] is far outside the"
-                " volume"
-            )
-            raise ValueError(f"{told}; give points in metres")
-        names = design.probes.names
-        given_probe = names[design.evaluation.probe] if probe is None else probe
-        ensure_type(Iterable, "the name of a probe, or one for each point", probe=given_probe)
-        asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
-        for name in asked:
-            if name not in names:
-                raise ValueError(f'no probe "{name}"; {hint(name, names)}')
-        if len(asked) not in (1, len(given)):
-            raise ValueError(f"{len(asked)} probes for {len(given)} points")
-        probes = np.broadcast_to([names.index(name) for name in asked], len(given))
+        design, names = self.design, self.design.probes.names
+        given = ensure_points(points, design.machine.volume)
+        asked = names[design.evaluation.probe] if probe is None else probe
+        probes = probe_places(asked, names, len(given))
         return correct(self.functions.at, given, probes, self.sigma)
+
+    def to_map(self, date: str | None = None) -> FittedMap:
+        """What the fit found of the machine, with its covariance, to be kept in a file and used;
+        `date` is the day of the campaign, such as "2026-11-22".
+
+        :raises ValueError: the estimate has not converged, or the date is no day.
+
+        >>> import ballplate as bp
+        >>> bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
+        <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
+        """
+        return map_of(self, date)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
         """Residuals of a fit that has converged, for each position; in three dimensions as they are

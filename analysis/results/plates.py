@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.estimation.covariance import MICROMETRE, blank
+from ballplate.simulator.computing.rounding import blank
+from ballplate.simulator.estimation.covariance import MICROMETRE
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes, plate_axes

@@ -31,7 +31,8 @@ METHODS = {
 }
 METHOD = max(METHODS)
 
-# What says nothing about the result: names, and where things stand.
+# What says nothing about the result: names, and where things stand; and what was made of a file
+# whose content counts.
 LEFT_OUT = (
     "title",
     "description",
@@ -43,6 +44,7 @@ LEFT_OUT = (
     "tree",
     "builder",
     "_folder",
+    "_found",
 )
 # The same, of single classes: how the laboratory's tables are read; and functions in Python, which
 # the text of their module and their options tell.
@@ -58,6 +60,7 @@ LATER_KEYS = {
     "ArtefactSettings": ("reads", "flatness"),
     "DistanceCalibration": ("root",),
     "CoordinateCalibration": ("root",),
+    "Prior": ("by_offset",),
     "KinematicSettings": ("functions", "squareness"),
     "EmpiricalSettings": ("rotation_functions",),
     "RadialSettings": ("function",),

@@ -18,6 +18,7 @@ from ballplate.reproduction.published import npl
 from ballplate.reproduction.reproduction_tables import reproduction_markdown
 from ballplate.reproduction.shipped import Shipped
 from ballplate.simulator.experiment.machine_sections import machine_schema
+from ballplate.simulator.experiment.map_sections import map_schema
 from ballplate.simulator.experiment.schema import schema
 from ballplate.simulator.inputs.quantities import (
     UNITS,
@@ -69,6 +70,14 @@ def sweep_format() -> str:
 def machine_format() -> str:
     """The keys of a machine file, section by section, as Markdown."""
     return _keys(machine_schema())
+
+
+def map_format() -> str:
+    """The keys of a map file, less those of error models, as Markdown."""
+    whole = map_schema()
+    told = whole["properties"]["error_model"]["description"]
+    whole["properties"]["error_model"] = {"type": "object", "description": told}
+    return _keys(whole)
 
 
 def reproduction() -> str:
@@ -204,7 +213,8 @@ def _range(part: Schema) -> str:
 
 def _anchor(name: str, whole: Schema) -> str:
     # Several kinds of files have sections of the same name.
-    prefix = "machine-file" if whole["title"] == "ballplate machine" else "file-format"
+    prefixes = {"ballplate machine": "machine-file", "ballplate map": "map-file"}
+    prefix = prefixes.get(whole["title"], "file-format")
     return f"{prefix}-{name.lower()}"
 
 
@@ -248,6 +258,7 @@ PARTS = {
     "<!-- file format -->": file_format,
     "<!-- sweep format -->": sweep_format,
     "<!-- machine format -->": machine_format,
+    "<!-- map format -->": map_format,
     "<!-- units -->": units,
     "<!-- commands -->": commands,
     "<!-- reproduction -->": reproduction,

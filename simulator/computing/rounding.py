@@ -18,6 +18,10 @@ DIGITS = 20
 # Numbers below this fraction of the largest beside them are zero but for rounding.
 NOTHING = 1e-12
 
+# A function counts as undetermined when a null direction changes it by this fraction of what any
+# direction could.
+TOUCHED = 1e-7
+
 
 def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None) -> Array:
     """Numbers (...) to `digits` binary digits, and 0 for what is nothing beside the largest, of all
@@ -70,3 +74,13 @@ def printable(value: float, digits: int = 9) -> float:
     ('0.187', '0.188')
     """
     return float(f"{value:.{digits}g}")
+
+
+def blank(values: Array, change: Array, size: Array) -> Array:
+    """`values` with NaN where a null direction's `change` (..., deficiency) is no mere rounding of
+    `size`.
+    """
+    if change.shape[-1] == 0:
+        return values
+    open_ = np.sqrt((change**2).sum(axis=-1)) > TOUCHED * np.maximum(size, np.finfo(float).tiny)
+    return np.where(open_, np.nan, values)

@@ -43,6 +43,13 @@ class Volume:
         slightly = SLIGHTLY * self.size
         return self.lower - slightly, self.upper + slightly
 
+    def far_outside(self, x: Array) -> Flags:
+        """Which co-ordinates (n, d) lie outside by more than its own size: they are in another
+        unit.
+        """
+        size = float(self.size.max())
+        return np.asarray((x < self.lower - size) | (x > self.upper + size))
+
 
 @dataclass(frozen=True, eq=False)
 class Machine:

@@ -237,9 +237,10 @@ def _all_rows(
     of_model = np.flatnonzero(priors.of_model)
     if len(of_model):
         weight, of_parameters = 1.0 / priors.uncertainty[of_model], priors.by_model[of_model]
+        stated = priors.value - priors.of_offsets(design.probes.offsets)
         found.append(
             (
-                weight * (of_parameters @ a - priors.value[of_model]),
+                weight * (of_parameters @ a - stated[of_model]),
                 weight[:, None] * of_parameters,
             ),
         )

@@ -27,10 +27,6 @@ EXACT = 1e-10
 # The size of change that a singular value is quoted for.
 MICROMETRE = 1e-6
 
-# A function counts as undetermined when a null direction changes it by this fraction of what any
-# direction could.
-TOUCHED = 1e-7
-
 
 @dataclass(frozen=True)
 class Spectrum:
@@ -184,16 +180,6 @@ class BallCovariance:
     common: Array
     own: Array
     null: Array
-
-
-def blank(values: Array, change: Array, size: Array) -> Array:
-    """`values` with NaN where a null direction's `change` (..., deficiency) is no mere rounding of
-    `size`.
-    """
-    if change.shape[-1] == 0:
-        return values
-    open_ = np.sqrt((change**2).sum(axis=-1)) > TOUCHED * np.maximum(size, np.finfo(float).tiny)
-    return np.where(open_, np.nan, values)
 
 
 @single_threaded

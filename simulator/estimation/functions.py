@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..computing.rounding import blank
 from ..design.arrays import Design, State
 from ..design.parameters import SharedLayout
 from ..geometry.motions import AXIS_NAMES
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, Integers, Unit
 from .corrections import corrected_points, correction_rows
-from .covariance import MICROMETRE, blank
+from .covariance import MICROMETRE
 from .linearisation import LinearFunctions, Linearisation
 
 # Places whose derivatives by all shared parameters are formed at once.

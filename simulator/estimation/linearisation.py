@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.rounding import blank
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, State, nominal_state
 from ..design.parameters import SharedLayout, shared_layout
 from ..machines.protocol import Array
-from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, blank, spectrum
+from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, spectrum
 from .elimination import Factor, eliminate
 
 

@@ -32,12 +32,18 @@ from ..machines.settings import (
     build_error_model,
     kind_of,
 )
-from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
+from ..machines.true_machine_settings import (
+    CurvesSettings,
+    RandomSettings,
+    TrueMachineFileSettings,
+    TrueMapSettings,
+)
 from ..machines.truth import TruthError, true_machine
 from .curve_files import read_curves
 from .machine_file import load_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
+from .used_maps import read_true_map
 
 TOLERANCE = 1e-9
 
@@ -160,6 +166,9 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         return
     if isinstance(truth, TrueMachineFileSettings):
         _true_machine_of_file(truth, machine, references)
+        return
+    if isinstance(truth, TrueMapSettings):
+        read_true_map(truth, machine, references)
         return
     problems = references.problems
     if isinstance(truth, RandomSettings) and truth.position is None and truth.rotation is None:

@@ -15,10 +15,11 @@ from ..design.arrays import (
     nominal_state,
 )
 from ..design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
-from ..design.influences.protocol import DesignParts, InfluenceSettings
+from ..design.influences.protocol import DesignParts, InfluenceParameter, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
 from ..inputs.messages import ExperimentError
+from ..machines.protocol import Integers
 from .checks import MOST_SHARED
 from .model import Experiment, Position
 from .structure import Sections
@@ -99,19 +100,25 @@ def with_influences(design: Design, experiment: Experiment) -> Design:
         )
         raise ExperimentError([experiment.message(("influences",), text)])
     known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
-    priors, none = design.of(Priors), np.full(len(known), -1)
     stated = [parameters[k] for k in known]
-    return disturbed.observed(
-        Priors(
-            (*priors.names, *(one.name for one in stated)),
-            np.append(priors.position, none),
-            np.append(priors.probe, none),
-            np.append(priors.component, none),
-            np.concatenate([priors.by_model, np.zeros((len(known), priors.by_model.shape[1]))]),
-            np.append(priors.value, [one.value for one in stated]),
-            np.append(priors.uncertainty, [one.uncertainty for one in stated]),
-            np.append(np.full(len(priors), -1), known),
-        )
+    return disturbed.observed(_with_stated(design.of(Priors), known, stated))
+
+
+def _with_stated(priors: Priors, known: Integers, stated: list[InfluenceParameter]) -> Priors:
+    """Priors, and what is stated of the parameters `known` of influence quantities."""
+    none = np.full(len(known), -1)
+    offsets = priors.by_offset
+    return Priors(
+        (*priors.names, *(one.name for one in stated)),
+        np.append(priors.position, none),
+        np.append(priors.probe, none),
+        np.append(priors.component, none),
+        np.concatenate([priors.by_model, np.zeros((len(known), priors.by_model.shape[1]))]),
+        np.append(priors.value, [one.value for one in stated]),
+        np.append(priors.uncertainty, [one.uncertainty for one in stated]),
+        np.append(np.full(len(priors), -1), known),
+        None if offsets is None else np.pad(offsets, ((0, len(known)), (0, 0), (0, 0))),
+        priors.units,
     )
 
 

@@ -164,7 +164,12 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     for probe, axis, value, u in experiment.certified_offsets:
         label = f"probe {probe.name}: offset {'xyz'[axis]}"
         given.append(Prior(label, None, probe.name, axis, np.zeros(parameters), value, u, nowhere))
-    probes = list(experiment.probes)
+    probes, by_offset = list(experiment.probes), None
+    if any(prior.by_offset for prior in given):
+        by_offset = np.zeros((len(given), len(probes), experiment.dimension))
+        for k, prior in enumerate(given):
+            for name, coefficients in (prior.by_offset or {}).items():
+                by_offset[k, probes.index(name)] = coefficients
     return Priors(
         tuple(prior.name for prior in given),
         np.array([-1 if p.position is None else places.index(p.position) for p in given], np.int64),
@@ -173,6 +178,8 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
         np.array([p.by_model for p in given], float).reshape(len(given), parameters),
         np.array([p.value for p in given], float),
         np.array([p.standard_uncertainty for p in given], float),
+        by_offset=by_offset,
+        units=tuple(p.unit for p in given),
     )
 
 

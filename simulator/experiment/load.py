@@ -69,7 +69,9 @@ def load(
     trees = variant_trees(root, base_problems)
     if not with_modules:
         forbidden = {
-            message for tree in (root, *trees.values()) for message in refused_modules(tree)
+            message
+            for tree in (root, *trees.values())
+            for message in refused_modules(tree, source.parent)
         }
         if forbidden:
             raise ExperimentError(sorted(forbidden))
@@ -208,7 +210,7 @@ def _build(
     check_radii(calibrations, problems)
     check_exact_values(calibrations, references)
     pool = resolve_pool(sections, candidates, calibrations, references)
-    priors = resolve_priors(sections, machine, named, references)
+    priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)
     check_size(sections, machine, positions, calibrations, probes, references)
     noise = resolve_noise(sections.get("noise"), problems)

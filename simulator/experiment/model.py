@@ -113,7 +113,8 @@ class Prior:
 
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation.
     ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
-    the error model's parameters. ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
+    the error model's parameters, and with ``by_offset`` of offsets (d,) of probes by their names.
+    ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
     """
 
     name: str
@@ -126,6 +127,7 @@ class Prior:
     mark: Mark
     path: str = ""
     unit: Unit = "m"
+    by_offset: Mapping[str, Floats] | None = None
 
 
 @dataclass(frozen=True, eq=False)

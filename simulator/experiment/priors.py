@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..design.lookup import Floats, References
@@ -15,9 +17,10 @@ from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, kind_of
-from .model import Position, Prior
-from .sections import PriorSettings
+from .model import Position, Prior, Probe
+from .sections import MapPriorSettings, PriorSettings
 from .structure import Sections
+from .used_maps import resolve_map_prior
 
 MOST_PRIORS = 5000
 PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
@@ -27,6 +30,7 @@ def resolve_priors(
     sections: Sections,
     machine: Machine | None,
     positions: dict[int, Position],
+    probes: Mapping[str, Probe],
     references: References,
 ) -> tuple[Prior, ...]:
     """Return the priors; what is wrong goes to the problems."""
@@ -43,7 +47,11 @@ def resolve_priors(
     known = _known(model, positions, references)
     found: list[Prior] = []
     for i, entry in entries.items():
-        found += _prior(entry, ("priors", int(i)), known, references)
+        steps: Steps = ("priors", int(i))
+        if isinstance(entry, MapPriorSettings):
+            found += resolve_map_prior(entry, steps, model, machine, references, probes)
+        else:
+            found += _prior(entry, steps, known, references)
         if len(found) > MOST_PRIORS:
             text = (
                 f"there are {len(found)} priors up to here, coefficients counted; at most"

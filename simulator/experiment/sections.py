@@ -4,16 +4,17 @@ elsewhere.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, StringConstraints
+from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
 from ..design.influences.kinds import AnyInfluence
 from ..design.noise import Distribution, NoiseSettings
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
-from ..inputs.quantities import Length, LengthFunction
+from ..inputs.days import Day
+from ..inputs.quantities import Length, LengthFunction, PositiveLength
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
@@ -66,6 +67,55 @@ class PriorSettings(Settings):
         description="value with unit; default 0, of a position's origin the nominal co-ordinate",
     )
     standard_uncertainty: Text = Field(description="standard uncertainty of the value, with unit")
+
+
+class MapPriorSettings(Settings):
+    """What the map of an earlier campaign tells of the machine."""
+
+    kind: Literal["map"] = Field(description="the map of an earlier campaign")
+    file: Text = Field(description="map file, as ballplate fit -o writes it")
+    inflation: Annotated[float, Field(ge=1, le=1e6)] = Field(
+        1.0, description="factor of the map's standard uncertainties; default 1"
+    )
+    drift_per_year: PositiveLength | None = Field(
+        None,
+        description=(
+            "standard uncertainty by which each parameter's effect may have changed in a year, such"
+            " as 0.5 um"
+        ),
+    )
+    years: Annotated[float, Field(ge=0, le=1000)] | None = Field(
+        None, description="years since the campaign of the map"
+    )
+    date: Day | None = Field(
+        None, description="day of this campaign, such as 2027-05-22, in place of years"
+    )
+    offsets: bool = Field(
+        False,
+        description=(
+            "whether the map's estimates of probe offsets count as well, of probes by the same"
+            " names that are estimated here and have not been changed; default: false"
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _one_age(self) -> Self:
+        if self.years is not None and self.date is not None:
+            raise ValueError("gives the age twice; give either years or date")
+        if self.drift_per_year is None and (self.years, self.date) != (None, None):
+            raise ValueError("an age needs a drift; add drift_per_year: 0.5 um, or leave it out")
+        return self
+
+
+def _form_of_prior(value: Any) -> str:
+    said = value if isinstance(value, dict) else {}
+    return "<map>" if {"kind", "file"} & said.keys() else "<parameter>"
+
+
+AnyPrior = Annotated[
+    Annotated[PriorSettings, Tag("<parameter>")] | Annotated[MapPriorSettings, Tag("<map>")],
+    Discriminator(_form_of_prior),
+]
 
 
 class PointsSettings(Settings):
@@ -163,8 +213,8 @@ class ExperimentSettings(Settings):
     pool: PoolSettings | None = Field(
         None, description="candidates from which ballplate plan chooses positions and calibration"
     )
-    priors: NonEmpty[PriorSettings] | None = Field(
-        None, description="prior knowledge of machine errors and poses"
+    priors: NonEmpty[AnyPrior] | None = Field(
+        None, description="prior knowledge of machine errors and poses, or a map of the machine"
     )
     readings: ReadingsSettings | None = Field(
         None, description="the laboratory's readings: where they are and how they are written"

@@ -21,7 +21,7 @@ from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import PositionSettings
 from .probe_sections import AnyProbe, StarSettings
-from .sections import ExperimentSettings, PriorSettings
+from .sections import AnyPrior, ExperimentSettings
 from .variants import ALIASES
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
@@ -30,7 +30,7 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
     "artefacts": (Mapping, AnyArtefactSettings),
     "positions": (Sequence, PositionSettings),
     "calibration": (Sequence, CalibrationSettings),
-    "priors": (Sequence, PriorSettings),
+    "priors": (Sequence, AnyPrior),
     "stars": (Sequence, StarSettings),
     "influences": (Sequence, AnyInfluence),
 }

@@ -139,7 +139,39 @@ class TrueMachineFileSettings(Settings):
         return TrueMachine(PlaneModel(found.model, level), found.a)
 
 
+class TrueMapSettings(Settings):
+    """The machine that a map of a fit describes."""
+
+    kind: Literal["map"] = Field(description="the machine that a fit has found")
+    file: str = Field(description="Map file, as ballplate fit -o writes it.")
+    draw: Annotated[int, Field(ge=0)] | None = Field(
+        default=None,
+        description=(
+            "Seed with which the machine is drawn about the estimates, within their covariance;"
+            " default: the estimates themselves."
+        ),
+    )
+
+    # What the file says; filled in when the experiment is loaded.
+    _found: TrueMachine | None = PrivateAttr(default=None)
+    _content: str = PrivateAttr(default="")
+
+    def of(self, machine: TrueMachine, content: str) -> None:
+        """Take the machine of a file, and the SHA-256 of what is in that."""
+        self._found, self._content = machine, content
+
+    def machine(self) -> TrueMachine:
+        """The errors that were found, or drawn."""
+        assert self._found is not None
+        return self._found
+
+
 TrueMachineSettings = Annotated[
-    ZeroSettings | CoefficientSettings | RandomSettings | CurvesSettings | TrueMachineFileSettings,
+    ZeroSettings
+    | CoefficientSettings
+    | RandomSettings
+    | CurvesSettings
+    | TrueMachineFileSettings
+    | TrueMapSettings,
     Field(discriminator="kind"),
 ]

@@ -20,6 +20,7 @@ from .true_machine_settings import (
     CurvesSettings,
     RandomSettings,
     TrueMachineFileSettings,
+    TrueMapSettings,
     ZeroSettings,
 )
 
@@ -58,6 +59,9 @@ def true_machine(
         return TrueMachine(curves, np.ones(len(curves.parameters)))
     if isinstance(settings, TrueMachineFileSettings):
         return in_frame_of(fitted, settings.machine(len(lower)), lower, upper)
+    if isinstance(settings, TrueMapSettings):
+        machine = settings.machine()
+        return machine if machine.model == fitted else in_frame_of(fitted, machine, lower, upper)
     other = getattr(settings, "error_model", None)
     model = fitted if other is None else build_error_model(other, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))

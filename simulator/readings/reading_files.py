@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design.arrays import Design, Readings, in_sequence, measured, nominal_state
 from ..design.observations.readings import expected_readings
@@ -84,7 +83,7 @@ def read_readings(
     empty = AXES[:d] if design.positions.across is not None else ()
 
     def is_possible(x: Array) -> bool:
-        return settings.coordinates == "part" or not far_outside(x, design).any()
+        return settings.coordinates == "part" or not design.machine.volume.far_outside(x).any()
 
     found = source_rows(sources, design, settings, messages, is_possible, units, empty)
     rows = found.rows
@@ -195,19 +194,10 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
     return np.array(index, np.int64).reshape(-1, 3), messages
 
 
-def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
-    """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in
-    another unit.
-    """
-    volume = design.machine.volume
-    size = float(volume.size.max())
-    return np.asarray((x < volume.lower - size) | (x > volume.upper + size))
-
-
 def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> None:
     """Refuse readings far outside the volume: their unit is not what it says."""
     messages: list[Message] = []
-    for i, axis in np.argwhere(far_outside(x, design)).tolist():
+    for i, axis in np.argwhere(design.machine.volume.far_outside(x)).tolist():
         if len(messages) >= MOST_MESSAGES:
             messages.append(rows[i].mark.message("", MORE_ERRORS))
             break

@@ -386,6 +386,7 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         ("experiment", "schema.json"),
         ("sweep", "sweep-schema.json"),
         ("machine", "machine-schema.json"),
+        ("map", "map-schema.json"),
     ],
 )
 def test_schema_is_the_shipped_one(

@@ -80,8 +80,18 @@ WALK = {
     ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
-        {"--plot": "fit.svg", "--report": "fit.html"},
+        {"--plot": "fit.svg", "--report": "fit.html", "-o": "fit.npz"},
         also=("balls.csv",),
+    ),
+    "correct": Walk(
+        {
+            "MAP": "map.yaml",
+            "POINTS": "corners.csv",
+            "--lengths": "pairs.csv",
+            "--tasks": "design.yaml",
+        },
+        {"-o": "o.csv", "--covariance": "v.csv"},
+        ("--probe", "probe"),
     ),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
@@ -127,7 +137,7 @@ WALK = {
 }
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
-LEFT_OUT = ("--from", "--done", "--store", "--folder", "--results", "--designs")
+LEFT_OUT = ("--from", "--done", "--store", "--folder", "--results", "--designs", "--tasks")
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +179,10 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(certificate),
     ]
     assert main(arguments) == 0
+    (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
+    (folder / "pairs.csv").write_text("first,second\nA,B\n", encoding="utf-8")
+    fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
+    assert main(fit) == 0
     return folder
 
 

@@ -16,6 +16,7 @@ from ballplate.gross_errors import leftover
 from ballplate.montecarlo import trials
 from ballplate.planning import criteria, information
 from ballplate.planning.requirements import root_search as search
+from ballplate.results import correction
 from ballplate.results.variance_components import components
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values
@@ -78,6 +79,7 @@ LIMITS = {
     "`reach`": (search.MOST_POINTS,),
     "`lengths` |": (lengths.MOST_POINTS,),
     "`lengths --pairs`": (lengths_command.MOST_PAIRS,),
+    "`correct --covariance`": (correction.MOST_CO_ORDINATES,),
     "`map`": (volumetric.MOST_POINTS,),
     "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, curve_options.MOST_ORDER),
 }

@@ -16,7 +16,6 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.any_table import TableRows
-from ballplate.simulator.readings.reading_files import far_outside
 from ballplate.simulator.readings.reading_sources import read_source
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -53,7 +52,7 @@ def read(
     wrong: list[object] = []
 
     def is_possible(x: np.ndarray) -> bool:
-        return not far_outside(x, design).any()
+        return not design.machine.volume.far_outside(x).any()
 
     found = read_source(source, names, stated, wrong, is_possible, 3, {})  # type: ignore[arg-type]
     if wrong:

@@ -233,7 +233,7 @@ def test_what_is_printed_twice_is_taken_once_and_measured_twice_twice(tmp_path: 
         ("UNITS/PARSEC", 'report:3:1: unknown unit "PARSEC"; DMIS has MM, CM, M, INCH, FEET'),
         ("GA(A)=FEAT/SPHERE,OUTER,CART,1,2,3,4", 'report:3:1: "GA(A)=FEAT" is no feature of DMIS; write F(name)=FEAT/… or FA(name)=FEAT/…'),
         ("FA(A)=FEAT/SPHERE,OUTER,CART,1,2,3,4$", 'report:3:1: "4ENDFIL" is not a number; write for example "500.0003"'),
-        ("FA(A=FEAT/SPHERE,OUTER,CART,1,2,3,4", 'report:3:1: "FA(A=FEAT/SPHERE,OUTER,CART,1,2,3,4" is no DMIS statement'),
+        ("FA(A=FEAT/SPHERE,OUTER,CART,1,2,3,4", 'report:3:1: "FA(A=FEAT/SPHERE,OUTER,CART,1,2,3,4" is no DMIS statement; check whether the file is complete'),
     ],
 )  # fmt: skip
 def test_wrong_statements_of_dmis_are_told_with_their_lines(

@@ -178,6 +178,13 @@ def _make_readings(folder: Path) -> None:
         folder, "plan", "pool.yaml", "--positions", "2", "--workers", "1", "-o", "planned.yaml"
     )
     _ballplate(folder, "simulate", "planned.yaml", "-o", "planned-readings.csv")
+    for name in ("map.yaml", "map.npz"):
+        _ballplate(
+            folder, "fit", "small.yaml", "small-readings.csv", "-o", name, "--date", "2026-11-22"
+        )
+    points = "name,probe,x_mm,y_mm,z_mm\nA,down,50,200,100\nB,right,450,200,100\n"
+    (folder / "to-correct.csv").write_text(points, encoding="utf-8")
+    (folder / "lengths.csv").write_text("first,second\nA,B\n", encoding="utf-8")
 
 
 def _make_stores(folder: Path) -> None:

@@ -55,6 +55,10 @@ RECIPES = (
         " --no-offsets"
     ),
     "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
+    "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
+    "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
+    "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
+    "correct map.yaml small-readings.csv --probe right --with-repeatability",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"

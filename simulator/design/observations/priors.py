@@ -21,8 +21,9 @@ class Priors(Observations):
     Each row is about a pose parameter (`position` and `component`, by place among origin and
     rotation), about a probe offset (`probe` and `component`), about a parameter of an influence
     quantity (`influence`, None where there are none), or about a linear function of the model's
-    parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
-    stated as co-ordinates, pose angles as deviations from the nominal pose.
+    parameters, `by_model` (m, n), and of probe offsets, `by_offset` (m, l, d), None where there are
+    no such; indices that do not apply are -1. `units` are those of the first, where they are told.
+    Origins and offsets are stated as co-ordinates, pose angles as deviations from the nominal pose.
     """
 
     word: ClassVar[str] = "prior"
@@ -36,6 +37,8 @@ class Priors(Observations):
     value: Array
     uncertainty: Array
     influence: Integers | None = None
+    by_offset: Array | None = None
+    units: tuple[Unit, ...] = ()
 
     @property
     def of_influence(self) -> Integers:
@@ -77,6 +80,8 @@ class Priors(Observations):
         return f"prior of {self.names[k]}"
 
     def unit(self, design: Design, k: int) -> Unit:
+        if k < len(self.units):
+            return self.units[k]
         if self.position[k] >= 0:
             return "rad" if self.component[k] >= design.dimension else "m"
         if self.probe[k] >= 0:
@@ -92,11 +97,18 @@ class Priors(Observations):
         axis = np.minimum(self.component, design.dimension - 1)
         of_probes = state.probes[self.probe, axis]
         of_model = self.by_model @ state.a if len(self) else np.zeros(0)
+        of_model = of_model + self.of_offsets(state.probes)
         if self.influence is not None and len(state.influences):
             of_model = np.where(self.influence >= 0, state.influences[self.influence], of_model)
         return np.where(
             self.position >= 0, of_poses, np.where(self.probe >= 0, of_probes, of_model)
         )
+
+    def of_offsets(self, offsets: Array) -> Array:
+        """What probe offsets (l, d) contribute to what each (m,) is about, beside the model."""
+        if self.by_offset is None:
+            return np.zeros(len(self))
+        return np.asarray(np.einsum("mld,ld->m", self.by_offset, offsets))
 
     def _derivative(self, design: Design, state: State) -> Array:
         """Derivative (m, s) of the values by the shared parameters."""
@@ -105,6 +117,9 @@ class Priors(Observations):
         if not len(self):
             return derivative
         derivative[:, layout.model] = self.by_model
+        if self.by_offset is not None:
+            free = layout.offset_columns >= 0
+            derivative[:, layout.offset_columns[free]] = self.by_offset[:, free]
         rows = np.flatnonzero(self.probe >= 0)
         derivative[rows, layout.offset_columns[self.probe[rows], self.component[rows]]] = 1.0
         rows = np.flatnonzero(self.of_influence >= 0)

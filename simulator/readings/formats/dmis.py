@@ -88,7 +88,8 @@ def statements(text: Text, problems: ReportProblems) -> Iterator[Statement]:
             last = text.is_cut and number == len(text.lines)
             yield Statement(text.mark(start), kind.upper(), name, word.upper(), rest, last)
         elif re.match(r"\s*FA?\s*\(", joined, re.IGNORECASE):
-            problems.add(text.mark(start), f'"{shorten(joined)}" is no DMIS statement')
+            told = f'"{shorten(joined)}" is no DMIS statement; check whether the file is complete'
+            problems.add(text.mark(start), told)
         joined = ""
     if joined:
         told = "the file ends within a statement; it was cut off, take a whole copy"

@@ -1,0 +1,166 @@
+"""The map that a fit leaves behind."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.influences.temperature import (
+    ARTEFACT_COLUMN,
+    AXIS_COLUMNS,
+    SCALES_COLUMN,
+    TemperaturesSettings,
+)
+from ballplate.simulator.design.objects import Probes
+from ballplate.simulator.experiment.model_files import absolute
+from ballplate.simulator.inputs.days import parse_day
+from ballplate.simulator.inputs.yamltree import to_python, written
+from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+
+from .estimates import ParameterEstimate
+
+if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
+
+    from .estimates import EstimatedFunctions
+
+# What expanded uncertainties have where the experiment does not say.
+COVERAGE_FACTOR = 2.0
+
+_AXES_FIXED = (
+    "errors are zero at the lower corner of the volume, and straightnesses EYX, EZX and EZY at the"
+    " other end of their axis too"
+)
+FRAMES = {
+    "kinematic": _AXES_FIXED,
+    "machine": _AXES_FIXED,
+    "empirical": (
+        "six displacements and three rotations of the probe are zero at corners of the volume"
+    ),
+    "metric": "the x axis is that of the machine, and the y axis lies in its plane of x and y",
+    "python": "that of the model itself",
+}
+
+
+class MappedFit(Protocol):
+    """What a map is made of: a fit of an experiment, see `Fit`."""
+
+    @property
+    def label(self) -> str: ...
+    @property
+    def experiment(self) -> Experiment | None: ...
+    @property
+    def observed(self) -> ObservedReadings: ...
+    @property
+    def sigma(self) -> float: ...
+    @property
+    def sigma_is_estimated(self) -> bool: ...
+    @property
+    def degrees_of_freedom(self) -> int: ...
+    @property
+    def estimates(self) -> tuple[ParameterEstimate, ...]: ...
+    @property
+    def functions(self) -> EstimatedFunctions: ...
+
+
+@single_threaded
+def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
+    """The machine's errors, the estimated offsets of probes and their joint covariance, of a fit
+    that has converged.
+
+    :raises ValueError: the estimate has not converged, or the `date` names no day.
+    """
+    if date is not None:
+        parse_day(date)
+    at, experiment = fit.functions.at, fit.experiment
+    assert experiment is not None
+    design, layout, state = at.design, at.layout, at.state
+    offsets = layout.offset_columns[design.probes.free]
+    columns = np.concatenate([np.arange(len(layout))[layout.model], offsets])
+    root = fit.sigma * at.shared[columns]
+    scale = layout.scale[columns]
+    stated = written(experiment.tree, "error_model")
+    settings = {} if stated is None else to_python(stated)
+    factor = written(experiment.tree, "coverage_factor")
+    return FittedMap(
+        title=experiment.title,
+        model=design.model,
+        settings=absolute(settings, experiment.source.parent),
+        volume=design.machine.volume,
+        values=state.a,
+        probes=Probes(design.probes.names, state.probes, design.probes.free),
+        drawn_offsets=design.probes.offsets,
+        probe=design.probes.names[design.evaluation.probe],
+        covariance=0.5 * (root @ root.T + (root @ root.T).T),
+        undetermined=determined_only(at.shared_null[columns], scale),
+        sigma=fit.sigma,
+        sigma_is_estimated=fit.sigma_is_estimated,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        repeatability=design.machine.repeatability,
+        coverage_factor=COVERAGE_FACTOR if factor is None else experiment.coverage_factor,
+        frame=FRAMES[experiment.error_model.kind],
+        temperatures=_temperatures(fit.observed, experiment),
+        left_out=tuple(_left_out(one) for one in fit.estimates if one.kind == "influence"),
+        data=_data(fit.observed),
+        experiment=fit.label,
+        program=f"ballplate {version('ballplate')}",
+        date=date,
+    )
+
+
+def _left_out(one: ParameterEstimate) -> LeftOut:
+    is_known = bool(np.isfinite(one.standard_uncertainty))
+    value, uncertainty = (one.value, one.standard_uncertainty) if is_known else (None, None)
+    return LeftOut(one.name, one.kind, one.unit, value, uncertainty)
+
+
+def _data(observed: ObservedReadings) -> MapData:
+    """What the readings say, however they were written."""
+    design, readings = observed.design, observed.design.readings
+    found = hashlib.sha256()
+    for names in (design.positions.names, design.balls.names, design.probes.names):
+        found.update("\n".join(names).encode())
+    for one in (readings.position, readings.ball, readings.probe):
+        found.update(np.ascontiguousarray(one, "<i8").tobytes())
+    found.update(np.ascontiguousarray(observed.x, "<f8").tobytes())
+    return MapData(len(readings), found.hexdigest())
+
+
+def _temperatures(observed: ObservedReadings, experiment: Experiment) -> dict[str, float] | None:
+    """The reference temperature, and the mean ones of scales and artefacts over readings that have
+    them, or else over positions, where they are stated.
+    """
+    stated = [one for one in experiment.influences if isinstance(one, TemperaturesSettings)]
+    if not stated:
+        return None
+    found = {"reference": stated[0].reference}
+    beside = observed.design.readings.beside or {}
+    for word, columns in (
+        ("scales", (*AXIS_COLUMNS, SCALES_COLUMN)),
+        ("artefact", (ARTEFACT_COLUMN,)),
+    ):
+        values = [one[np.isfinite(one)] for name, one in beside.items() if name in columns]
+        if not sum(map(len, values)):
+            values = [
+                np.atleast_1d(value)
+                for one in stated
+                for value in _by_position(one, word, observed.design.positions.names)
+            ]
+        if values:
+            found[word] = float(np.concatenate(values).mean())
+    return found
+
+
+def _by_position(stated: TemperaturesSettings, word: str, positions: Sequence[str]) -> list[Any]:
+    """Temperatures of scales or artefacts in each position, none where none are stated."""
+    measured = stated.scale_temperature if word == "scales" else stated.artefact_temperature
+    if measured is None:
+        return []
+    own = stated.positions or {}
+    of_positions = [getattr(own.get(name), word, None) for name in positions]
+    return [measured.value if one is None else one for one in of_positions]

@@ -1,0 +1,119 @@
+"""Lengths that are to be corrected: between named points, and measuring tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError, refused
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.readings.point_files import GivenPoints, read_pairs
+
+
+@dataclass(frozen=True, eq=False)
+class WantedLengths:
+    """Lengths: names, scale readings `points` (m, 2, d) of their ends in metres, `probes` (m, 2),
+    and targets, None where there are none.
+    """
+
+    names: tuple[str, ...]
+    points: Array
+    probes: Integers
+    targets: tuple[Target | None, ...]
+
+    def beside(self, other: WantedLengths) -> WantedLengths:
+        """Both, one after the other."""
+        return WantedLengths(
+            self.names + other.names,
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.probes, other.probes]),
+            self.targets + other.targets,
+        )
+
+
+def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> WantedLengths:
+    """Lengths between pairs of points by their names, or indices.
+
+    :raises ValueError: a name that no point has, or several; an index of none.
+    """
+    return _between(given, [_ends(given, pair) for pair in pairs])
+
+
+def between_listed(given: GivenPoints, source: Path | GivenText) -> WantedLengths:
+    """Lengths between the pairs of points that a CSV file names.
+
+    :raises ExperimentError: a wrong table, or a name that no point has, or several.
+    """
+    pairs, marks = read_pairs(source)
+    found, messages = [], []
+    for pair, mark in zip(pairs, marks, strict=True):
+        try:
+            found.append(_ends(given, pair))
+        except ValueError as error:
+            messages.append(mark.message("", str(error)))
+        if len(messages) >= MOST_MESSAGES:
+            break
+    if messages:
+        raise ExperimentError(messages)
+    return _between(given, found)
+
+
+def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> WantedLengths:
+    """The measuring tasks of an experiment.
+
+    :raises ExperimentError: there is none, of other dimensions, or with a probe that the map does
+        not have.
+    """
+    tasks, known = experiment.evaluation.tasks, fitted.probes.names
+    if not tasks:
+        raise refused(experiment.source, "has no measuring tasks", "evaluation.tasks")
+    if experiment.dimension != fitted.dimension:
+        text = f"has {experiment.dimension} axes, and the map {fitted.dimension}"
+        raise refused(experiment.source, text, "machine.volume")
+    absent = {name for task in tasks for name in task.probes if name not in known}
+    if absent:
+        text = f"the map has no probe {listing(sorted(absent))}; known: {listing(known)}"
+        raise refused(experiment.source, text, "evaluation.tasks")
+    return WantedLengths(
+        tuple(task.name for task in tasks),
+        np.array([task.points for task in tasks]),
+        np.array([[known.index(name) for name in task.probes] for task in tasks], np.int64),
+        tuple(task.target for task in tasks),
+    )
+
+
+def _between(given: GivenPoints, pairs: Sequence[tuple[int, int]]) -> WantedLengths:
+    places = np.array(pairs, np.int64).reshape(-1, 2)
+    names = tuple(f"{given.name(i)} to {given.name(j)}" for i, j in pairs)
+    return WantedLengths(names, given.points[places], given.probes[places], (None,) * len(names))
+
+
+def _ends(given: GivenPoints, pair: Sequence[str | int]) -> tuple[int, int]:
+    """Indices of two points by their names, or indices.
+
+    :raises ValueError: see `between_named`.
+    """
+    if isinstance(pair, str) or len(pair) != 2:
+        raise ValueError(f"a length between {pair!r}; give two points")
+    first, second = (_end(given, one) for one in pair)
+    return first, second
+
+
+def _end(given: GivenPoints, one: str | int) -> int:
+    if not isinstance(one, str):
+        if not 0 <= one < len(given.points):
+            raise ValueError(f"no point {one!r}; there are 0 to {len(given.points) - 1}")
+        return int(one)
+    count = given.times[one]
+    if count != 1:
+        what = f"{count} points are called" if count else "no point is called"
+        told = "names of ends must differ" if count else hint(one, given.times)
+        raise ValueError(f'{what} "{one}"; {told}')
+    return given.places[one]

@@ -1,0 +1,321 @@
+"""The fitted map of a map file's tree, or what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from ..design.objects import Probes, Volume
+from ..inputs.messages import ExperimentError
+from ..inputs.problems import Problems
+from ..inputs.quantities import format_length
+from ..inputs.settings import describe, listing, shorten
+from ..inputs.wording import explain
+from ..inputs.yamltree import Mapping as MappingNode
+from ..inputs.yamltree import Node, to_python
+from ..machines.custom import CustomModelError
+from ..machines.protocol import Array, ErrorModel
+from ..machines.settings import (
+    MachineFileSettings,
+    PythonSettings,
+    build_error_model,
+    kind_of,
+)
+from ..maps.fitted_map import FittedMap, LeftOut, MapData
+from .machine_file import load_machine
+from .map_content import AXES, checksum_of, corner_corrections
+from .map_sections import MapSettings
+from .model_files import absolute, fingerprints
+
+# Eigenvalues of a matrix of correlations that are no less than this times their number below zero
+# are so by rounding.
+NEGATIVE = 1e-10
+# Corrections of the same model, in metres, agree within this; and within this part of them.
+SAME, SAME_PART = 1e-12, 1e-9
+
+
+# In one piece: what is checked needs what was found right before it.
+def map_of_tree(
+    root: Node, arrays: Mapping[str, Array], source: Path, problems: Problems
+) -> FittedMap | None:
+    """The map of a tree, or None after saying what is wrong."""
+    if not isinstance(root, MappingNode) or "map" not in root.items:
+        what = describe(to_python(root)) if not isinstance(root, MappingNode) else "no key map"
+        text = f"is no map file ({what}); write one with: ballplate fit FILE READINGS -o map.yaml"
+        problems.add((), text)
+        return None
+    problems.add_empty()
+    try:
+        settings = _adapter().validate_python(to_python(root))
+    except ValidationError as error:
+        for one in explain(error.errors(include_url=False), root, _json_schema()):
+            problems.add(one.steps, one.text, one.of_key)
+        return None
+    ends = settings.volume.stated.values()
+    for axis, (low, high) in settings.volume.stated.items():
+        if low >= high:
+            text = f"ends at {format_length(high)}, not above its beginning, {format_length(low)}"
+            problems.add(("volume", axis), text)
+    if problems.messages:
+        return None
+    lower, upper = (np.array(one) for one in zip(*ends, strict=True))
+    volume = Volume(lower, upper)
+    model = _model(settings, volume, source.parent, problems)
+    probes = _probes(settings, len(lower), problems)
+    if model is None or probes is None:
+        return None
+    values = np.array([one.value for one in settings.parameters])
+    _check_parameters(settings, model, problems)
+    if problems.messages:
+        return None
+    size = len(values) + int(probes.free.sum())
+    covariance, undetermined = (
+        (arrays["covariance"], arrays["undetermined"])
+        if arrays
+        else (_triangle(settings, size, problems), _directions(settings, size, problems))
+    )
+    if not problems.messages:
+        _check_covariance(covariance, undetermined, size, problems)
+    if not problems.messages:
+        _check_unchanged(settings, root, model, values, volume, covariance, undetermined, problems)
+    if problems.messages:
+        return None
+    data = settings.data
+    return FittedMap(
+        title=settings.title,
+        model=model,
+        settings=absolute(to_python(root.items["error_model"]), source.parent),
+        volume=volume,
+        values=values,
+        probes=probes,
+        drawn_offsets=np.array([one.nominal or one.offset for one in settings.probes.values()]),
+        probe=settings.probe,
+        covariance=covariance,
+        undetermined=undetermined,
+        sigma=settings.sigma.value,
+        sigma_is_estimated=settings.sigma.estimated,
+        degrees_of_freedom=settings.sigma.degrees_of_freedom,
+        repeatability=np.array(settings.repeatability),
+        coverage_factor=settings.coverage_factor,
+        frame=settings.frame,
+        temperatures=settings.temperatures,
+        left_out=tuple(
+            LeftOut(one.name, one.kind, one.unit, one.value, one.standard_uncertainty)
+            for one in settings.left_out
+        ),
+        data=None if data is None else MapData(data.readings, data.sha256),
+        experiment=settings.experiment,
+        program=settings.program,
+        date=settings.date,
+    )
+
+
+def _model(
+    settings: MapSettings, volume: Volume, folder: Path, problems: Problems
+) -> ErrorModel | None:
+    """The error model, or None after saying what is wrong."""
+    own: Any = settings.error_model
+    d = len(volume.lower)
+    kind = kind_of(own)
+    if d not in kind.dimensions:
+        problems.add(("volume",), f"has {d} axes, but {own.kind} models have {kind.dimensions[0]}")
+        return None
+    try:
+        if isinstance(own, MachineFileSettings):
+            own.of(load_machine(folder / own.file))
+        elif isinstance(own, PythonSettings):
+            own.beside(folder)
+        wrong = list(kind.wrong(own, d))
+        for below, text in wrong:
+            problems.add(("error_model", *below), text)
+        if wrong:
+            return None
+        _check_files(settings, folder, problems)
+        return build_error_model(own, *volume.corners)
+    except CustomModelError as error:
+        problems.add(("error_model", error.key), str(error))
+    except ExperimentError as error:
+        problems.take(error, ("error_model", "file"))
+    return None
+
+
+def _check_files(settings: MapSettings, folder: Path, problems: Problems) -> None:
+    """Report files that the error model rests on and that are not what they were."""
+    stated = to_python(problems.root)["error_model"]  # type: ignore[index,unused-ignore]
+    for name, found in fingerprints(absolute(stated, folder)).items():
+        known = settings.files.get(name)
+        if known is not None and known != found:
+            text = (
+                "has changed since the map was written, which may no longer belong to it; put the"
+                " earlier file back, or fit again"
+            )
+            problems.add(("files", name), text)
+
+
+def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:
+    """The probes, or None after saying what is wrong."""
+    for name, probe in settings.probes.items():
+        if {len(probe.offset), len(probe.nominal or probe.offset)} != {d} or any(
+            AXES.index(axis) >= d for axis in probe.estimated
+        ):
+            problems.add(("probes", name), f"is not of {d} axes, as the volume")
+    if len(settings.repeatability) != d:
+        problems.add(("repeatability",), f"is not of {d} axes, as the volume")
+    if settings.probe not in settings.probes:
+        text = f"is none of the probes; known: {listing(settings.probes)}"
+        problems.add(("probe",), text)
+    if problems.messages:
+        return None
+    free = [[axis in one.estimated for axis in AXES[:d]] for one in settings.probes.values()]
+    offsets = np.array([one.offset for one in settings.probes.values()])
+    return Probes(tuple(settings.probes), offsets, np.array(free, bool))
+
+
+def _check_parameters(settings: MapSettings, model: ErrorModel, problems: Problems) -> None:
+    """Report parameters that are not those of the error model."""
+    known, given = model.parameters, settings.parameters
+    if len(known) != len(given):
+        text = f"has {len(given)} entries, but the error model {len(known)} parameters"
+        problems.add(("parameters",), f"{text}; the file is incomplete, or was edited")
+        return
+    for k, (one, stated) in enumerate(zip(known, given, strict=True)):
+        if (one.name, one.unit) != (stated.name, stated.unit):
+            text = (
+                f'is "{shorten(stated.name)}" in {stated.unit}, but the error model has'
+                f' "{one.name}" in {one.unit} there'
+            )
+            problems.add(("parameters", k), text)
+
+
+def _triangle(settings: MapSettings, size: int, problems: Problems) -> Array:
+    """The covariance (size, size) of the rows of its lower triangle."""
+    rows = settings.covariance
+    found = np.zeros((size, size))
+    if len(rows) != size:
+        text = (
+            f"has {len(rows)} rows; {size} parameters and estimated offsets need {size}: the file"
+            " is incomplete, or was edited"
+        )
+        problems.add(("covariance",), text)
+        return found
+    for k, row in enumerate(rows):
+        found[k, : k + 1] = _numbers(row, k + 1, ("covariance", k), problems)
+        found[:k, k] = found[k, :k]
+    return found
+
+
+def _directions(settings: MapSettings, size: int, problems: Problems) -> Array:
+    """Undetermined directions (size, k)."""
+    rows = [
+        _numbers(row, size, ("undetermined", k), problems)
+        for k, row in enumerate(settings.undetermined)
+    ]
+    return np.array(rows).reshape(-1, size).T
+
+
+def _numbers(row: str | float, count: int, steps: tuple[str, int], problems: Problems) -> Array:
+    """The numbers of a row, zeros after saying what is wrong with them."""
+    words = str(row).split()
+    try:
+        found = np.array(list(map(float, words)))
+    except ValueError:
+        found = np.full(len(words), np.nan)
+    if len(words) != count:
+        problems.add(steps, f"{len(words)} numbers instead of {count}; write the map again")
+    elif not np.isfinite(found).all():
+        wrong = next(word for word in words if not _is_number(word))
+        problems.add(steps, f'"{shorten(wrong)}" is not a number; write the map again')
+    else:
+        return found
+    return np.zeros(count)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False
+
+
+def _check_covariance(
+    covariance: Array, undetermined: Array, size: int, problems: Problems
+) -> None:
+    """Report what is no covariance: of another size, not symmetric, with negative variances."""
+    if covariance.shape != (size, size) or undetermined.shape[:1] != (size,):
+        problems.add(("covariance",), f"is not of {size} parameters and estimated offsets")
+        return
+    if not (np.isfinite(covariance).all() and np.isfinite(undetermined).all()):
+        problems.add(("covariance",), "has entries that are no finite numbers")
+        return
+    if (covariance != covariance.T).any():
+        problems.add(("covariance",), "is not symmetric")
+        return
+    variances = np.diagonal(covariance)
+    for k in np.flatnonzero(variances < 0.0).tolist():
+        problems.add(("covariance", k), f"ends in the variance {float(variances[k])!r}, below zero")
+    if (variances < 0.0).any():
+        return
+    spread = np.where(variances > 0.0, np.sqrt(variances), 1.0)
+    least = float(np.linalg.eigvalsh(covariance / np.outer(spread, spread)).min())
+    if least < -NEGATIVE * size:
+        text = (
+            "is not that of any values: some combination of them would have a variance below zero"
+            f" (eigenvalue {least:.3g} of the correlations); write the map again"
+        )
+        problems.add(("covariance",), text)
+
+
+def _check_unchanged(
+    settings: MapSettings,
+    root: MappingNode,
+    model: ErrorModel,
+    values: Array,
+    volume: Volume,
+    covariance: Array,
+    undetermined: Array,
+    problems: Problems,
+) -> None:
+    """Report values that were edited, and a model that corrects otherwise than it did."""
+    said = {
+        key: value
+        for key, value in to_python(root).items()
+        if key not in ("covariance", "undetermined")
+    }
+    own = settings.checksum
+    if own is not None and own != checksum_of(said, covariance, undetermined):
+        text = (
+            "is not that of what the file says: it was edited or damaged since it was written;"
+            " write it again with fit -o, or remove the checksum if the changes are meant"
+        )
+        problems.add(("checksum",), text)
+        return
+    stated = np.array(settings.check)
+    found = corner_corrections(model, values, volume)
+    if stated.size == 0:
+        return
+    if stated.shape != found.shape:
+        problems.add(("check",), f"has not {len(found)} points of {found.shape[1]} axes")
+        return
+    apart = np.abs(stated - found) > SAME + SAME_PART * np.abs(found)
+    if apart.any():
+        worst = float(np.abs(stated - found).max())
+        text = (
+            f"the error model with these values corrects by up to {format_length(worst)} otherwise"
+            " than when the map was written; it, or the values, have changed: fit again"
+        )
+        problems.add(("check",), text)
+
+
+@cache
+def _adapter() -> TypeAdapter[MapSettings]:
+    return TypeAdapter(MapSettings)
+
+
+@cache
+def _json_schema() -> dict[str, Any]:
+    return _adapter().json_schema()

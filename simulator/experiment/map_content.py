@@ -1,0 +1,113 @@
+"""What a map file says besides its covariance, and how changes of it are recognised."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..design.objects import Volume
+from ..inputs.messages import refused
+from ..machines.custom import CustomModelError
+from ..machines.protocol import Array, ErrorModel
+from ..maps.fitted_map import FittedMap
+from .model_files import fingerprints, relative
+
+AXES = ("x", "y", "z")
+# What is not hashed: it may be corrected by hand.
+WORDS = ("title", "experiment", "date", "program", "frame", "checksum")
+
+
+def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
+    """What a map file holds besides its covariance and undetermined directions."""
+    try:
+        files = fingerprints(fitted.settings)
+    except CustomModelError as error:
+        raise refused(folder, str(error), "error_model") from None
+    lower, upper = fitted.volume.corners
+    found: dict[str, Any] = {
+        "map": 1,
+        "title": fitted.title,
+        "experiment": fitted.experiment,
+        "date": fitted.date,
+        "program": fitted.program,
+        "error_model": _plain(relative(fitted.settings, folder)),
+        "files": files,
+        "volume": {
+            axis: [_length(low), _length(high)]
+            for axis, low, high in zip(AXES, lower, upper, strict=False)
+        },
+        "frame": fitted.frame,
+        "repeatability": [_length(one) for one in fitted.repeatability.tolist()],
+        "probes": _probe_data(fitted),
+        "probe": fitted.probe,
+        "sigma": {
+            "value": fitted.sigma,
+            "estimated": fitted.sigma_is_estimated,
+            "degrees_of_freedom": fitted.degrees_of_freedom,
+        },
+        "coverage_factor": fitted.coverage_factor,
+        "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),
+        "data": None if fitted.data is None else vars(fitted.data),
+        "left_out": [
+            {key: value for key, value in vars(one).items() if value is not None}
+            for one in fitted.left_out
+        ],
+        "parameters": [
+            {"name": one.name, "unit": one.unit, "value": value}
+            for one, value in zip(fitted.model.parameters, fitted.values.tolist(), strict=True)
+        ],
+        "check": corner_corrections(fitted.model, fitted.values, fitted.volume).tolist(),
+    }
+    found = {key: value for key, value in found.items() if value not in (None, {}, [], "")}
+    found["checksum"] = checksum_of(found, fitted.covariance, fitted.undetermined)
+    return found
+
+
+def _probe_data(fitted: FittedMap) -> dict[str, Any]:
+    """Probes as a file states them, by name."""
+    found: dict[str, Any] = {}
+    for k, name in enumerate(fitted.probes.names):
+        found[name] = {"offset": [_length(one) for one in fitted.probes.offsets[k].tolist()]}
+        if fitted.probes.free[k].any():
+            found[name] |= {
+                "estimated": [AXES[axis] for axis in np.flatnonzero(fitted.probes.free[k])],
+                "nominal": [_length(one) for one in fitted.drawn_offsets[k].tolist()],
+            }
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """What a file says, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
+
+
+def _length(value: float) -> str:
+    return f"{value!r} m"
+
+
+def checksum_of(head: Mapping[str, Any], covariance: Array, undetermined: Array) -> str:
+    """SHA-256 of what a file says, however it is written."""
+    said = {key: value for key, value in head.items() if key not in WORDS}
+    found = hashlib.sha256(json.dumps(said, sort_keys=True).encode())
+    for one in (covariance[np.tril_indices(len(covariance))], undetermined):
+        found.update(repr(one.shape).encode())
+        found.update(np.ascontiguousarray(one, "<f8").tobytes())
+    return found.hexdigest()
+
+
+def corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Array:
+    """Corrections (2^d + 1, d) at the corners and the centre, with a probe of a tenth of the
+    volume.
+    """
+    d = len(volume.lower)
+    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    points = volume.lower + volume.size * np.concatenate([corners, np.full((1, d), 0.5)])
+    offsets = np.broadcast_to(0.1 * volume.size, points.shape)
+    return np.asarray(model.error(points, values, offsets))

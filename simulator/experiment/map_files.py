@@ -1,0 +1,119 @@
+"""Map files: writing a fitted map as YAML, or as arrays of NumPy, and reading it with all that is
+wrong with it.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..inputs.messages import ExperimentError, Message, refused
+from ..inputs.problems import Problems, in_order
+from ..inputs.settings import shorten
+from ..inputs.yamltree import Mark, Node, read_bytes, read_tree
+from ..machines.protocol import Array
+from ..maps.fitted_map import FittedMap
+from .changes import node_of
+from .map_checks import map_of_tree
+from .map_content import head_of
+
+BINARY = ".npz"
+
+
+def write_map(fitted: FittedMap, path: str | os.PathLike[str]) -> None:
+    """Write a map file: YAML, or arrays of NumPy where the name ends in .npz. Numbers are written
+    with all their digits.
+
+    :raises ExperimentError: the error model cannot be named in a file, or what it rests on cannot
+        be read.
+    """
+    target = Path(path)
+    head = head_of(fitted, target.parent)
+    if target.suffix.lower() != BINARY:
+        target.write_text(map_text(fitted, head), encoding="utf-8", newline="\n")
+        return
+    lower = np.tril(np.ones(fitted.covariance.shape, bool))
+    covariance = np.where(lower, fitted.covariance, fitted.covariance.T)
+    parts = {"covariance": covariance, "undetermined": fitted.undetermined}
+    # Opened here, as NumPy would add an ending to names that have it in capitals.
+    with target.open("wb") as stream:
+        np.savez(stream, map=np.array(json.dumps(head)), **parts)  # type: ignore[arg-type,unused-ignore]
+
+
+def map_text(fitted: FittedMap, head: Mapping[str, Any]) -> str:
+    """A map file as YAML; `head` is what it holds besides arrays."""
+    lines = []
+    for key, value in head.items():
+        if key == "checksum":
+            continue
+        if isinstance(value, list):
+            lines += [f"{key}:", *(f"- {_json(one)}" for one in value)]
+        elif key == "probes":
+            lines += [f"{key}:", *(f"  {_json(name)}: {_json(one)}" for name, one in value.items())]
+        else:
+            lines.append(f"{key}: {_json(value)}")
+    if fitted.undetermined.shape[1]:
+        lines.append("undetermined:")
+        lines += [f'- "{_row(one)}"' for one in fitted.undetermined.T]
+    lines.append("covariance:")
+    lines += [f'- "{_row(row[: k + 1])}"' for k, row in enumerate(fitted.covariance)]
+    return "\n".join([*lines, f"checksum: {head['checksum']}", ""])
+
+
+def _row(values: Array) -> str:
+    return " ".join(map(repr, values.tolist()))
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def read_map(path: str | os.PathLike[str]) -> FittedMap:
+    """Read a map file, YAML or arrays of NumPy.
+
+    :raises ExperimentError: it cannot be read, is damaged, incomplete or edited, is no map, or
+        rests on a file that has changed; holds everything that was found.
+    """
+    source = Path(path)
+    refused_messages: list[Message] = []
+    root, arrays = map_tree(source, refused_messages)
+    problems = Problems(root)
+    found = map_of_tree(root, arrays, source, problems)
+    if found is None or problems.messages or refused_messages:
+        raise ExperimentError(in_order(problems.messages, refused_messages, source))
+    return found
+
+
+def map_tree(source: Path, minor: list[Message]) -> tuple[Node, dict[str, Array]]:
+    """What a map file says, and the arrays that it has beside that; `minor` as for `read_tree`.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    if source.suffix.lower() == BINARY:
+        return _binary(source)
+    if read_bytes(source)[:2] == b"PK":
+        raise refused(source, "has arrays of NumPy; give it the ending .npz")
+    return read_tree(source, minor), {}
+
+
+def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
+    """What a file of arrays says, as a tree whose nodes are all at its name, and its arrays."""
+    content = read_bytes(source)
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as found:
+            head = json.loads(str(found["map"]))
+            arrays = {name: np.array(found[name]) for name in ("covariance", "undetermined")}
+        if not all(one.dtype == float and one.ndim == 2 for one in arrays.values()):
+            raise ValueError("its arrays are no matrices of doubles")
+        root = node_of({**head, "covariance": [""]}, Mark(str(source), 0, 0))
+    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        text = f"is no map, or damaged ({shorten(str(error))}); write it again with fit -o"
+        raise refused(source, text) from None
+    return root, arrays

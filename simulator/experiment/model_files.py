@@ -1,0 +1,76 @@
+"""Files that an error model rests on besides its settings: a machine file with its tables, the
+module of a user's own model.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..inputs.yamltree import child, read_bytes, read_tree, to_python
+from ..machines.custom import named_object
+
+# Keys of settings of error models that name a file or a folder, by the kind of the model.
+PLACES = {"machine": "file", "python": "folder"}
+
+
+def absolute(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Settings of an error model with absolute paths in place of those found from a folder."""
+    return _placed(settings, lambda path: str((folder / path).resolve()))
+
+
+def relative(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Settings of an error model with paths found from a folder in place of absolute ones."""
+
+    def path_from(path: str) -> str:
+        try:
+            return Path(os.path.relpath(path, folder.resolve())).as_posix()
+        except ValueError:
+            # Another drive.
+            return path
+
+    return _placed(settings, path_from)
+
+
+def _placed(settings: Mapping[str, Any], place: Any) -> dict[str, Any]:
+    found, key = dict(settings), PLACES.get(settings["kind"])
+    if key == "folder" and ":" not in settings["object"]:
+        # An entry point is found wherever it is installed.
+        return found
+    return found if key is None else found | {key: place(found.get(key, "."))}
+
+
+def model_files(settings: Mapping[str, Any]) -> dict[str, Path]:
+    """Files that an error model of `settings` with absolute paths rests on, by their names.
+
+    :raises ExperimentError: a machine file cannot be read.
+    :raises CustomModelError: there is no such model.
+    """
+    if settings["kind"] == "machine":
+        path = Path(settings["file"])
+        errors = to_python(child(read_tree(path, []), "errors") or read_tree(path, []))
+        named = (one.get("file") for one in errors.values() if isinstance(one, dict))
+        tables = [str(name) for name in named if name is not None]
+        return {path.name: path, **{name: path.parent / name for name in tables}}
+    if settings["kind"] == "python":
+        folder = settings.get("folder")
+        found = named_object(settings["object"], None if folder is None else Path(folder))
+        file = getattr(sys.modules.get(found.__module__), "__file__", None)
+        return {} if file is None else {Path(file).name: Path(file)}
+    return {}
+
+
+def fingerprints(settings: Mapping[str, Any]) -> dict[str, str]:
+    """SHA-256 of the files that an error model rests on, by their names; raises as `model_files`.
+
+    >>> fingerprints({"kind": "metric"})
+    {}
+    """
+    return {
+        name: hashlib.sha256(read_bytes(path)).hexdigest()
+        for name, path in model_files(settings).items()
+    }

@@ -1,0 +1,220 @@
+"""Maps that an experiment names: as its true machine, or as prior knowledge of its machine."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from datetime import date
+
+import numpy as np
+
+from ..design.lookup import References
+from ..design.objects import Machine
+from ..inputs.days import parse_day
+from ..inputs.messages import ExperimentError, Steps, format_path
+from ..inputs.quantities import format_length
+from ..inputs.settings import listing
+from ..inputs.yamltree import mark_of, read_bytes
+from ..machines.protocol import ErrorModel, TrueMachine
+from ..machines.true_machine_settings import TrueMapSettings
+from ..maps.fitted_map import FittedMap
+from ..maps.map_prior import determined_combinations, marginal_of
+from .map_content import corner_corrections
+from .map_files import read_map
+from .model import Prior, Probe
+from .sections import MapPriorSettings
+
+AXES = ("x", "y", "z")
+# Ends of volumes that are the same, in metres.
+TOLERANCE = 1e-9
+YEAR = 365.25
+# The same corrections, in metres, and in parts of them.
+SAME, SAME_PART = 1e-12, 1e-9
+
+
+def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: References) -> None:
+    """Let the true machine be that of its map, or report what is wrong with it."""
+    steps: Steps = ("true_machine", "file")
+    found = _read(truth.file, steps, references)
+    if found is None:
+        return
+    a = found.values
+    if truth.draw is not None:
+        generator = np.random.default_rng(np.random.SeedSequence(truth.draw))
+        root = found.root
+        a = a + (root @ generator.standard_normal(root.shape[1]))[: len(a)]
+    content = hashlib.sha256(read_bytes(references.folder / truth.file)).hexdigest()
+    truth.of(TrueMachine(found.model, a), content)
+    if found.undetermined.shape[1]:
+        text = (
+            f"has {found.undetermined.shape[1]} undetermined directions, in which the true machine"
+            " is as the fit happened to leave it"
+        )
+        references.problems.doubt(steps, text)
+    if machine is None:
+        return
+    if machine.dimension != found.dimension:
+        text = f"is of {found.dimension} axes, but machine.volume of {machine.dimension}"
+        references.problems.add(steps, f"{text}; name another map")
+        return
+    _check_ends(found, machine, steps, references, outside_only=True)
+
+
+def resolve_map_prior(
+    settings: MapPriorSettings,
+    steps: Steps,
+    model: ErrorModel,
+    machine: Machine,
+    references: References,
+    probes: Mapping[str, Probe],
+) -> list[Prior]:
+    """What a map tells of the machine of another campaign, as priors that do not depend on one
+    another; what is wrong goes to the problems.
+
+    These are combinations of the parameters in which the map's covariance is diagonal, once each
+    parameter is measured by its effect: as many as the map determines.
+    """
+    problems, of_file = references.problems, (*steps, "file")
+    fitted = _read(settings.file, of_file, references)
+    years = None if fitted is None else _years(settings, fitted, steps, references)
+    if fitted is None or years is None or not _is_same(fitted, model, machine, of_file, references):
+        return []
+    kept = np.arange(len(fitted.values))
+    free = [
+        (name, axis)
+        for k, name in enumerate(fitted.probes.names)
+        for axis in range(fitted.dimension)
+        if fitted.probes.free[k, axis]
+    ]
+    shared = [
+        j
+        for j, (name, axis) in enumerate(free)
+        if settings.offsets and name in probes and probes[name].is_estimated
+    ]
+    kept = np.concatenate([kept, len(fitted.values) + np.array(shared, np.int64)])
+    drift = (settings.drift_per_year or 0.0) * years
+    found = determined_combinations(marginal_of(fitted, kept), settings.inflation, drift)
+    if fitted.without_scatter or not (found[2] > 0.0).all():
+        text = (
+            "states no uncertainty, as that of readings without scatter does; use the map of real"
+            " readings"
+        )
+        problems.add(of_file, text)
+        return []
+    mark = mark_of(problems.root, of_file)
+    priors = []
+    for k, (row, value, uncertainty) in enumerate(zip(*found, strict=True)):
+        by_offset: dict[str, np.ndarray] = {}
+        for coefficient, j in zip(row[len(fitted.values) :].tolist(), shared, strict=True):
+            name, axis = free[j]
+            by_offset.setdefault(name, np.zeros(fitted.dimension))[axis] = coefficient
+        largest = int(np.abs(row * fitted.scale[kept]).argmax())
+        label = f"{settings.file}, combination {k + 1}, mostly"
+        priors.append(
+            Prior(
+                f"{label} {fitted.parameters[int(kept[largest])].name}",
+                None,
+                None,
+                -1,
+                row[: len(fitted.values)],
+                float(value),
+                float(uncertainty),
+                mark,
+                format_path(of_file),
+                "m",
+                by_offset or None,
+            )
+        )
+    return priors
+
+
+def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
+    try:
+        return read_map(references.folder / file)
+    except ExperimentError as error:
+        references.problems.take(error, steps)
+        return None
+
+
+def _years(
+    settings: MapPriorSettings, fitted: FittedMap, steps: Steps, references: References
+) -> float | None:
+    """Years between both campaigns, None after saying what is wrong."""
+    if settings.drift_per_year is None:
+        return 0.0
+    if settings.years is not None:
+        return settings.years
+    problems = references.problems
+    if settings.date is None:
+        text = "needs the time between both campaigns; add date: 2027-05-22 or years: 0.5"
+        problems.add((*steps, "drift_per_year"), text)
+        return None
+    if fitted.date is None:
+        text = "the map states no date; give years: 0.5 in place of the date of this campaign"
+        problems.add((*steps, "date"), text)
+        return None
+    start, end = parse_day(fitted.date), parse_day(settings.date)
+    if end < start:
+        problems.add((*steps, "date"), f"is before that of the map, {fitted.date}; correct it")
+        return None
+    return _between(start, end)
+
+
+def _between(start: date, end: date) -> float:
+    return (end - start).days / YEAR
+
+
+def _is_same(
+    fitted: FittedMap, model: ErrorModel, machine: Machine, steps: Steps, references: References
+) -> bool:
+    """Whether a map is of the error model that is fitted here; says where not."""
+    add = references.problems.add
+    if machine.dimension != fitted.dimension:
+        add(steps, f"is of {fitted.dimension} axes, but machine.volume of {machine.dimension}")
+        return False
+    if not _check_ends(fitted, machine, steps, references, outside_only=False):
+        return False
+    own = [(one.name, one.unit) for one in model.parameters]
+    known = [(one.name, one.unit) for one in fitted.model.parameters]
+    if own != known:
+        differ = [name for name, _ in set(own) ^ set(known)]
+        text = (
+            f"is of another error model (parameters differ: {listing(sorted(differ), 4)}); fit with"
+            " the same model, or convert the map"
+        )
+        add(steps, text)
+        return False
+    there = corner_corrections(fitted.model, fitted.values, fitted.volume)
+    here = corner_corrections(model, fitted.values, fitted.volume)
+    if (np.abs(there - here) > SAME + SAME_PART * np.abs(there)).any():
+        text = (
+            "is of another error model, which has the same parameters and corrects otherwise; fit"
+            " with the same model"
+        )
+        add(steps, text)
+        return False
+    return True
+
+
+def _check_ends(
+    fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
+) -> bool:
+    """Whether the volume is that of the map, or within it where `outside_only`; says where not."""
+    own, volume, is_right = fitted.volume, machine.volume, True
+    for k, axis in enumerate(AXES[: fitted.dimension]):
+        ends = float(own.lower[k]), float(own.upper[k])
+        low, high = float(volume.lower[k]), float(volume.upper[k])
+        if outside_only:
+            is_wrong = low < ends[0] - TOLERANCE or high > ends[1] + TOLERANCE
+        else:
+            is_wrong = abs(low - ends[0]) > TOLERANCE or abs(high - ends[1]) > TOLERANCE
+        if is_wrong:
+            what = "stay within it" if outside_only else "make them the same, or convert the map"
+            text = (
+                f"its volume goes from {format_length(ends[0])} to {format_length(ends[1])} in"
+                f" {axis}, but machine.volume from {format_length(low)} to {format_length(high)};"
+                f" {what}"
+            )
+            references.problems.add(steps, text)
+            is_right = False
+    return is_right

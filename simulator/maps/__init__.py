@@ -1,0 +1,1 @@
+"""Fitted maps of machines: estimated errors with their covariance, and what follows from them."""

@@ -1,0 +1,181 @@
+"""What a fit leaves behind: the estimated errors of a machine with their joint covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..computing.rounding import TOUCHED, blank
+from ..design.objects import Probes, Volume
+from ..geometry.motions import AXIS_NAMES
+from ..machines.protocol import Array, ErrorModel, Integers, Parameter, Unit
+
+# An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
+LEAST_SIGMA = 1e-6
+
+# Eigenvalues of correlations below this, in parts of the largest, are rounding.
+ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A parameter that a fit estimated and its map does not apply: of an influence quantity, say.
+
+    `kind` is as in the estimates of a fit; `value` and `standard_uncertainty` are in `unit`, None
+    where it is undetermined.
+    """
+
+    name: str
+    kind: str
+    unit: Unit
+    value: float | None
+    standard_uncertainty: float | None
+
+
+@dataclass(frozen=True)
+class MapData:
+    """The readings that a map comes from: how many, and the SHA-256 of what they say."""
+
+    readings: int
+    sha256: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FittedMap:
+    """The estimated errors of a machine, b = (a, estimated probe offsets) with its covariance.
+
+    `settings` are those of the error `model` as a file states them, with absolute paths. `values`
+    (n,) are a, and `probes` have their offsets, estimated where they are `free`, and stated before
+    as `drawn_offsets` (l, d); `probe` is the one that is meant where none is named. `covariance`
+    (m, m) of b includes `sigma`, and leaves out the `undetermined` directions (m, k), orthonormal
+    where each parameter is measured by its effect: what they change is unknown. Parameters are in
+    metres, radians and ratios; `repeatability` (d,) is the stated one of a reading, in metres.
+    `coverage_factor` is what expanded uncertainties have. `frame` says which motion of the whole
+    the model holds, `temperatures` are in degrees Celsius, and `left_out` are estimates of the fit
+    that the map does not apply. `date` is that of the campaign, as 2026-11-22, where it is known.
+    """
+
+    title: str
+    model: ErrorModel
+    settings: Mapping[str, Any]
+    volume: Volume
+    values: Array
+    probes: Probes
+    drawn_offsets: Array
+    probe: str
+    covariance: Array
+    undetermined: Array
+    sigma: float
+    sigma_is_estimated: bool
+    degrees_of_freedom: int
+    repeatability: Array
+    coverage_factor: float = 2.0
+    frame: str = ""
+    temperatures: Mapping[str, float] | None = None
+    left_out: tuple[LeftOut, ...] = ()
+    data: MapData | None = None
+    experiment: str = ""
+    program: str = ""
+    date: str | None = None
+
+    def __repr__(self) -> str:
+        open_ = self.undetermined.shape[1]
+        told = f", {open_} undetermined directions" if open_ else ""
+        return f"<FittedMap {self.title}: {len(self.parameters)} parameters{told}>"
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3, the number of machine axes."""
+        return self.model.dimension
+
+    @property
+    def without_scatter(self) -> bool:
+        """Whether sigma, and with it the covariance, is zero but for rounding."""
+        return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    @cached_property
+    def offset_columns(self) -> Integers:
+        """Places (l, d) of estimated offsets in b, -1 where an offset is as stated."""
+        free = self.probes.free
+        columns = np.full(free.shape, -1, np.int64)
+        columns[free] = len(self.values) + np.arange(int(free.sum()))
+        return columns
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What b (m,) consists of: the model's parameters, then estimated offsets."""
+        offsets = (
+            f"probe {self.probes.names[probe]}: offset {AXIS_NAMES[axis]}"
+            for probe, axis in np.argwhere(self.probes.free).tolist()
+        )
+        return (
+            *self.model.parameters,
+            *(Parameter(name, "m", "offset", name) for name in offsets),
+        )
+
+    @property
+    def estimates(self) -> Array:
+        """All of b (m,), in the order of `parameters`."""
+        return np.concatenate([self.values, self.probes.offsets[self.probes.free]])
+
+    @cached_property
+    def scale(self) -> Array:
+        """How much of each parameter (m,) moves some point by a metre."""
+        return np.array([1.0 / one.effect for one in self.parameters])
+
+    @cached_property
+    def root(self) -> Array:
+        """A square root (m, r) of the covariance."""
+        spread = np.sqrt(np.diagonal(self.covariance))
+        size = np.where(spread > 0.0, spread, 1.0)
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        kept = values > ROUNDING * max(float(values[-1]), 0.0) if len(values) else values > 0.0
+        return np.asarray(size[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
+
+    def standard_uncertainties(
+        self, rows: Array | None = None, drawn: Array | None = None
+    ) -> Array:
+        """Of linear functions of b with derivatives `rows` (..., m), by default of b itself; NaN
+        where undetermined, which derivatives `drawn` (..., m) on a machine without errors tell if
+        they are others there.
+        """
+        rows = np.eye(len(self.scale)) if rows is None else rows
+        return self._blanked(
+            rows if drawn is None else drawn, np.linalg.norm(rows @ self.root, axis=-1)
+        )
+
+    def function_root(self, rows: Array, drawn: Array | None = None) -> Array:
+        """A square root (..., r) of the joint covariance of linear functions of b with derivatives
+        `rows` (..., m); NaN where undetermined, as `drawn` (..., m) tell.
+        """
+        at = rows if drawn is None else drawn
+        return self._blanked(at[..., None, :], rows @ self.root)
+
+    def function_covariance(self, rows: Array, drawn: Array | None = None) -> Array:
+        """Covariance (k, k) of linear functions of b with derivatives `rows` (k, m); NaN where one
+        is undetermined, as `drawn` (k, m) tell.
+        """
+        found = self.function_root(rows, drawn)
+        return np.asarray(found @ found.T)
+
+    def _blanked(self, rows: Array, values: Array) -> Array:
+        return blank(values, rows @ self.undetermined, np.linalg.norm(rows * self.scale, axis=-1))
+
+
+def determined_only(null: Array, scale: Array) -> Array:
+    """Directions (m, k) that span how undetermined ones of all parameters change those of a map.
+
+    `null` (m, j) are the latter's rows, `scale` (m,) as that of the map; directions are orthonormal
+    in its units.
+
+    >>> determined_only(np.array([[2.0, 0.0], [0.0, 0.0]]), np.array([2.0, 1.0])).tolist()
+    [[2.0], [0.0]]
+    """
+    left, sizes, _ = np.linalg.svd(null / scale[:, None], full_matrices=False)
+    found = scale[:, None] * left[:, sizes > TOUCHED]
+    signs = np.sign(found[np.abs(found / scale[:, None]).argmax(axis=0), np.arange(found.shape[1])])
+    return np.asarray(found * signs)

@@ -1,0 +1,141 @@
+"""Points of a CSV file, which are to be corrected, and lengths between them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ..design.objects import Volume
+from ..inputs.arguments import ensure_type
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.settings import hint, shorten
+from ..inputs.tables import header_names, read_table
+from ..inputs.yamltree import GivenText, Mark
+from ..machines.protocol import Array, Integers
+
+AXES = ("x", "y", "z")
+# Columns of text that a file may have; the first three name its points.
+NAMING, PROBE = ("name", "position", "ball"), "probe"
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPoints:
+    """Scale readings `points` (n, d) in metres, their names, empty where there are none, and the
+    indices (n,) of their probes; `marks` are where they stand.
+    """
+
+    points: Array
+    names: tuple[str, ...]
+    probes: Integers
+    marks: tuple[Mark, ...] = ()
+
+    def name(self, i: int) -> str:
+        """The name of a point, or its number from 1."""
+        return self.names[i] or f"point {i + 1}"
+
+    @cached_property
+    def times(self) -> Counter[str]:
+        """How often each name is given."""
+        return Counter(name for name in self.names if name)
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """The last point of each name."""
+        return {name: i for i, name in enumerate(self.names)}
+
+
+def read_points(
+    source: Path | GivenText,
+    probes: tuple[str, ...],
+    probe: str,
+    volume: Volume,
+    offsets: Array | None = None,
+) -> GivenPoints:
+    """Points of a CSV file with the columns x_mm, y_mm and z_mm, or in another unit, and if need
+    be name, or position and ball, and probe; without the latter it is `probe` of the `probes`.
+    Where `offsets` (l, d) of these are given, the points have them added already.
+
+    :raises ExperimentError: a wrong table, unknown probes, or points far outside the volume.
+    """
+    d = len(volume.lower)
+    there = header_names(source)
+    texts = tuple(name for name in (*NAMING, PROBE) if name in there)
+    rows = read_table(source, texts, AXES[:d])
+    points = np.array([row.lengths for row in rows])
+    messages: list[Message] = []
+    known = {name: k for k, name in enumerate(probes)}
+    given = [probe] * len(rows)
+    if PROBE in texts:
+        given = [row.texts[texts.index(PROBE)] for row in rows]
+    for row, name in zip(rows, given, strict=True):
+        if name not in known and len(messages) < MOST_MESSAGES:
+            messages.append(row.mark.message("", f'unknown probe "{name}"; {hint(name, known)}'))
+    for i, axis in np.argwhere(volume.far_outside(points)).tolist():
+        text = f"{AXES[axis]} is {points[i, axis]:.6g} m, far outside the volume; check the unit"
+        messages.append(rows[i].mark.message("", text))
+        if len(messages) >= MOST_MESSAGES:
+            messages.append(rows[i].mark.message("", MORE_ERRORS))
+            break
+    if messages:
+        raise ExperimentError(messages)
+    named = [k for k, name in enumerate(texts) if name in NAMING]
+    names = tuple(" ".join(row.texts[k] for k in named) for row in rows)
+    indices = np.array([known[name] for name in given], np.int64)
+    if offsets is not None:
+        points = points - offsets[indices]
+    return GivenPoints(points, names, indices, tuple(row.mark for row in rows))
+
+
+def ensure_points(points: object, volume: Volume) -> Array:
+    """Points (n, d) in metres that a user gives as arrays.
+
+    :raises ValueError: they are of another shape, or far outside the volume.
+
+    >>> ensure_points([[1.0, 2.0, 3.0]], Volume(np.zeros(2), np.ones(2)))
+    Traceback (most recent call last):
+    ValueError: points of shape (1, 3); expected (n, 2)
+    """
+    d = len(volume.lower)
+    try:
+        given = np.asarray(points, float)
+    except (TypeError, ValueError):
+        words = f"numbers in metres, {d} for each point"
+        raise ValueError(f"points={shorten(repr(points))}; give {words}") from None
+    if given.ndim != 2 or given.shape[1] != d:
+        raise ValueError(f"points of shape {given.shape}; expected (n, {d})")
+    if not np.isfinite(given).all():
+        raise ValueError("points have co-ordinates that are no finite numbers; leave these out")
+    for i, axis in np.argwhere(volume.far_outside(given)).tolist():
+        told = f"{AXES[axis]} = {given[i, axis]:.6g} m of points[{i}] is far outside the volume"
+        raise ValueError(f"{told}; give points in metres")
+    return given
+
+
+def probe_places(probe: object, known: tuple[str, ...], count: int) -> Integers:
+    """Indices (count,) of probes by the name of one, or of one for each point.
+
+    :raises TypeError: no name, and no names.
+    :raises ValueError: an unknown name, or another number of them.
+    """
+    ensure_type(Iterable, "the name of a probe, or one for each point", probe=probe)
+    asked = [probe] if isinstance(probe, str) else list(probe)  # type: ignore[call-overload]
+    for name in asked:
+        if name not in known:
+            raise ValueError(f'no probe "{name}"; {hint(name, known)}')
+    if len(asked) not in (1, count):
+        raise ValueError(f"{len(asked)} probes for {count} points")
+    return np.broadcast_to(np.array([known.index(name) for name in asked], np.int64), count)
+
+
+def read_pairs(source: Path | GivenText) -> tuple[tuple[tuple[str, str], ...], tuple[Mark, ...]]:
+    """Pairs of names of a CSV file with the columns first and second, and where each stands.
+
+    :raises ExperimentError: a wrong table.
+    """
+    rows = read_table(source, ("first", "second"), ())
+    return tuple((row.texts[0], row.texts[1]) for row in rows), tuple(row.mark for row in rows)

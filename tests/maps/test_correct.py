@@ -1,0 +1,250 @@
+"""Points and lengths by a map, against the error model written anew and differences of it."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pandas
+import pytest
+from ballplate.cli import main
+from ballplate.simulator.inputs.covariances import read_matrix
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+from tests.maps.kinds import FREE, fit_of, write_files
+from tests.reference import dense
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("correct")
+    write_files(found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def fitted() -> FittedMap:
+    """A map of everything: all determined, and an offset of a probe estimated."""
+    probes = bp.quickstart().with_(
+        {
+            "probes.right": {"offset": FREE["right"]["offset"], "standard_uncertainty": "10 um"},
+            "error_model.position_coefficients": 3,
+            "error_model.rotation_coefficients": 3,
+        }
+    )
+    return bp.fit(probes, bp.simulate(probes)).to_map()
+
+
+def written_anew(fitted: FittedMap, b: np.ndarray, x: np.ndarray, probe: int) -> np.ndarray:
+    """Corrected points by the reference's own error model, for all that the map holds."""
+    functions = dense.error_functions(3, 3)
+    reported = fitted.model.reported()
+    n, coefficients = len(fitted.values), reported.matrix @ b[: len(fitted.values)]
+    values = dict(zip(reported.names, coefficients, strict=True))
+    own = []
+    for one in functions:
+        wanted = [
+            values.get(f"{one.name} t^{k + 1}", values.get(f"{one.name} t", 0.0) if k == 0 else 0.0)
+            for k in range(one.coefficients - 1)
+        ]
+        own.append(np.linalg.lstsq(dense.monomial_matrix(one), np.array(wanted), rcond=None)[0])
+    offsets = fitted.probes.offsets.copy()
+    offsets[fitted.probes.free] = b[n:]
+    lower, upper = (np.array(one) for one in fitted.volume.corners)
+    p = np.repeat(offsets[probe][None], len(x), axis=0)
+    return x + dense.machine_error(functions, lower, upper, x, np.concatenate(own), p)
+
+
+def derivatives(fitted: FittedMap, function) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Central differences of a function of what the map holds."""
+    columns = []
+    for k, scale in enumerate(fitted.scale):
+        step = np.zeros(len(fitted.scale))
+        step[k] = 1e-4 * scale
+        ahead, behind = (function(fitted.estimates + sign * step) for sign in (1.0, -1.0))
+        columns.append((ahead - behind) / (2.0 * step[k]))
+    return np.stack(columns, axis=-1)
+
+
+def test_corrected_points_and_their_covariance(fitted: FittedMap) -> None:
+    x = np.random.default_rng(2).uniform(0.05, 0.95, (6, 3))
+    for probe in (0, 1):
+        name = fitted.probes.names[probe]
+        found = bp.correct(fitted, x, name)
+        right = written_anew(fitted, fitted.estimates, x, probe)
+        assert np.abs(found.points - right).max() < 1e-14
+        rows = derivatives(fitted, lambda b, k=probe: written_anew(fitted, b, x, k).ravel())
+        covariance = rows @ fitted.covariance @ rows.T
+        size = np.sqrt(np.diagonal(covariance))
+        assert (np.abs(found.covariance() - covariance) < 1e-7 * np.outer(size, size)).all()
+        blocks = covariance.reshape(6, 3, 6, 3)[np.arange(6), :, np.arange(6)]
+        assert np.allclose(found.blocks, blocks, rtol=1e-6, atol=1e-22)
+        k = found.coverage_factor
+        assert np.allclose(found.expanded_uncertainties.ravel(), k * size, rtol=1e-7)
+        # The correction is what is added to where the tip is by the scales.
+        tip = x + fitted.drawn_offsets[probe]
+        assert np.abs(tip + found.corrections - found.points).max() < 1e-15
+
+
+def test_lengths_between_points_of_different_probes(fitted: FittedMap) -> None:
+    x = np.array([[0.1, 0.2, 0.3], [0.8, 0.7, 0.2], [0.5, 0.1, 0.9]])
+    probes = [fitted.probes.names[k] for k in (0, 1, 1)]
+    found = bp.correct(fitted, x, probes, lengths=[(0, 1), (1, 2)], coverage_factor=3.0)
+
+    def lengths(b: np.ndarray) -> np.ndarray:
+        places = [written_anew(fitted, b, x[i : i + 1], k)[0] for i, k in enumerate((0, 1, 1))]
+        return np.array(
+            [np.linalg.norm(places[0] - places[1]), np.linalg.norm(places[1] - places[2])]
+        )
+
+    rows = derivatives(fitted, lengths)
+    right = np.sqrt(np.diagonal(rows @ fitted.covariance @ rows.T))
+    assert np.allclose([one.value for one in found.lengths], lengths(fitted.estimates), rtol=1e-14)
+    assert np.allclose([one.standard_uncertainty for one in found.lengths], right, rtol=1e-7)
+    tips = x + fitted.drawn_offsets[[0, 1, 1]]
+    assert found.lengths[0].read == pytest.approx(np.linalg.norm(tips[0] - tips[1]), rel=1e-15)
+    # The scatter of both readings adds to the variance.
+    scattered = bp.correct(fitted, x, probes, lengths=[(0, 1)], with_repeatability=True)
+    added = 2.0 * (fitted.sigma * fitted.repeatability[0]) ** 2
+    variance = scattered.lengths[0].standard_uncertainty ** 2
+    assert variance == pytest.approx(right[0] ** 2 + added, rel=1e-7)
+    assert np.allclose(
+        scattered.blocks - found.blocks, 0.5 * added * np.eye(3), rtol=1e-9, atol=1e-24
+    )
+
+
+def test_centres_of_balls_are_taken_back_to_the_scales(fitted: FittedMap) -> None:
+    x = np.array([[0.1, 0.2, 0.3], [0.8, 0.7, 0.2]])
+    for name, stated in zip(fitted.probes.names, fitted.drawn_offsets, strict=True):
+        centres = bp.correct(fitted, x + stated, name, coordinates="ball centres")
+        assert np.abs(centres.points - bp.correct(fitted, x, name).points).max() < 1e-16 * 4
+
+
+def test_what_is_undetermined_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fit = fit_of("deficient", folder)
+    bp.write_map(fit.to_map(), folder / "open.yaml")
+    points = folder / "points.csv"
+    points.write_text("name,x_mm,y_mm,z_mm\nA,100,200,300\nB,400,200,300\n")
+    known = fit.correct([[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], "right").standard_uncertainties
+    assert np.isnan(known).any() and not np.isnan(known).all()
+    out = folder / "open.csv"
+    status = main(
+        [
+            "correct",
+            str(folder / "open.yaml"),
+            str(points),
+            "--length",
+            "A",
+            "B",
+            "-o",
+            str(out),
+            "--probe",
+            "right",
+        ]
+    )
+    told = capsys.readouterr().out
+    assert status == 1
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    for k, row in enumerate(rows):
+        for axis, letter in enumerate("xyz"):
+            u = row[f"U_{letter}_um"]
+            assert (u == "") == (row[f"{letter}_mm"] == "") == bool(np.isnan(known[k, axis]))
+            assert u == "" or float(u) == pytest.approx(2e6 * known[k, axis], rel=1e-9)
+    assert told.count("undetermined") >= 2 * int(np.isnan(known).sum())
+    assert "nan" not in told
+
+
+def test_the_command_writes_what_python_gives(
+    fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bp.write_map(fitted, tmp_path / "map.yaml")
+    table = pandas.DataFrame(
+        {
+            "name": ["A", "B", "C"],
+            "probe": [fitted.probes.names[k] for k in (0, 1, 0)],
+            "x_in": [4.0, 20.0, 41.0],
+            "y_in": [5.0, 6.0, 7.0],
+            "z_in": [8.0, 9.0, 10.0],
+        }
+    )
+    table.to_csv(tmp_path / "points.csv", index=False)
+    (tmp_path / "pairs.csv").write_text("first,second\nA,B\nB,C\n")
+    outputs = ["-o", str(tmp_path / "out.csv"), "--covariance", str(tmp_path / "covariance.csv")]
+    arguments = ["correct", str(tmp_path / "map.yaml"), str(tmp_path / "points.csv"), *outputs]
+    lengths = ["--lengths", str(tmp_path / "pairs.csv"), "--length", "A", "C"]
+    assert main([*arguments, *lengths, "--json"]) == 0
+    captured = capsys.readouterr()
+    data = json.loads(captured.out)
+    found = bp.correct(fitted, table, lengths=[("A", "B"), ("B", "C"), ("A", "C")])
+    x = 0.0254 * table[["x_in", "y_in", "z_in"]].to_numpy()
+    assert np.allclose(found.points, bp.correct(fitted, x, list(table["probe"])).points, rtol=1e-15)
+    assert [one["name"] for one in data["lengths"]] == ["A to C", "A to B", "B to C"]
+    by_name = {one.name: one for one in found.lengths}
+    for one in data["lengths"]:
+        assert one["value"] == pytest.approx(by_name[one["name"]].value, rel=1e-14)
+        right = by_name[one["name"]].standard_uncertainty
+        assert one["standard_uncertainty"] == pytest.approx(right, rel=1e-9)
+    assert np.allclose([one["point"] for one in data["points"]], found.points, rtol=1e-14)
+    assert [one["outside"] for one in data["points"]] == [False, False, True]
+    assert "1 of 3 points lie outside the volume of the map" in captured.err
+    with (tmp_path / "out.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["outside"] for row in rows] == ["no", "no", "yes"]
+    assert float(rows[1]["x_mm"]) == pytest.approx(1e3 * found.points[1, 0], rel=1e-14)
+    written = read_matrix(tmp_path / "covariance.csv")
+    assert np.allclose(written.values, found.covariance(), rtol=1e-12, atol=1e-24)
+
+
+def test_tasks_of_an_experiment(fitted: FittedMap, tmp_path: Path) -> None:
+    ends = {"from": ["100 mm", "200 mm", "300 mm"], "to": ["700 mm", "200 mm", "300 mm"]}
+    task = {"name": "long", **ends, "target_uncertainty": "1 um"}
+    experiment = bp.quickstart().with_(
+        {"evaluation": {"tasks": [task, {**task, "name": "tight", "target_uncertainty": "1 nm"}]}}
+    )
+    from ballplate.results.correction import correction
+    from ballplate.results.wanted_lengths import tasks_of_experiment
+    from ballplate.simulator.readings.point_files import GivenPoints
+
+    nothing = GivenPoints(np.zeros((0, 3)), (), np.zeros(0, np.int64))
+    found = correction(fitted, nothing, tasks_of_experiment(fitted, experiment))
+    x = [[0.1, 0.2, 0.3], [0.7, 0.2, 0.3]]
+    right = bp.correct(fitted, x, lengths=[(0, 1)]).lengths[0]
+    assert [one.value for one in found.lengths] == [right.value, right.value]
+    assert [one.is_met for one in found.lengths] == [True, False]
+
+
+POINTS = "name,x_mm,y_mm,z_mm\nA,100,200,300\nB,400,200,300\nA,1,2,3\n"
+SLIPS = {
+    "unknown name": (POINTS, ["--length", "B", "C"], 2, 'no point is called "C"'),
+    "name twice": (POINTS, ["--length", "B", "A"], 2, '2 points are called "A"'),
+    "unknown probe": (POINTS, ["--probe", "up"], 2, 'no probe "up" in the map'),
+    "unit": (POINTS.replace("_mm", "_m"), [], 3, ":2:1: x is 100 m, far outside the volume"),
+    "no number": (POINTS.replace("400", "4OO"), [], 3, ':3:3: "4OO" is not a number'),
+    "no axis": ("x_mm,y_mm\n1,2\n", [], 3, "no column for z"),
+    "same place": (POINTS + "D,1,2,3\nE,1,2,3\n", ["--length", "D", "E"], 2, "same place"),
+}
+
+
+@pytest.mark.parametrize("case", SLIPS)
+def test_slips_are_told(
+    case: str, fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, options, status, told = SLIPS[case]
+    bp.write_map(fitted, tmp_path / "map.npz")
+    (tmp_path / "points.csv").write_text(text)
+    arguments = ["correct", str(tmp_path / "map.npz"), str(tmp_path / "points.csv"), *options]
+    assert main(arguments) == status
+    assert told in capsys.readouterr().err
+
+
+def test_few_degrees_of_freedom_are_told(folder: Path) -> None:
+    fitted = replace(
+        fit_of("metric", folder).to_map(), degrees_of_freedom=5, sigma_is_estimated=True
+    )
+    found = bp.correct(fitted, [[0.1, 0.1]])
+    assert any("degrees of freedom is itself uncertain by" in one for one in found.warnings)

@@ -1,0 +1,291 @@
+"""A map as prior of a next campaign: the same as both campaigns evaluated together."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.sweeps.fingerprint import fingerprint
+
+from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files
+
+CALIBRATION = IN_SPACE["calibration"][0]
+# Readings to far less than the machine's errors make everything linear.
+SMALL = {"kind": "random", "position": "1 um", "rotation": "1 urad", "seed": 3}
+
+
+class Campaigns:
+    """Two campaigns of one machine with a plate each, and both as one experiment."""
+
+    def __init__(self, kind: str, folder: Path, probes: dict[str, Any] | None = None) -> None:
+        self.base = MODELS[kind][0]
+        self.folder = folder
+        write_files(folder)
+        truth = {"kind": "zero"} if kind == "python" else SMALL
+        self.common = {
+            "error_model": model_of(kind, folder),
+            "sigma": "given",
+            "true_machine": truth,
+        }
+        if probes is not None:
+            self.common |= {"probes": probes}
+        places = self.base["positions"]
+        self.first = [{**one, "artefact": "A"} for one in places[1 if len(places) > 3 else 0 :]]
+        self.second = [
+            {**one, "name": f"again {one['name']}", "artefact": "B"}
+            for k, one in enumerate(places)
+            if k != 1
+        ]
+        self.joint = self.experiment("AB", [*self.first, *self.second])
+        self.readings = bp.simulate(self.joint, 7)
+        self.of_first = self.readings["position"].isin([one["name"] for one in self.first])
+
+    def experiment(self, plates: str, positions: Any, **more: Any) -> bp.Experiment:
+        sections = {
+            **self.base,
+            **self.common,
+            "artefacts": {name: self.base["artefacts"]["plate"] for name in plates},
+            "positions": positions,
+            "calibration": [{**CALIBRATION, "artefact": name} for name in plates],
+        }
+        return bp.experiment({**sections, **more}, self.folder)
+
+    def map_of_first(self, date: str | None = None) -> FittedMap:
+        fit = bp.fit(self.experiment("A", self.first), self.readings[self.of_first])
+        bp.write_map(fit.to_map(date), self.folder / "first.yaml")
+        return fit.to_map()
+
+    def fit_of_second(self, priors: Any = None, **more: Any) -> FittedMap:
+        if priors is not None:
+            more["priors"] = [{"kind": "map", "file": "first.yaml", **priors}]
+        experiment = self.experiment("B", self.second, **more)
+        return bp.fit(experiment, self.readings[~self.of_first]).to_map()
+
+    def both(self) -> FittedMap:
+        return bp.fit(self.joint, self.readings).to_map()
+
+
+def determined(fitted: FittedMap, undetermined: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates and covariance in metres, across directions that are undetermined."""
+    null = undetermined / fitted.scale[:, None]
+    across = np.linalg.qr(np.hstack([null, np.eye(len(null))]))[0][:, null.shape[1] :]
+    covariance = fitted.covariance / np.outer(fitted.scale, fitted.scale)
+    return across.T @ (fitted.estimates / fitted.scale), across.T @ covariance @ across
+
+
+# Cheap ones in every run.
+KINDS = [
+    "metric",
+    "plane",
+    "machine file",
+    *(
+        pytest.param(kind, marks=pytest.mark.long)
+        for kind in ("spatial metric", "kinematic", "empirical", "python")
+    ),
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_map_as_prior_equals_both_campaigns_together(kind: str, tmp_path: Path) -> None:
+    campaigns = Campaigns(kind, tmp_path)
+    first = campaigns.map_of_first()
+    found, alone, right = campaigns.fit_of_second({}), campaigns.fit_of_second(), campaigns.both()
+    assert found.undetermined.shape == right.undetermined.shape
+    assert first.undetermined.shape[1] >= right.undetermined.shape[1]
+    values, covariance = determined(found, right.undetermined)
+    true_values, true_covariance = determined(right, right.undetermined)
+    spread = np.sqrt(np.diagonal(true_covariance))
+    assert (np.abs(values - true_values) < 1e-3 * spread).all()
+    assert (np.abs(covariance - true_covariance) < 1e-3 * np.outer(spread, spread)).all()
+    # The prior has told something: it is no mere copy of the second campaign.
+    _, without = determined(alone, right.undetermined)
+    assert np.diagonal(covariance).sum() < 0.9 * np.diagonal(without).sum()
+
+
+def test_estimated_offsets_of_probes_count_where_they_are_kept(tmp_path: Path) -> None:
+    unknown = FREE | {"right": {"offset": FREE["right"]["offset"], "unknown": True}}
+    campaigns = Campaigns("spatial metric", tmp_path, FREE)
+    campaigns.map_of_first()
+    right = campaigns.both()
+    # What was known of the offset beforehand is in the map, and counts once.
+    kept = campaigns.fit_of_second({"offsets": True}, probes=unknown)
+    spread = right.standard_uncertainties()
+    assert len(spread) == 9
+    assert (np.abs(kept.estimates - right.estimates) < 1e-3 * spread).all()
+    assert np.allclose(kept.standard_uncertainties(), spread, rtol=1e-3)
+    forgotten = campaigns.fit_of_second({}, probes=unknown)
+    assert (forgotten.standard_uncertainties()[6:] > 1.2 * spread[6:]).all()
+
+
+@pytest.mark.parametrize(
+    ("stated", "years"),
+    [
+        ({"inflation": 2.5}, 0.0),
+        ({"drift_per_year": "0.4 um", "years": 2.0}, 2.0),
+        ({"drift_per_year": "0.4 um", "date": "2027-11-22", "inflation": 1.5}, 365.0 / 365.25),
+    ],
+)
+def test_age_enlarges_what_the_map_tells(stated: Any, years: float, tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    first, alone = campaigns.map_of_first("2026-11-22"), campaigns.fit_of_second()
+    found = campaigns.fit_of_second(stated)
+    # Two independent estimates, by the textbook.
+    drifted = np.diag((0.4e-6 * years * first.scale) ** 2)
+    known = np.linalg.inv(stated.get("inflation", 1.0) ** 2 * first.covariance + drifted)
+    own = np.linalg.inv(alone.covariance)
+    covariance = np.linalg.inv(known + own)
+    values = covariance @ (known @ first.estimates + own @ alone.estimates)
+    spread = np.sqrt(np.diagonal(covariance))
+    assert (np.abs(found.estimates - values) < 1e-3 * spread).all()
+    assert (np.abs(found.covariance - covariance) < 1e-3 * np.outer(spread, spread)).all()
+
+
+def test_priors_are_as_many_as_the_map_determines(tmp_path: Path) -> None:
+    campaigns = Campaigns("kinematic", tmp_path)
+    first = campaigns.map_of_first()
+    with_map = campaigns.experiment(
+        "B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}]
+    )
+    open_ = first.undetermined.shape[1]
+    assert open_ > 0
+    assert len(with_map.priors) == len(first.estimates) - open_
+    rows = np.array([one.by_model for one in with_map.priors])
+    assert np.abs(rows @ first.undetermined).max() < 1e-9
+    uncertainties = np.array([one.standard_uncertainty for one in with_map.priors])
+    # Not correlated with one another, and with the uncertainties that they state.
+    assert np.allclose(
+        rows @ first.covariance @ rows.T, np.diag(uncertainties**2), rtol=1e-6, atol=1e-21
+    )
+
+
+def test_plans_and_trials_know_the_map(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    campaigns.map_of_first()
+    with_map = campaigns.experiment(
+        "B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}]
+    )
+    found = bp.run(with_map, trials=4, seed=1, workers=1)
+    assert (
+        found.quantities["U6"].average
+        < bp.run(campaigns.experiment("B", campaigns.second)).quantities["U6"].average
+    )
+    assert found.monte_carlo is not None
+
+
+CASES = {
+    "volume": (
+        {"machine": IN_SPACE["machine"] | {"volume": ["500 mm", "500 mm", "600 mm"]}},
+        "its volume goes from 0 mm to 500 mm in z, but machine.volume from 0 mm to 600 mm",
+    ),
+    "model": (
+        {"error_model": {"kind": "empirical"}},
+        "is of another error model (parameters differ",
+    ),
+    "file": ({"priors": [{"kind": "map", "file": "none.yaml"}]}, "there is no such file"),
+    "age": (
+        {"priors": [{"kind": "map", "file": "first.yaml", "drift_per_year": "1 um"}]},
+        "needs the time between both campaigns",
+    ),
+    "no date": (
+        {
+            "priors": [
+                {
+                    "kind": "map",
+                    "file": "first.yaml",
+                    "drift_per_year": "1 um",
+                    "date": "2027-01-01",
+                }
+            ]
+        },
+        "the map states no date",
+    ),
+    "no drift": (
+        {"priors": [{"kind": "map", "file": "first.yaml", "years": 1}]},
+        "an age needs a drift",
+    ),
+    "slip": (
+        {"priors": [{"kind": "map", "file": "first.yaml", "inflat": 1}]},
+        "inflat: unknown key",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_prior_that_does_not_fit_is_refused(case: str, tmp_path: Path) -> None:
+    more, text = CASES[case]
+    campaigns = Campaigns("spatial metric", tmp_path)
+    campaigns.map_of_first()
+    priors = {"priors": [{"kind": "map", "file": "first.yaml"}]}
+    with pytest.raises(bp.ExperimentError) as refusal:
+        lay_out(campaigns.experiment("B", campaigns.second, **{**priors, **more}))
+    assert text in str(refusal.value)
+    assert "priors[0]" in str(refusal.value)
+
+
+def test_a_map_of_a_plane_is_refused_in_space(tmp_path: Path) -> None:
+    campaigns = Campaigns("metric", tmp_path)
+    campaigns.map_of_first()
+    in_space = Campaigns("spatial metric", tmp_path)
+    with pytest.raises(bp.ExperimentError, match="is of 2 axes, but machine.volume of 3"):
+        in_space.fit_of_second({})
+    assert len(IN_PLANE["machine"]["volume"]) == 2
+
+
+def test_a_map_without_scatter_is_no_prior(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    exact = campaigns.experiment("A", campaigns.first, sigma="estimated")
+    fitted = bp.fit(exact, bp.simulate(exact, exact=True)).to_map()
+    bp.write_map(fitted, tmp_path / "first.yaml")
+    with pytest.raises(bp.ExperimentError, match="states no uncertainty, as that of readings"):
+        campaigns.fit_of_second({})
+    assert "agree with its model but for rounding" in bp.correct(fitted, [[0.1, 0.1, 0.1]]).notes[0]
+
+
+def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    campaigns.map_of_first()
+    design = lay_out(
+        campaigns.experiment("B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}])
+    )
+    (priors,) = (one for one in design.observations if one.word == "prior")
+    assert {priors.unit(design, k) for k in range(len(priors))} == {"m"}
+    names = {priors.name(design, k) for k in range(len(priors))}
+    assert len(names) == 6
+    assert all(one.startswith("prior of first.yaml, combination ") for one in names)
+
+
+def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Path) -> None:
+    write_files(tmp_path)
+    experiment = bp.experiment(IN_SPACE | {"error_model": model_of("python", tmp_path)}, tmp_path)
+    for name in ("own.yaml", "own.npz"):
+        bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / name)
+        sections = IN_SPACE | {
+            "error_model": {"kind": "metric"},
+            "true_machine": {"kind": "map", "file": name},
+        }
+        (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
+        assert load(tmp_path / "file.yaml")
+        with pytest.raises(bp.ExperimentError, match="true_machine.file: is the map of an error"):
+            load(tmp_path / "file.yaml", with_modules=False)
+
+
+def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
+    campaigns = Campaigns("spatial metric", tmp_path)
+    fitted = campaigns.map_of_first()
+
+    def told(**truth: Any) -> str:
+        more = {"true_machine": {"kind": "map", "file": "first.yaml", **truth}}
+        return fingerprint(campaigns.experiment("B", campaigns.second, **more))
+
+    before = told()
+    assert before == told() != told(draw=1)
+    bp.write_map(replace(fitted, values=1.01 * fitted.values), tmp_path / "first.yaml")
+    assert told() != before

@@ -1,0 +1,88 @@
+"""Maps of fits, written and read again: every number to the bit, for every kind of error model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+
+from tests.maps.kinds import MODELS, fit_of, write_files
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("maps")
+    write_files(found)
+    return found
+
+
+@pytest.mark.parametrize("name", ["map.yaml", "map.npz"])
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_map_is_read_as_it_was_written(kind: str, name: str, folder: Path) -> None:
+    fitted = fit_of(kind, folder).to_map("2026-11-22")
+    # In another folder, from which files of models are found, too.
+    path = folder / "below" / name
+    path.parent.mkdir(exist_ok=True)
+    bp.write_map(fitted, path)
+    again = bp.load_map(path)
+    for attribute in (
+        "values",
+        "covariance",
+        "undetermined",
+        "repeatability",
+        "estimates",
+        "scale",
+    ):
+        assert np.array_equal(getattr(again, attribute), getattr(fitted, attribute)), attribute
+    assert np.array_equal(again.probes.offsets, fitted.probes.offsets)
+    assert np.array_equal(again.probes.free, fitted.probes.free)
+    assert again.volume.corners == fitted.volume.corners
+    assert again.parameters == fitted.parameters
+    for attribute in [
+        "title",
+        "sigma",
+        "sigma_is_estimated",
+        "degrees_of_freedom",
+        "coverage_factor",
+        "frame",
+        "temperatures",
+        "left_out",
+        "data",
+        "experiment",
+        "program",
+        "date",
+        "probe",
+    ]:
+        assert getattr(again, attribute) == getattr(fitted, attribute), attribute
+    before = path.read_bytes()
+    bp.write_map(again, path)
+    assert name.endswith(".npz") or path.read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_map_corrects_as_its_fit(kind: str, folder: Path) -> None:
+    from ballplate.simulator.maps.corrected_points import corrected_with_root
+
+    fit = fit_of(kind, folder)
+    fitted = fit.to_map()
+    lower, upper = fitted.volume.corners
+    points = np.random.default_rng(3).uniform(lower, upper, (40, fitted.dimension))
+    points[0] = lower
+    for k, probe in enumerate(fitted.probes.names):
+        known = fit.correct(points, probe)
+        places, root = corrected_with_root(fitted, points, k)
+        assert np.abs(places - known.points).max() < 1e-15
+        found, right = np.linalg.norm(root, axis=2), known.standard_uncertainties
+        assert np.array_equal(np.isnan(found), np.isnan(right))
+        assert np.nanmax(np.abs(found - right), initial=0.0) < 1e-9 * np.nanmax(right, initial=1e-9)
+
+
+def test_uncertainties_of_parameters_are_those_of_the_fit(folder: Path) -> None:
+    for kind in MODELS:
+        fit = fit_of(kind, folder)
+        fitted = fit.to_map()
+        known = {one.name: one.standard_uncertainty for one in fit.estimates}
+        right = [known[one.name] for one in fitted.parameters]
+        assert np.allclose(fitted.standard_uncertainties(), right, rtol=1e-9, equal_nan=True), kind
