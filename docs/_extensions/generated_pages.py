@@ -145,7 +145,7 @@ def _table(part: Schema, whole: Schema, sections: dict[str, list[str]]) -> list[
     )
     lines = ["| key | value | default | meaning |", "|---|---|---|---|"]
     for name, below in part["properties"].items():
-        if "default" in below and below["default"] not in ([], {}):
+        if "default" in below and below["default"] not in ([], {}, ""):
             default = f"`{_written(below['default'])}`"
         else:
             default = "*required*" if name in required else ""

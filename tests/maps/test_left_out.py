@@ -51,6 +51,7 @@ def test_every_estimate_is_held_or_left_out_by_name(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.long
 def test_the_marginal_of_the_machine_counts_what_is_left_out() -> None:
     """Uncertainties of the map are those beside the estimated influences, not with these held."""
     experiment = with_influences(TEMPERATURE)

@@ -128,8 +128,8 @@ def test_estimated_offsets_of_probes_count_where_they_are_kept(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("stated", "years"),
     [
-        ({"inflation": 2.5}, 0.0),
-        ({"drift_per_year": "0.4 um", "years": 2.0}, 2.0),
+        pytest.param({"inflation": 2.5}, 0.0, marks=pytest.mark.long),
+        pytest.param({"drift_per_year": "0.4 um", "years": 2.0}, 2.0, marks=pytest.mark.long),
         ({"drift_per_year": "0.4 um", "date": "2027-11-22", "inflation": 1.5}, 365.0 / 365.25),
     ],
 )

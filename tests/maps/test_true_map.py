@@ -40,6 +40,7 @@ def test_error_free_readings_of_a_map_give_it_back(kind: str, folder: Path) -> N
     assert np.abs(apart - null @ (null.T @ apart)).max() < 1e-12
 
 
+@pytest.mark.long
 def test_machines_are_drawn_within_the_covariance(folder: Path) -> None:
     fitted = fit_of("spatial metric", folder).to_map()
     bp.write_map(fitted, folder / "drawn.yaml")
