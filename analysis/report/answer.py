@@ -1,4 +1,4 @@
-"""Answer of a sweep: which settings meet the target, which of them takes fewest observations, and
+"""SweepAnswer of a sweep: which settings meet the target, which of them takes fewest observations, and
 what each axis changes while the others stay.
 """
 
@@ -43,7 +43,7 @@ class AxisWorth:
 
 
 @dataclass(frozen=True)
-class Answer:
+class SweepAnswer:
     """Sentences, the settings that they are about, and what each axis is worth."""
 
     sentences: tuple[str, ...]
@@ -51,7 +51,7 @@ class Answer:
     worth: tuple[AxisWorth, ...]
 
 
-def answer(results: ReportedSweep) -> Answer | None:
+def answer(results: ReportedSweep) -> SweepAnswer | None:
     """The answer of a sweep; None where nothing is done or recorded that cells are judged by."""
     judged = criterion(results)
     done = np.flatnonzero(results.done)
@@ -85,7 +85,7 @@ def answer(results: ReportedSweep) -> Answer | None:
             f"{len(results.cells) - len(done)} of {len(results.cells)} settings are not computed;"
             " the answer is that of the others."
         )
-    return Answer(
+    return SweepAnswer(
         tuple(sentences),
         _table(results, done[order[:LISTED]], column, symbol),
         tuple(_worths(results, column, done[~partly & np.isfinite(value)])),
