@@ -22,8 +22,8 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *("check", "run", "budget", "plan", "sheet", "next", "reach", "lengths", "reliability"),
-    *("simulate", "import", "fit", "ladder", "validate", "certificate"),
+    *("check", "run", "budget", "studio", "plan", "sheet", "next", "reach", "lengths"),
+    *("reliability", "simulate", "import", "fit", "ladder", "validate", "certificate"),
     *("correct", "curves", "compensation", "convert", "diff", "adjust", "compare"),
     *("sweep", "export", "report", "map"),
     *("spline", "reproduce", "schema", "init"),

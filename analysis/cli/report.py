@@ -6,10 +6,15 @@ import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .export import add_store, warn_of_damage, warn_of_other_methods
 from .outputs import PAGE, UsageError, add_force, add_output, write
 from .telling import complain
+
+if TYPE_CHECKING:
+    from ..report.results import ReportedSweep
+    from ..report.store_comparison import StoreComparison
 
 BAD_FILE = 3
 
@@ -54,6 +59,13 @@ def add_options(parser: ArgumentParser) -> None:
         help="run the sweep's error models in Python, which drawings of its designs need",
     )
 
+    parser.add_argument(
+        "--compare",
+        metavar="STORE",
+        type=Path,
+        help="a store of a sweep over the same axes, to compare with on the page",
+    )
+
 
 def run(options: Namespace) -> int:
     """Write the report."""
@@ -71,6 +83,8 @@ def run(options: Namespace) -> int:
     if form == "html" and PAGE.is_missing:
         complain(f"ballplate report: {PAGE.told}")
         return BAD_FILE
+    if options.compare is not None and form != "html":
+        raise UsageError("--compare is for the page; leave it out, or name a page with -o")
     with closing(open_store(options.store)) as store:
         results = read_results(store, options.sweep)
         is_damaged = warn_of_damage(store.path, results.found, len(results.cells))
@@ -79,8 +93,9 @@ def run(options: Namespace) -> int:
             from ..report.page import page
             from .progress import progress
 
+            comparison = _comparison(results, options.compare)
             with progress(options) as shown:
-                text = page(store, results, options.run_modules, shown.show)
+                text = page(store, results, options.run_modules, shown.show, comparison)
         else:
             from ..presentation.formats import FORMATS
             from ..report.tables import report_tables
@@ -95,3 +110,23 @@ def run(options: Namespace) -> int:
         content = text.encode("utf-8", "replace")
         write(options, {output: lambda path: path.write_bytes(content)})
     return BAD_FILE if is_damaged else 0
+
+
+def _comparison(results: ReportedSweep, path: Path | None) -> StoreComparison | None:
+    """The comparison with the newest sweep of another store; None where none is asked for.
+
+    :raises UsageError: it has nothing that can be compared.
+    """
+    if path is None:
+        return None
+    from ..report.results import read_results
+    from ..report.store_comparison import IncomparableError, compared
+    from ..sweeps.store import open_store
+
+    with closing(open_store(path)) as store:
+        other = read_results(store, None)
+        warn_of_damage(store.path, other.found, len(other.cells))
+        try:
+            return compared(results, other, path.name)
+        except IncomparableError as error:
+            raise UsageError(error) from None

@@ -26,11 +26,13 @@ from ..presentation.table import Block, Entry, Row, Table
 from ..sweeps.store import Store
 from ..uncertainty.error_map import error_map
 from ..uncertainty.quantities import DESCRIPTIONS
+from .answer import answer
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .plots import plot_svg
 from .results import ReportedSweep, best_and_worst, cell_list, criterion
 from .series import Plot, plots
+from .store_comparison import StoreComparison
 from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
 
@@ -67,10 +69,14 @@ class DrawnMap:
 
 
 def page(
-    store: Store, results: ReportedSweep, run_modules: bool = False, report: Report = unreported
+    store: Store,
+    results: ReportedSweep,
+    run_modules: bool = False,
+    report: Report = unreported,
+    comparison: StoreComparison | None = None,
 ) -> str:
     """The page. Experiments with code of their own are drawn only with `run_modules`; `report`
-    receives what is drawn.
+    receives what is drawn, and a `comparison` with another sweep follows the answer.
 
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
@@ -91,6 +97,8 @@ def page(
         "summary": _summary(results),
         "style": Markup(shipped("page.css")),
         "facts": _facts(results),
+        "answer": answer(results),
+        "comparison": comparison,
         "failures": failures(results),
         "tables": report_tables(results),
         "plots": _plots(drawn, report),
@@ -107,10 +115,12 @@ def page(
 
 def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
     known = [
+        ("answer", "Answer", context["answer"]),
+        ("comparison", "Compared with another sweep", context["comparison"]),
         ("swept", "What was swept", True),
-        ("uncertainties", "Uncertainties", context["tables"]),
         ("plots", "Along the axes", context["plots"]),
         ("heat", "Over two axes", context["heats"]),
+        ("uncertainties", "Uncertainties", context["tables"]),
         ("failed", "Failed cells", context["failures"].shown),
         ("rank", "What the readings determine", context["ranks"].shown),
         ("designs", "Designs", context["designs"] or context["no_designs"]),

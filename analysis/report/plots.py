@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 # are evenly spaced.
 WIDE = 30.0
 
+# Values of a line that are marked.
+MOST_MARKERS = 12
+
 # Letters of a legend's line.
 LEGEND = 54
 
@@ -65,8 +68,8 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     axes.set_ylabel(plot.unit)
     axes.grid(True)
     for k, line in enumerate(panel.lines):
-        _line(axes, line, k)
-    values = [np.concatenate([line.y, line.low, line.high, line.actual]) for line in panel.lines]
+        _line(axes, line, k, plot.is_scattered)
+    values = [np.concatenate([line.y, line.actual]) for line in panel.lines]
     finite = np.concatenate(values)
     finite = finite[np.isfinite(finite)]
     if len(finite) and finite.min() > 0 and finite.max() > WIDE * finite.min():
@@ -88,20 +91,10 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
         axes.set_xticks(numbers, [f"{value:.6g}" for value in numbers])
 
 
-def _line(axes: Axes, line: SeriesLine, k: int) -> None:
+def _line(axes: Axes, line: SeriesLine, k: int, is_scattered: bool) -> None:
     colour, marker = SERIES[k], MARKERS[k]
-    if len(line.low):
-        bars = np.stack([line.y - line.low, line.high - line.y])
-        axes.errorbar(
-            line.x,
-            line.y,
-            bars,
-            color=colour,
-            marker=marker,
-            markersize=3.5,
-            elinewidth=1.0,
-            capsize=2.5,
-        )
+    if is_scattered:
+        axes.plot(line.x, line.y, color=colour, linestyle="none", marker=".", markersize=3.0)
         return
     label = _wrapped(line.label) or "linearised"
     axes.plot(
@@ -109,7 +102,8 @@ def _line(axes: Axes, line: SeriesLine, k: int) -> None:
         line.y,
         color=colour,
         linestyle=DASHES[k],
-        marker=marker,
+        # Markers of many values would hide the line.
+        marker=marker if len(line.x) <= MOST_MARKERS else None,
         markerfacecolor=PAPER,
         label=label,
     )

@@ -47,16 +47,6 @@ class ReportAxis:
         """The name, with the unit where there is one."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
-    def groups(self, most: int) -> Integers:
-        """Place of each value among at most so many: neighbouring ones together where there are
-        more.
-        """
-        count = len(self.labels)
-        if count <= most:
-            return np.arange(count)
-        order = np.argsort(np.argsort(np.array(self.numbers), kind="stable"), kind="stable")
-        return np.asarray(order * most // count)
-
     @property
     def short_labels(self) -> tuple[str, ...]:
         """Labels without the unit that `title` has, and no longer than tells them apart."""

@@ -93,7 +93,8 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated. `experiment` is that which was fitted.
+    estimates had been stated. `experiment` is that which was fitted, from which a page of the fit
+    names its assumptions.
     """
 
     label: str

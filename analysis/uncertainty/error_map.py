@@ -48,13 +48,13 @@ class ErrorMap:
 
 
 @single_threaded
-def error_map(experiment: Experiment) -> ErrorMap:
-    """The error map's uncertainty with the probe with which the experiment is evaluated, at zero
-    machine error.
+def error_map(experiment: Experiment, nodes: int = POINTS) -> ErrorMap:
+    """The error map's uncertainty at `nodes` points along x and y, with the probe with which the
+    experiment is evaluated, at zero machine error.
     """
     design = lay_out(experiment)
     volume = design.machine.volume
-    x, y = (np.linspace(volume.lower[k], volume.upper[k], POINTS) for k in (0, 1))
+    x, y = (np.linspace(volume.lower[k], volume.upper[k], nodes) for k in (0, 1))
     levels: list[tuple[str, float | None]] = [("", None)]
     sides = [y, x]
     if design.dimension == 3:

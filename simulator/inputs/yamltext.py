@@ -106,6 +106,8 @@ def changed_data(data: Any, change: TextChange) -> Any:
     if isinstance(data, tuple):
         assert isinstance(step, int)
         items = list(data)
+        if not rest and change.kind == "remove":
+            return (*items[:step], *items[step + 1 :])
         items[step] = _one_changed(items[step], rest, change)
         return tuple(items)
     if not rest and change.kind == "remove":

@@ -234,7 +234,7 @@ def test_a_text_that_does_not_say_what_was_found_is_refused() -> None:
         {key: item for key, item in edit.value.items() if key != "quarter_turns"},
         {**edit.value, "quarter_turns": 2},
     ):
-        with pytest.raises(ExperimentError, match="cannot be written as it was found"):
+        with pytest.raises(ExperimentError, match="cannot be written as it was made"):
             mended(text, SOURCE, None, replace(repair, edits=(replace(edit, value=value),)))
 
 

@@ -182,7 +182,12 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
     assert len(text) < 1_000_000
     found = assert_accessible(text)
     assert "7800 cells more are not shown here; ballplate export gives all." in found.texts["p"]
-    assert any("Median, with bars" in one for one in found.texts["figcaption"])
+    # Lines of single cells for 6 of 20 values of a second axis, at the best cell's setting first.
+    assert any(
+        "c 1, the setting of the best cell; 6 of 20 values of b" in one
+        for one in found.texts["figcaption"]
+    )
+    assert not any("edian" in one for one in found.texts["figcaption"])
     groups = ranks(read_results(store, 1)).shown
     assert [group.count for group in groups] == [1600, 6400] and "amounts of cell 0" in groups[
         0

@@ -222,7 +222,7 @@ def _parser() -> argparse.ArgumentParser:
 
 @cache
 def grammar() -> Grammar:
-    """Options and arguments of every command."""
+    """Options and arguments of every command that ends by itself."""
     commands = next(
         one for one in _parser()._actions if isinstance(one, argparse._SubParsersAction)
     )
@@ -231,7 +231,12 @@ def grammar() -> Grammar:
             action for action in command._actions if not isinstance(action, argparse._HelpAction)
         )
         for name, command in commands.choices.items()
+        if name not in SERVING
     }
+
+
+# Commands that run until they are interrupted.
+SERVING = {"studio"}
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from ...rank.verdict import Verdict
 from ...results.study import check
 from .changes import apply_all
 from .repair_search import Repair, Repairs
-from .written import edits, position_settings
+from .written import Edit, edits, position_settings
 
 PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
@@ -54,30 +54,16 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
     :raises ExperimentError: the repair cannot be written without changing what stands about it, or
         what others refer to.
     """
-    before = {one.name: one for one in load(source, planning=True, text=text)}
-    experiment = before[variant]
+    (experiment,) = (one for one in load(source, planning=True, text=text) if one.name == variant)
     changed = apply_all(repair.changes, experiment)
-    new = text
-    # A variant with more entries of a list has a list of its own, in which the others are changed.
-    changes = sorted(_changes(experiment, changed, repair), key=lambda one: len(one.steps))
-    for change in changes:
-        for one in _in_file(parse_tree(new, str(source)), variant, change):
-            new = with_changes(new, str(source), [one])
-    after = {one.name: one for one in load(source, planning=True, text=new)}
-    others_differ = before.keys() != after.keys() or any(
-        to_python(before[name].tree) != to_python(one.tree)
-        for name, one in after.items()
-        if name != variant
+    # Nothing is left undetermined, whatever the file expected until now.
+    extra = (
+        [TextChange(("expected_rank_deficiency",), 0)]
+        if experiment.expected_rank_deficiency
+        else []
     )
+    new = with_experiment(text, source, experiment, changed, repair.edits, extra)
     (checked,) = (one for one in load(source, text=new) if one.name == variant)
-    if others_differ or edits(after[variant], changed) or edits(changed, after[variant]):
-        raise ExperimentError(
-            [
-                experiment.message(
-                    (), "the repair cannot be written as it was found; write it by hand"
-                )
-            ]
-        )
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
         text = "the repaired file does not have the rank that was found; nothing is changed"
@@ -85,11 +71,63 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
     return new
 
 
-def _changes(experiment: Experiment, changed: Experiment, repair: Repair) -> Iterator[TextChange]:
+def with_experiment(
+    text: str,
+    source: Path,
+    experiment: Experiment,
+    changed: Experiment,
+    needed: Iterable[Edit] | None = None,
+    extra: Iterable[TextChange] = (),
+) -> str:
+    """The text of an experiment's file that says what has changed of it; what a variant does not
+    say itself is changed for that variant alone.
+
+    `needed` are the edits where these are known, and `extra` changes are made besides.
+
+    :raises ExperimentError: this cannot be written without changing what stands about it, or what
+        others refer to.
+    """
+    before = {one.name: one for one in load(source, planning=True, text=text)}
+    # A variant with more entries of a list has a list of its own, in which the others are changed.
+    changes = sorted(
+        [
+            *changes_of(experiment, edits(experiment, changed) if needed is None else needed),
+            *extra,
+        ],
+        key=lambda one: len(one.steps),
+    )
+    new = with_text_changes(text, source, experiment.name, changes)
+    after = {one.name: one for one in load(source, planning=True, text=new)}
+    others_differ = before.keys() != after.keys() or any(
+        to_python(before[name].tree) != to_python(one.tree)
+        for name, one in after.items()
+        if name != experiment.name
+    )
+    written_as = after.get(experiment.name, experiment)
+    if others_differ or edits(written_as, changed) or edits(changed, written_as):
+        text = "the change cannot be written as it was made; write it by hand"
+        raise ExperimentError([experiment.message((), text)])
+    return new
+
+
+def with_text_changes(
+    text: str, source: Path, variant: str | None, changes: Iterable[TextChange]
+) -> str:
+    """The text with changes of what it says of a variant, or of its only experiment.
+
+    :raises ExperimentError: as `with_experiment` does.
+    """
+    for change in changes:
+        for one in _in_file(parse_tree(text, str(source)), variant, change):
+            text = with_changes(text, str(source), [one])
+    return text
+
+
+def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextChange]:
     """What the experiment's own file would have to say otherwise, of a variant's its tree."""
     said = to_python(experiment.tree)
     places = {place.name: place for place in experiment.positions}
-    for edit in repair.edits:
+    for edit in needed:
         if edit.steps[0] == "positions" and not edit.is_new:
             name = str(edit.steps[1])
             at = next(i for i, one in enumerate(said["positions"]) if str(one["name"]) == name)
@@ -98,8 +136,6 @@ def _changes(experiment: Experiment, changed: Experiment, repair: Repair) -> Ite
             yield from _of_position(steps, said["positions"][at], settings, edit.value)
         else:
             yield TextChange(edit.steps, edit.value, "append" if edit.is_new else "set")
-    if experiment.expected_rank_deficiency:
-        yield TextChange(("expected_rank_deficiency",), 0)
 
 
 def _of_position(

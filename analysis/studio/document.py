@@ -1,0 +1,180 @@
+"""A design file while it is changed: its text, the steps back and forward, and saving it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.yamltree import parse_tree, read_bytes, read_text, to_python
+
+# Texts before the present one that are kept.
+MOST_STEPS = 200
+
+BYTE_ORDER_MARK = "\ufeff"
+
+
+class ChangedOnDiskError(Exception):
+    """The file is not as it was when it was read or written last."""
+
+
+@dataclass(frozen=True)
+class DesignDocument:
+    """A design file and its text, which need not be saved.
+
+    `content` is what the file held when it was read or written last, None where there was none
+    yet. `back` and `forward` are texts that undoing and redoing lead to, the next one last.
+    `with_modules` says whether error models in Python may be run, since the user has opened the
+    file by name.
+    """
+
+    path: Path
+    variant: str | None
+    text: str
+    content: bytes | None
+    with_modules: bool = True
+    back: tuple[str, ...] = ()
+    forward: tuple[str, ...] = ()
+
+    @property
+    def is_saved(self) -> bool:
+        return self.content is not None and self.content == encoded(self)
+
+
+def opened(path: Path, variant: str | None = None, with_modules: bool = True) -> DesignDocument:
+    """The document of a file.
+
+    :raises ExperimentError: the file cannot be read as text.
+    """
+    text = read_text(path)
+    return DesignDocument(path, variant, text, read_bytes(path), with_modules)
+
+
+def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:
+    """The experiment that the text says.
+
+    :raises ExperimentError: the text is wrong, or has no such variant.
+    """
+    found = load(document.path, planning, document.with_modules, document.text)
+    for one in found:
+        if one.name == document.variant or len(found) == 1:
+            return one
+    names = ", ".join(str(one.name) for one in found)
+    raise refused(document.path, f"choose one of the variants: {names}", "variants")
+
+
+def data_of(document: DesignDocument) -> Any:
+    """What the text says, as plain data with what the variant changes; None where it is no YAML."""
+    try:
+        return to_python(experiment_of(document, planning=True).tree)
+    except ExperimentError:
+        pass
+    try:
+        return to_python(parse_tree(document.text, str(document.path)))
+    except ExperimentError:
+        return None
+
+
+def variants_of(document: DesignDocument) -> tuple[str, ...]:
+    """The names of the variants that the text has, none where it is wrong."""
+    try:
+        found = load(document.path, True, document.with_modules, document.text)
+    except ExperimentError:
+        return ()
+    return tuple(one.name for one in found if one.name is not None)
+
+
+def changed(document: DesignDocument, text: str) -> DesignDocument:
+    """The document with another text, and the present one a step back."""
+    if text == document.text:
+        return document
+    back = (*document.back, document.text)[-MOST_STEPS:]
+    return replace(document, text=text, back=back, forward=())
+
+
+def undone(document: DesignDocument) -> DesignDocument:
+    """One step back; the same where there is none."""
+    if not document.back:
+        return document
+    forward = (*document.forward, document.text)
+    return replace(document, text=document.back[-1], back=document.back[:-1], forward=forward)
+
+
+def redone(document: DesignDocument) -> DesignDocument:
+    """One step forward; the same where there is none."""
+    if not document.forward:
+        return document
+    back = (*document.back, document.text)
+    return replace(document, text=document.forward[-1], back=back, forward=document.forward[:-1])
+
+
+def encoded(document: DesignDocument) -> bytes:
+    """What the file is to hold, with the byte order mark that it had."""
+    mark = BYTE_ORDER_MARK.encode()
+    starts = document.content is not None and document.content.startswith(mark)
+    return (mark if starts else b"") + document.text.encode()
+
+
+def ensure_as_read(document: DesignDocument) -> None:
+    """Make sure that saving takes away nothing that others wrote.
+
+    :raises ChangedOnDiskError: the file holds something else than what was read or written last.
+    """
+    try:
+        found: bytes | None = document.path.read_bytes()
+    except FileNotFoundError:
+        found = None
+    if found != document.content:
+        name = document.path.name
+        how = "has been removed" if found is None else "has changed"
+        raise ChangedOnDiskError(
+            f"{name} {how} on disk since it was opened here; nothing was written: save under"
+            " another name, or open the file again"
+        )
+
+
+def reopened(document: DesignDocument) -> DesignDocument:
+    """The document as it is on disk now, with the present text a step back."""
+    found = opened(document.path, document.variant, document.with_modules)
+    return replace(changed(document, found.text), content=found.content)
+
+
+def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:
+    """Write the text into its file, or into a new one; what others wrote meanwhile stays.
+
+    :raises ChangedOnDiskError: the file holds something else than what was read or written last,
+        or there is a new one of that name already.
+    :raises OSError: it cannot be written.
+    """
+    if path is not None:
+        document = replace(document, path=path, content=None)
+        if path.exists():
+            raise ChangedOnDiskError(f"{path.name} is there already; choose another name")
+    ensure_as_read(document)
+    content = encoded(document)
+    target = document.path.resolve()
+    with tempfile.NamedTemporaryFile(dir=target.parent, prefix=".ballplate-", delete=False) as file:
+        beside = Path(file.name)
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    try:
+        mode = target.stat().st_mode if target.exists() else 0o666 & ~_mask()
+        beside.chmod(mode)
+        ensure_as_read(document)
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+    return replace(document, content=content)
+
+
+def _mask() -> int:
+    """What permissions new files of this process do without."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

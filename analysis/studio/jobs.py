@@ -1,0 +1,203 @@
+"""Long computations beside the studio: each in a process of its own, which can be stopped."""
+
+from __future__ import annotations
+
+import base64
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.computing.steps import ProgressStep, Report, counted
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.inputs.messages import ExperimentError
+
+from ..presentation.formatting import finite
+from .actions import value_of
+from .document import DesignDocument, experiment_of
+
+Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
+
+# Most computations beside one another.
+MOST_RUNNING = 2
+
+# Data sets of Monte Carlo unless another number is asked for.
+TRIALS = 256
+
+
+def _suggest(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from .suggestions import suggested_repairs
+
+    return suggested_repairs(document, report)
+
+
+def _next(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from .suggestions import next_positions
+
+    return next_positions(document, report)
+
+
+def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from ..montecarlo.experiments import trials
+    from ..results.study import predict
+
+    experiment = experiment_of(document)
+    found = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
+    return {"lines": replace(predict(experiment), monte_carlo=found).lines()}
+
+
+def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from ..planning.campaign import Request, campaign
+
+    experiment = experiment_of(document, planning=True)
+    return {"lines": campaign(experiment, Request(), report=report).lines()}
+
+
+def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    """U6 and the rank for several values of one key."""
+    from ..results.study import planned_uncertainty
+
+    experiment, path = experiment_of(document), str(settings["path"])
+    values = [str(one) for one in settings["values"]]
+    found: list[dict[str, Any]] = []
+    for value in counted(values, "values", len(values), report):
+        try:
+            planned = planned_uncertainty(experiment.with_({path: value_of(value)}))
+        except ExperimentError as error:
+            found.append({"value": value, "error": error.messages[0].text})
+            continue
+        lengths = planned.quantities.get("U6")
+        found.append(
+            {
+                "value": value,
+                "deficiency": planned.deficiency,
+                "average": None if lengths is None else finite(lengths.average),
+                "maximum": None if lengths is None else finite(lengths.maximum),
+                "within": None if lengths is None else lengths.within_target,
+            }
+        )
+    return found
+
+
+def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    """The fit of readings that were dropped on the page, with their residuals at the balls."""
+    from ballplate.simulator.readings.reading_files import read_readings
+
+    from ..results.residuals import reading_residuals
+    from ..results.study import fit
+
+    experiment = experiment_of(document)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / (Path(str(settings["name"])).name or "readings.csv")
+        file.write_bytes(base64.b64decode(str(settings["content"])))
+        observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
+    found = fit(experiment, observed)
+    data: dict[str, Any] = {"lines": found.lines(), "notes": list(found.notes)}
+    if found.converged:
+        design = found.design
+        readings, residuals, standardised = reading_residuals(
+            design, found.solution, found.observed.x
+        )
+        data["residuals"] = {
+            "position": [design.positions.names[k] for k in readings.position],
+            "place": found.observed.x[design.plate_readings].tolist(),
+            "value": residuals.tolist(),
+            "standardised": np.abs(standardised).max(axis=1).tolist(),
+        }
+    return data
+
+
+JOBS: Mapping[str, Work] = {
+    "suggest": _suggest,
+    "next": _next,
+    "monte carlo": _monte_carlo,
+    "plan": _plan,
+    "sweep": _sweep,
+    "fit": _fit,
+}
+"""What can run beside the studio; another is a function and its line here."""
+
+
+@dataclass
+class Job:
+    """A computation in a process of its own: `state` is running, done, failed or stopped, `step`
+    how far it has come, and `result` what came of it, or why nothing did.
+    """
+
+    name: str
+    revision: int
+    process: BaseProcess
+    connection: Connection
+    state: str = "running"
+    step: str = ""
+    result: Any = None
+
+    def look(self) -> None:
+        """Take what the process has told since."""
+        with suppress(EOFError, OSError):
+            while self.state == "running" and self.connection.poll():
+                kind, said = self.connection.recv()
+                if kind == "step":
+                    self.step = said
+                else:
+                    self.state, self.result = kind, said
+        if self.state == "running" and not self.process.is_alive() and not self.connection.poll():
+            self.state, self.result = "failed", "the computation ended without a result"
+
+    def stop(self) -> None:
+        """End the process."""
+        if self.state == "running":
+            self.state = "stopped"
+        self.process.terminate()
+        self.process.join(2.0)
+        self.connection.close()
+
+    def to_dict(self, number: int) -> dict[str, Any]:
+        return {
+            "id": number,
+            "job": self.name,
+            "revision": self.revision,
+            "state": self.state,
+            "step": self.step,
+            "result": self.result,
+        }
+
+
+def started(name: str, document: DesignDocument, settings: Mapping[str, Any], revision: int) -> Job:
+    """Start a computation with the document as it is now.
+
+    :raises KeyError: there is no such job.
+    """
+    JOBS[name]
+    # A new interpreter: a copy of this process would have its threads' locks without the threads.
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    arguments = (sender, name, document, dict(settings))
+    process = context.Process(target=_work, args=arguments, daemon=True)
+    process.start()
+    sender.close()
+    return Job(name, revision, process, receiver)
+
+
+def _work(
+    connection: Connection, name: str, document: DesignDocument, settings: Mapping[str, Any]
+) -> None:
+    def report(step: ProgressStep) -> None:
+        connection.send(("step", str(step)))
+
+    try:
+        result = JOBS[name](document, settings, report)
+    except ExperimentError as error:
+        connection.send(("failed", "\n".join(map(str, error.messages))))
+    except (ValueError, TypeError, KeyError, ImportError, OSError) as error:
+        connection.send(("failed", f"{error}"))
+    else:
+        connection.send(("done", result))
+    finally:
+        connection.close()

@@ -1,0 +1,54 @@
+"""The studio's server on the loopback address of this machine."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+
+import uvicorn
+
+from .server import application
+from .session import Session
+
+ADDRESS = "127.0.0.1"
+
+# Seconds for answers under way when the studio ends.
+LAST_ANSWERS = 1
+
+
+class _Server(uvicorn.Server):
+    """A server that leaves signals to the command."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        with nullcontext():
+            yield
+
+
+def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
+    """Serve a session until the command is interrupted; `tell` receives the address to open.
+
+    Port 0 is any that is free.
+
+    :raises OSError: the port cannot be had.
+    """
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    with listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((ADDRESS, port))
+        number, token = listener.getsockname()[1], secrets.token_urlsafe(24)
+        config = uvicorn.Config(
+            application(session, token, number),
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            lifespan="off",
+            timeout_graceful_shutdown=LAST_ANSWERS,
+        )
+        tell(f"http://{ADDRESS}:{number}/?token={token}")
+        try:
+            _Server(config).run(sockets=[listener])
+        finally:
+            session.close()

@@ -1,0 +1,146 @@
+// Forms for the sections of a design, made from the schema of its file.
+
+const SECTIONS = [
+  "title", "machine", "error_model", "probes", "artefacts", "positions", "calibration", "influences", "evaluation",
+  "target_uncertainty", "coverage_factor", "expected_rank_deficiency",
+];
+
+function resolve(schema, root) {
+  let found = schema;
+  while (found?.$ref) found = found.$ref.split("/").slice(1).reduce((at, key) => at[key], root);
+  return found ?? {};
+}
+
+// The forms that data may have there: alternatives are narrowed to those whose constants fit.
+function forms(schema, data, root) {
+  const found = resolve(schema, root);
+  const alternatives = found.anyOf ?? found.oneOf;
+  if (!alternatives) return [found];
+  const every = alternatives.flatMap((one) => forms(one, data, root));
+  const fitting = every.filter((one) => fits(one, data, root));
+  return fitting.length ? fitting : every;
+}
+
+function fits(schema, data, root) {
+  if (data === undefined) return true;
+  if (Array.isArray(data)) return schema.type === "array";
+  if (data !== null && typeof data === "object") {
+    if (schema.type !== "object" && !schema.properties && !schema.additionalProperties) return false;
+    return Object.entries(schema.properties ?? {}).every(([key, value]) => {
+      const part = resolve(value, root);
+      return part.const === undefined || data[key] === part.const;
+    });
+  }
+  return schema.type !== "object" && schema.type !== "array";
+}
+
+function choices(schemas, root) {
+  const found = new Set();
+  for (const one of schemas) {
+    if (one.const !== undefined) found.add(String(one.const));
+    (one.enum ?? []).forEach((value) => found.add(String(value)));
+    if (one.type === "boolean") ["true", "false"].forEach((value) => found.add(value));
+  }
+  const free = schemas.some((one) => one.enum === undefined && one.const === undefined && one.type !== "boolean" && one.type !== "null");
+  return free ? null : [...found];
+}
+
+// A value as the file would state it, in one line.
+export function flow(value) {
+  if (value === null || value === undefined) return "";
+  if (Array.isArray(value)) return `[${value.map(flow).join(", ")}]`;
+  if (typeof value === "object") return `{${Object.entries(value).map(([key, one]) => `${key}: ${flow(one)}`).join(", ")}}`;
+  return String(value);
+}
+
+function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  Object.entries(attributes).forEach(([key, value]) => {
+    if (key === "class") made.className = value;
+    else if (value !== undefined) made.setAttribute(key, value);
+  });
+  made.append(...children);
+  return made;
+}
+
+export function build(container, data, schema, messages, onSet) {
+  const open = new Set([...container.querySelectorAll("details[open]")].map((one) => one.dataset.section));
+  container.replaceChildren();
+  for (const section of SECTIONS) {
+    const part = schema.properties?.[section];
+    if (!part) continue;
+    const details = element("details", { "data-section": section });
+    details.open = open.has(section);
+    const description = resolve(part, schema).description ?? part.description ?? "";
+    details.append(element("summary", { title: description }, section.replaceAll("_", " ")));
+    fields(details, [section], data?.[section], part, schema, messages, onSet, section);
+    container.append(details);
+  }
+}
+
+function fields(into, path, data, part, root, messages, onSet, label) {
+  const possible = forms(part, data, root);
+  const description = part.description ?? resolve(part, root).description ?? possible[0]?.description ?? "";
+  const isMapping = data !== null && typeof data === "object" && !Array.isArray(data);
+  const isList = Array.isArray(data) && data.some((one) => one !== null && typeof one === "object" && !Array.isArray(one));
+  if (isMapping) {
+    for (const [key, value] of Object.entries(data)) {
+      const below = property(possible, key, root);
+      fields(into, [...path, key], value, below, root, messages, onSet, path.length > 1 ? `${label}.${key}` : key);
+    }
+    adding(into, path, data, possible, root, onSet, label);
+    return;
+  }
+  if (isList) {
+    data.forEach((value, k) => {
+      const below = possible.find((one) => one.items)?.items ?? {};
+      fields(into, [...path, k], value, below, root, messages, onSet, path.length > 1 ? `${label}[${k + 1}]` : value?.name ?? `${k + 1}`);
+    });
+    return;
+  }
+  const options = data === undefined ? null : choices(possible, root);
+  const said = flow(data);
+  let input;
+  if (options && options.length > 1) {
+    input = element("select");
+    [...new Set([said, ...options])].forEach((one) => input.append(new Option(one, one, one === said, one === said)));
+  } else {
+    input = element("input", { value: said, placeholder: data === undefined ? "not stated" : "" });
+  }
+  input.dataset.path = JSON.stringify(path);
+  input.addEventListener("change", () => onSet(path, input.value, input));
+  const name = element("span", { title: description }, label === path[0] ? "value" : label);
+  const box = element("label", {}, name, input);
+  const steps = path.reduce((text, step) => (typeof step === "number" ? `${text}[${step}]` : text ? `${text}.${step}` : step), "");
+  for (const message of messages.filter((one) => one.path === steps)) {
+    input.classList.add("bad-field");
+    box.append(element("span", { class: "field-error" }, message.text));
+  }
+  into.append(box);
+}
+
+function property(possible, key, root) {
+  for (const one of possible) {
+    if (one.properties?.[key]) return one.properties[key];
+    if (one.additionalProperties && typeof one.additionalProperties === "object") return one.additionalProperties;
+  }
+  return {};
+}
+
+// A key that is not there yet: one of the schema's, or a name of the user's own.
+function adding(into, path, data, possible, root, onSet, label) {
+  const known = [...new Set(possible.flatMap((one) => Object.keys(one.properties ?? {})))].filter((key) => !(key in data));
+  const isOpen = possible.some((one) => one.additionalProperties);
+  if (!known.length && !isOpen) return;
+  const list = `keys-${path.join("-")}`;
+  const names = element("datalist", { id: list });
+  known.forEach((key) => names.append(new Option(property(possible, key, root).description ?? "", key)));
+  const key = element("input", { list, placeholder: "another key", "aria-label": `another key of ${label}`, "data-key": path.join(".") });
+  const value = element("input", { placeholder: "value", "aria-label": `value of another key of ${label}` });
+  const set = () => {
+    if (key.value.trim() && value.value.trim()) onSet([...path, key.value.trim()], value.value, value);
+  };
+  value.addEventListener("change", set);
+  const more = element("details", {}, element("summary", {}, `add to ${label.replaceAll("_", " ")}`), key, names, value);
+  into.append(more);
+}

@@ -1,0 +1,418 @@
+// The page of the studio: it asks, the engine answers, and everything that is shown comes from there.
+import { View, colourOf } from "./view.js";
+import { build, flow } from "./forms.js";
+
+const $ = (id) => document.getElementById(id);
+let state = null;
+let schema = null;
+let selected = null;
+let motion = null;
+let parked = {}; // positions that are switched off, as the file states them
+let suggestions = [];
+let fits = null;
+let previewing = null;
+let polling = null;
+
+async function ask(path, body) {
+  const options = body === undefined ? {} : {
+    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body),
+  };
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch {
+    throw new Error("the studio does not answer; start it again with the same command, and reload the page");
+  }
+  const text = await response.text();
+  let data;
+  try {
+    data = JSON.parse(text);
+  } catch {
+    throw new Error(text.trim());
+  }
+  if (!response.ok || data.error !== undefined) throw new Error(data.error);
+  return data;
+}
+
+function tell(text, bad = false) {
+  $("notice").textContent = text;
+  $("notice").classList.toggle("bad", bad);
+}
+
+let queue = Promise.resolve();
+function act(action, said = "") {
+  // One after the other: each goes on from the answer before.
+  queue = queue.then(async () => {
+    const started = performance.now();
+    try {
+      state = await ask("/api/do", { ...action, revision: state.revision });
+      if (said) tell(said);
+      else tell("");
+      show();
+      window.studio.latency.push(performance.now() - started);
+      return true;
+    } catch (error) {
+      tell(error.message, true);
+      show();
+      return false;
+    }
+  });
+  return queue;
+}
+
+const view = new View($("view"), {
+  onSelect: (name) => choose(name),
+  onDrag: (name, by) => preview({ do: "move", position: name, by }),
+  onDrop: (name, by) => act({ do: "move", position: name, by }),
+});
+
+let waiting = null;
+async function preview(action) {
+  waiting = action;
+  if (previewing) return;
+  previewing = true;
+  while (waiting) {
+    const next = waiting;
+    waiting = null;
+    try {
+      const design = await ask("/api/preview", next);
+      tell("");
+      figures(design, []);
+    } catch (error) {
+      tell(error.message, true);
+    }
+  }
+  previewing = false;
+}
+
+function choose(name) {
+  selected = name;
+  view.show(state.design, selected, { withMap: $("show-map").checked });
+  places();
+}
+
+const micro = (value) => (value === null || value === undefined || Number.isNaN(value) ? "undetermined" : `${Number((1e6 * value).toPrecision(3))}`);
+const share = (value) => (value === null || value === undefined ? "" : `${Math.floor(1000 * value) / 10} %`);
+
+function make(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  Object.entries(attributes).forEach(([key, value]) => {
+    if (key === "class") made.className = value;
+    else if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    else if (value !== undefined && value !== false) made.setAttribute(key, value === true ? "" : value);
+  });
+  made.append(...children.filter((one) => one !== null && one !== undefined));
+  return made;
+}
+
+function show() {
+  const { design } = state;
+  $("title").textContent = `${state.file}${state.saved ? "" : " •"}${design ? ` — ${design.title}` : ""}`;
+  document.title = `${state.saved ? "" : "• "}${state.file} – ballplate studio`;
+  options($("files"), state.files.includes(state.file) ? state.files : [state.file, ...state.files], state.file);
+  $("variant-label").hidden = !state.variants.length;
+  options($("variants"), state.variants, state.variant);
+  $("undo").disabled = !state.back;
+  $("redo").disabled = !state.forward;
+  $("save").disabled = state.saved;
+  $("keep").textContent = state.kept ? "Stop comparing" : "Keep to compare";
+  if (document.activeElement !== $("text")) $("text").value = state.text;
+  if (design) {
+    if (!design.scene.positions.some((place) => place.name === selected)) selected = null;
+    if (motion !== null && motion >= design.motions.directions.length) motion = null;
+    if (motion === null && design.rank.deficiency) motion = 0;
+    if (motion !== null && !design.motions.directions.length) motion = null;
+    view.motion = motion;
+    view.show(design, selected, { withMap: $("show-map").checked });
+    figures(design, state.messages);
+    legend();
+  }
+  places();
+  if (schema) build($("forms"), state.data, schema, state.messages, (path, value) => act({ do: "set", path, value }));
+  const ghosts = suggestions.filter((one) => one.shown).flatMap((one) => one.places);
+  view.ghost(ghosts);
+  view.residuals(null);
+  suggested();
+}
+
+function options(select, names, chosen) {
+  select.replaceChildren(...names.map((name) => new Option(name, name, name === chosen, name === chosen)));
+}
+
+function legend() {
+  const range = view.mapRange();
+  $("legend").replaceChildren();
+  if (!range || !range[1] || !$("show-map").checked) return;
+  $("legend").append(
+    `standard uncertainty of a corrected co-ordinate: ${micro(range[0])} µm `,
+    make("span", { class: "ramp" }), ` ${micro(range[1])} µm; grey: undetermined`,
+  );
+}
+
+function figures(design, messages) {
+  const { rank } = design;
+  const expected = rank.deficiency === (rank.expected ?? 0);
+  const within = design.within;
+  const box = $("verdict");
+  box.classList.toggle("bad", messages.length > 0 || rank.deficiency > 0);
+  box.classList.toggle("warn", !messages.length && !rank.deficiency && within !== null && within < 1);
+  box.replaceChildren(...[
+    make("p", {}, make("strong", {}, messages.length ? "The text is wrong; these are the figures before it." : rank.words), messages.length || expected ? "" : ` (the file expects ${rank.expected ?? 0})`),
+    make("p", {}, `${rank.parameters} parameters, ${rank.observations} observations`),
+    design.headline.length ? make("p", {}, design.headline.join(", ")) : null,
+    ...design.target.map((text) => make("p", {}, text)),
+    ...rank.reasons.map((text) => make("p", {}, text)),
+  ].filter((one) => one !== null));
+  $("messages").replaceChildren(...messages.map((one) => make("li", {}, `line ${one.line}${one.path ? `, ${one.path}` : ""}: ${one.text}`)), ...design.doubts.map((text) => make("li", {}, text)));
+  quantities(design);
+  $("scale").textContent = design.scale.join(" ");
+  const list = make("ol");
+  design.motions.directions.forEach((one, index) => {
+    const moving = index === motion;
+    list.append(make("li", {},
+      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages); } }, moving ? "stop" : "move"),
+      make("strong", {}, ` ${one.weak ? "weak" : "undetermined"} `), one.words,
+    ));
+  });
+  $("motions").replaceChildren();
+  if (design.motions.directions.length) $("motions").append(make("h2", {}, "What the readings do not tell"), list);
+}
+
+function quantities(design) {
+  const kept = new Map((state.kept?.quantities ?? []).map((one) => [one.symbol, one]));
+  const unit = (row) => (row.unit === "m" ? "µm" : row.unit === "rad" ? "µrad" : row.unit === "1" ? "ppm" : row.unit.replace("m", "µm").replace("rad", "µrad"));
+  const cell = (row, key) => {
+    const was = kept.get(row.symbol)?.[key];
+    return make("td", {}, micro(row[key]), was !== undefined && state.kept ? make("span", { class: "was" }, `was ${micro(was)}`) : null);
+  };
+  $("quantities").replaceChildren(
+    make("thead", {}, make("tr", {}, make("th", {}, "standard uncertainty of"), make("th", {}, "average"), make("th", {}, "max."), make("th", {}, ""))),
+    make("tbody", {}, ...design.quantities.map((row) => make("tr", {},
+      make("td", { title: row.largest ? `largest at ${row.largest}` : undefined }, make("strong", {}, row.symbol), ` ${row.description}`, row.undetermined ? ` (${row.undetermined} of ${row.count} undetermined)` : ""),
+      cell(row, "average"), cell(row, "maximum"), make("td", {}, unit(row)),
+    ))),
+  );
+}
+
+function places() {
+  const list = state.design?.scene.positions ?? [];
+  $("positions").replaceChildren(...list.map((place, index) => {
+    const swatch = make("span", { class: "swatch" });
+    swatch.style.background = colourOf(index);
+    return make("li", { class: place.name === selected ? "chosen" : "" },
+      make("input", { type: "checkbox", checked: true, title: "read this position", "aria-label": `read ${place.name}`, onchange: () => switchOff(place.name) }),
+      swatch,
+      make("button", { class: "name", onclick: () => choose(place.name) }, place.name),
+      make("small", {}, `${place.readings}`),
+    );
+  }), ...Object.entries(parked).map(([name, settings]) => make("li", { class: "off" },
+    make("input", { type: "checkbox", title: "read this position", "aria-label": `read ${name}`, onchange: () => { delete parked[name]; act({ do: "add", settings }); } }),
+    make("span", { class: "swatch" }), make("span", {}, `${name} (off)`),
+  )));
+  const place = list.find((one) => one.name === selected);
+  $("position").hidden = !place;
+  if (place) details(place);
+}
+
+async function switchOff(name) {
+  try {
+    const settings = await ask("/api/settings", { position: name });
+    if (await act({ do: "remove", position: name })) parked[name] = settings;
+  } catch (error) {
+    tell(error.message, true);
+  }
+  places();
+}
+
+function details(place) {
+  const { scene } = state.design;
+  const name = place.name;
+  const many = place.groups > 1;
+  const axes = scene.dimension === 3 ? ["x", "y", "z"] : [];
+  const balls = scene.artefacts[place.artefact];
+  const across = Math.max(1, Math.round(Math.sqrt(balls.length)));
+  const grid = make("div", { class: "balls", role: "group", "aria-label": "balls that are read" }, ...balls.map((ball, k) => make("button", {
+    title: ball, "aria-label": ball, "aria-pressed": String(place.read[k]), disabled: many,
+    onclick: () => act({ do: "balls", position: name, balls: balls.filter((_, other) => (other === k ? !place.read[other] : place.read[other])) }),
+  })));
+  grid.style.gridTemplateColumns = `repeat(${across}, 1.05rem)`;
+  $("position").replaceChildren(
+    make("strong", {}, name), make("div", {}, `${place.artefact}; ${place.readings} readings`),
+    make("div", { class: "bar" },
+      make("button", { id: "turn", onclick: () => act({ do: "turn", position: name }) }, "Turn"),
+      ...axes.map((axis) => make("button", { disabled: place.plane === axis, title: `stand across ${axis}`, onclick: () => act({ do: "stand", position: name, across: axis }) }, `⟂ ${axis}`)),
+      make("button", { onclick: () => act({ do: "copy", position: name }) }, "Copy"),
+      make("button", { onclick: () => act({ do: "remove", position: name }) }, "Remove"),
+    ),
+    make("div", {}, "read with: ", ...Object.keys(scene.probes).map((probe) => make("label", {},
+      make("input", { type: "checkbox", checked: place.probes.includes(probe), disabled: many, "aria-label": `probe ${probe}`,
+        onchange: (event) => act({ do: "probes", position: name, probes: Object.keys(scene.probes).filter((one) => (one === probe ? event.target.checked : place.probes.includes(one))) }) }),
+      `${probe} `))),
+    grid, ...(many ? [make("small", {}, "several groups of readings: change them in the text")] : []),
+  );
+}
+
+function suggested() {
+  $("suggestions").replaceChildren(...suggestions.map((one) => make("li", {},
+    make("div", {}, one.words),
+    make("div", {}, one.average === null || one.average === undefined ? (one.deficiency ? `rank deficiency ${one.deficiency} left` : "") : `U6 ${micro(one.average)} µm on average, ${micro(one.maximum)} µm at most`,
+      one.weak ? `; ${one.weak} directions stay weak` : "", one.faint ? "; barely determined" : ""),
+    make("div", { class: "bar" },
+      make("button", { "aria-pressed": String(!!one.shown), onclick: () => { one.shown = !one.shown; show(); } }, one.shown ? "hide" : "show"),
+      make("button", { "data-apply": "", disabled: one.revision !== state.revision, title: one.revision !== state.revision ? "the design has changed since; ask again" : undefined, onclick: () => apply(one) }, "apply"),
+    ))));
+}
+
+function apply(one) {
+  suggestions = suggestions.filter((other) => other !== one);
+  if (one.settings) act({ do: "add", settings: one.settings }, "position added");
+  else act({ do: "repair", edits: one.edits }, "applied");
+}
+
+async function start(job, settings = {}) {
+  try {
+    await ask("/api/start", { job, settings });
+    tell(`${job}: started`);
+  } catch (error) {
+    tell(error.message, true);
+  }
+  poll();
+}
+
+const taken = new Set();
+async function poll() {
+  clearTimeout(polling);
+  let list;
+  try {
+    list = await ask("/api/jobs");
+  } catch (error) {
+    tell(error.message, true);
+    return;
+  }
+  for (const job of list) {
+    if (job.state !== "done" || taken.has(job.id)) continue;
+    taken.add(job.id);
+    if (job.job === "suggest" || job.job === "next") {
+      suggestions = job.result.map((one, k) => ({ ...one, places: one.places ?? [one.place], revision: job.revision, shown: k === 0 }));
+      if (!suggestions.length) tell(job.job === "suggest" ? "nothing is undetermined or weak, or nothing was found that helps" : "no further position fits");
+      show();
+    }
+    if (job.job === "fit" && job.result.residuals) {
+      const sizes = job.result.residuals.value.map((one) => Math.hypot(...one));
+      fits = { ...job.result.residuals, scale: (0.06 * view.size) / Math.max(...sizes, 1e-12) };
+      view.residuals(fits, fits.scale);
+      tell(`residuals are drawn ${Number(fits.scale.toPrecision(2)).toLocaleString("en")} times their size`);
+    }
+  }
+  computations(list);
+  if (list.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
+}
+
+function computations(list) {
+  $("jobs").replaceChildren(...list.map((job) => make("li", { "data-state": job.state },
+    make("strong", {}, job.job), ` ${job.state}${job.state === "running" && job.step ? `: ${job.step}` : ""} `,
+    make("button", { onclick: async () => { await ask("/api/stop", { id: job.id }); poll(); } }, job.state === "running" ? "stop" : "close"),
+    job.state === "failed" ? make("pre", {}, String(job.result)) : null,
+    job.state === "done" && job.result?.lines ? make("pre", {}, [...(job.result.notes ?? []), ...job.result.lines].join("\n")) : null,
+    job.state === "done" && job.job === "sweep" ? table(job.result) : null,
+  )));
+}
+
+function table(rows) {
+  return make("table", {}, make("thead", {}, make("tr", {}, ...["value", "deficiency", "U6 average µm", "U6 max. µm", "within target"].map((one) => make("th", {}, one)))),
+    make("tbody", {}, ...rows.map((row) => make("tr", {}, make("td", {}, row.value), ...(row.error ? [make("td", { colspan: "4" }, row.error)] : [make("td", {}, String(row.deficiency)), make("td", {}, micro(row.average)), make("td", {}, micro(row.maximum)), make("td", {}, share(row.within))])))));
+}
+
+function dialog(question, fields) {
+  $("question").textContent = question;
+  $("fields").replaceChildren(...fields.map(([name, value]) => make("label", {}, name, make("input", { name, value }))));
+  $("dialog").returnValue = "";
+  $("dialog").showModal();
+  return new Promise((resolve) => {
+    $("dialog").addEventListener("close", () => {
+      const ok = $("dialog").returnValue === "ok";
+      resolve(ok ? [...$("fields").querySelectorAll("input")].map((one) => one.value) : null);
+    }, { once: true });
+  });
+}
+
+async function fit(file) {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  let text = "";
+  for (let k = 0; k < bytes.length; k += 32768) text += String.fromCharCode(...bytes.subarray(k, k + 32768));
+  start("fit", { name: file.name, content: btoa(text) });
+}
+
+$("undo").onclick = () => act({ do: "undo" });
+$("redo").onclick = () => act({ do: "redo" });
+$("keep").onclick = () => act({ do: "keep", off: !!state.kept });
+$("save").onclick = () => act({ do: "save" }, "saved");
+$("save-as").onclick = async () => {
+  const answer = await dialog("Save under another name, in the same folder", [["name", state.file]]);
+  if (answer) act({ do: "save", name: answer[0] }, "saved");
+};
+$("files").onchange = async (event) => {
+  const name = event.target.value;
+  const discard = !state.saved;
+  if (discard && !(await dialog(`${state.file} has changes that are not saved. Leave them?`, []))) { show(); return; }
+  parked = {};
+  suggestions = [];
+  await act({ do: "open", name, discard });
+  view.home();
+};
+$("variants").onchange = (event) => act({ do: "variant", name: event.target.value });
+$("apply").onclick = () => act({ do: "text", text: $("text").value });
+$("reopen").onclick = () => act({ do: "reopen" }, "read again; undo leads back to the text that was here");
+$("toggle-text").onclick = () => {
+  $("text-box").hidden = !$("text-box").hidden;
+  $("toggle-text").setAttribute("aria-expanded", String(!$("text-box").hidden));
+};
+$("step").onchange = (event) => { view.step = Number(event.target.value); };
+$("show-map").onchange = show;
+$("home").onclick = () => { view.home(); };
+$("sweep").onclick = async () => {
+  const answer = await dialog("U6 for several values of one key", [["path", "machine.repeatability"], ["values, separated by ;", "0.1 um; 0.2 um; 0.4 um"]]);
+  if (answer) start("sweep", { path: answer[0], values: answer[1].split(";").map((one) => one.trim()).filter(Boolean) });
+};
+document.querySelectorAll("[data-job]").forEach((button) => { button.onclick = () => start(button.dataset.job); });
+$("readings").onchange = (event) => { if (event.target.files[0]) fit(event.target.files[0]); event.target.value = ""; };
+const drop = $("drop");
+drop.addEventListener("dragover", (event) => { event.preventDefault(); drop.classList.add("over-it"); });
+drop.addEventListener("dragleave", () => drop.classList.remove("over-it"));
+document.addEventListener("dragover", (event) => event.preventDefault());
+document.addEventListener("drop", (event) => {
+  event.preventDefault();
+  drop.classList.remove("over-it");
+  if (event.dataTransfer.files[0]) fit(event.dataTransfer.files[0]);
+});
+document.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.target === $("text")) return;
+  const key = event.key.toLowerCase();
+  const does = { z: event.shiftKey ? "redo" : "undo", y: "redo", s: "save" }[key];
+  if (!does) return;
+  event.preventDefault();
+  act({ do: does }, does === "save" ? "saved" : "");
+});
+$("view").addEventListener("keydown", (event) => {
+  const place = state.design?.scene.positions.find((one) => one.name === selected);
+  if (!place) return;
+  const column = (k) => place.rotation.map((row) => row[k]);
+  const keys = { ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1], PageUp: [2, 1], PageDown: [2, -1] };
+  if (event.key === "r" || event.key === "R") act({ do: "turn", position: selected });
+  else if (keys[event.key] && keys[event.key][0] < place.rotation.length) {
+    const [axis, sign] = keys[event.key];
+    act({ do: "move", position: selected, by: column(axis).map((one) => sign * one * view.step) });
+  } else return;
+  event.preventDefault();
+});
+window.addEventListener("beforeunload", (event) => { if (state && !state.saved) event.preventDefault(); });
+
+window.studio = { view, latency: [], state: () => state, act, flow };
+try {
+  [state, schema] = await Promise.all([ask("/api/state"), ask("/api/schema")]);
+  motion = state.design?.rank.deficiency ? 0 : null;
+  show();
+  poll();
+} catch (error) {
+  tell(error.message, true);
+}

@@ -1,0 +1,267 @@
+"""What the studio answers, and whom it refuses."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ballplate.designs import shipped
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.studio.server import application
+from ballplate.studio.session import Session
+from starlette.testclient import TestClient
+
+PORT, TOKEN = 8123, "a-token-of-the-tests"
+HOME = f"http://127.0.0.1:{PORT}"
+
+
+@pytest.fixture
+def design(tmp_path: Path) -> Path:
+    path = tmp_path / "quickstart.yaml"
+    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    return path
+
+
+@pytest.fixture
+def session(design):
+    found = Session(design)
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def stranger(session):
+    return TestClient(application(session, TOKEN, PORT), base_url=HOME, follow_redirects=False)
+
+
+@pytest.fixture
+def client(stranger):
+    assert stranger.get(f"/?token={TOKEN}").status_code == 303
+    return stranger
+
+
+REQUESTS = [
+    ("GET", "/"),
+    ("GET", "/api/state"),
+    ("GET", "/api/jobs"),
+    ("GET", "/api/schema"),
+    ("GET", "/static/studio.js"),
+    ("POST", "/api/do"),
+    ("POST", "/api/start"),
+]
+
+
+def test_without_the_token_nothing_is_answered(stranger, session):
+    before = session.state()["text"]
+    for method, path in REQUESTS:
+        for query in ("", "?token=", "?token=a-token-of-the-test"):
+            body = {"do": "text", "text": "title: x"}
+            answer = stranger.request(method, path + query, json=body)
+            assert answer.status_code == 403 and "token" in answer.text, (method, path)
+    assert session.state()["text"] == before
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://example.org"},
+        {"Origin": "null"},
+        {"Origin": f"https://127.0.0.1:{PORT}"},
+        {"Origin": "http://127.0.0.1:9999"},
+        {"Sec-Fetch-Site": "cross-site"},
+        {"Sec-Fetch-Site": "same-site"},
+        {"Host": "example.org"},
+        {"Host": f"example.org:{PORT}"},
+        {"Host": "127.0.0.1:9999"},
+        {"Host": ""},
+    ],
+)
+def test_another_origin_or_host_is_refused_with_the_token_too(client, headers):
+    for method, path in REQUESTS:
+        answer = client.request(method, path, json={"do": "undo"}, headers=headers)
+        assert answer.status_code == 403, (method, path)
+
+
+def test_the_page_may_ask_nobody_else(client):
+    page = client.get("/")
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'none'" in policy and "connect-src 'self'" in policy
+    assert "http" not in page.text.replace("http-equiv", "")
+    cookie = client.get(f"/?token={TOKEN}").headers["set-cookie"].lower()
+    assert "httponly" in cookie and "samesite=strict" in cookie
+
+
+def test_a_form_of_another_page_cannot_act(client, session):
+    answer = client.post(
+        "/api/do", content='{"do": "undo"}', headers={"Content-Type": "text/plain"}
+    )
+    assert answer.status_code == 415
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../other.yaml", "/etc/passwd", "sub/other.yaml", "other.txt", "", "..", "link.yaml", ".."],
+)
+def test_files_outside_the_folder_are_refused(client, design, tmp_path_factory, name):
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "other.yaml"
+    elsewhere.write_bytes(design.read_bytes())
+    design.with_name("link.yaml").symlink_to(elsewhere)
+    for action in ({"do": "open", "name": name}, {"do": "save", "name": name}):
+        answer = client.post("/api/do", json=action).json()
+        assert "is not the name of a design in the folder" in answer["error"]
+    assert elsewhere.read_bytes() == design.read_bytes()
+
+
+def test_a_model_in_python_runs_only_from_the_file_that_was_named(client, design):
+    ran = design.with_name("ran")
+    design.with_name("model.py").write_text(f"open({str(ran)!r}, 'w').close()\n")
+    text = design.read_text()
+    start = text.index("error_model:")
+    end = text.index("# The machine that")
+    other = text[:start] + "error_model: {kind: python, file: model.py, name: Model}\n" + text[end:]
+    design.with_name("other.yaml").write_text(other)
+    answer = client.post("/api/do", json={"do": "open", "name": "other.yaml"}).json()
+    assert any("Python" in one["text"] for one in answer["messages"])
+    assert not ran.exists()
+    # Nor does a change there, or a computation, run it.
+    client.post("/api/do", json={"do": "set", "path": ["title"], "value": "mine"})
+    client.post("/api/start", json={"job": "suggest"})
+    assert wait(client)[-1]["state"] == "failed"
+    assert not ran.exists()
+
+
+def wait(client, seconds=120.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = client.get("/api/jobs").json()
+        if all(one["state"] != "running" for one in found):
+            return found
+        time.sleep(0.05)
+    raise AssertionError(found)
+
+
+def test_figures_are_those_of_run(client, design):
+    answer = client.post("/api/do", json={"do": "move", "position": "z low", "by": [0.05, 0, 0.1]})
+    found = answer.json()["design"]
+    client.post("/api/do", json={"do": "save"})
+    (experiment,) = load(design)
+    for row in found["quantities"]:
+        expected = predict(experiment).quantities[row["symbol"]]
+        assert row["average"] == expected.average and row["maximum"] == expected.maximum
+    assert found["rank"]["deficiency"] == 0 and found["within"] == expected.within_target
+
+
+def test_a_change_in_another_window_is_not_lost(client):
+    state = client.get("/api/state").json()
+    turn = {"do": "turn", "position": "z low", "revision": state["revision"]}
+    assert "error" not in client.post("/api/do", json=turn).json()
+    assert "another window" in client.post("/api/do", json=turn).json()["error"]
+
+
+def test_saving_over_what_another_program_wrote_is_refused(client, design):
+    client.post("/api/do", json={"do": "turn", "position": "z low"})
+    design.write_bytes(design.read_bytes() + b"# another hand\n")
+    answer = client.post("/api/do", json={"do": "save"}).json()
+    assert "has changed on disk" in answer["error"]
+    assert design.read_bytes().endswith(b"# another hand\n")
+    answer = client.post("/api/do", json={"do": "save", "name": "mine.yaml"}).json()
+    assert answer["file"] == "mine.yaml" and answer["saved"]
+
+
+def test_a_wrong_text_keeps_the_figures_with_what_is_wrong(client):
+    before = client.get("/api/state").json()["design"]["quantities"]
+    action = {"do": "set", "path": ["machine", "repeatability"], "value": "0.2 furlongs"}
+    answer = client.post("/api/do", json=action).json()
+    (message,) = answer["messages"]
+    assert message["path"] == "machine.repeatability" and message["line"] > 0
+    assert answer["design"]["quantities"] == before
+    assert client.post("/api/do", json={"do": "undo"}).json()["messages"] == []
+
+
+@pytest.mark.parametrize("body", ["[]", "{", '"x"', '{"do": ["move"]}', '{"do": {"a": 1}}'])
+def test_what_is_no_action_is_answered_with_an_error(client, body):
+    answer = client.post("/api/do", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code in (200, 400) and answer.json()["error"]
+
+
+@pytest.mark.parametrize(
+    "file, variant",
+    [
+        ("npl/6.1.1.yaml", "B"),
+        ("certified/deficient.yaml", None),
+        ("planning/campaign.yaml", None),
+    ],
+)
+def test_what_is_undetermined_moves_a_plate_in_the_same_way_wherever_it_stands(file, variant):
+    """A change that no reading shows deforms a plate as a body: the length between two of its balls
+    changes by as much in one position as in another, though the machine moves otherwise there.
+    """
+    session = Session(Path(shipped(file)), variant)
+    design = session.state()["design"]
+    motions, positions = design["motions"], design["scene"]["positions"]
+    found = [one for one in motions["directions"] if not one["weak"]]
+    assert len(found) == design["rank"]["deficiency"] > 0
+    for direction in found:
+        assert np.linalg.norm(direction["nodes"] + direction["readings"], axis=1).max() <= 1.0002
+        seen = {}
+        for position, ball, by in zip(
+            motions["position"], motions["ball"], direction["readings"], strict=True
+        ):
+            seen.setdefault(positions[position]["artefact"], {}).setdefault(position, {})[ball] = by
+        for artefact in seen.values():
+            changes = []
+            for position, moved in artefact.items():
+                places = np.array(positions[position]["balls"])
+                balls = sorted(moved)
+                by = np.array([moved[ball] for ball in balls])
+                apart = places[balls][:, None] - places[balls][None]
+                lengths = np.linalg.norm(apart, axis=2) + np.eye(len(balls))
+                changes.append(((by[:, None] - by[None]) * apart).sum(axis=2) / lengths)
+            for one in changes[1:]:
+                # Displacements are rounded to a ten-thousandth of the largest.
+                assert np.abs(one - changes[0]).max() < 5e-4
+
+
+@pytest.mark.slow
+def test_suggestions_are_what_the_file_becomes(client, design):
+    client.post("/api/do", json={"do": "remove", "position": "y low"})
+    client.post("/api/start", json={"job": "next"})
+    (job,) = wait(client)
+    assert job["state"] == "done"
+    best, *others = job["result"]
+    assert all(one["average"] >= best["average"] for one in others)
+    answer = client.post("/api/do", json={"do": "add", "settings": best["settings"]}).json()
+    lengths = next(one for one in answer["design"]["quantities"] if one["symbol"] == "U6")
+    assert lengths["average"] == pytest.approx(best["average"], rel=1e-12)
+
+
+@pytest.mark.slow
+def test_a_computation_is_stopped(client):
+    client.post("/api/start", json={"job": "monte carlo", "settings": {"trials": 500_000}})
+    started = time.monotonic()
+    while "of" not in client.get("/api/jobs").json()[0]["step"]:
+        assert time.monotonic() - started < 120
+        time.sleep(0.05)
+    assert client.post("/api/stop", json={"id": 1}).json() == []
+
+
+@pytest.mark.slow
+def test_dropped_readings_are_fitted(client, design):
+    import base64
+
+    import ballplate as bp
+
+    table = bp.simulate(design).to_csv(index=False).encode()
+    content = base64.b64encode(table).decode()
+    client.post(
+        "/api/start", json={"job": "fit", "settings": {"name": "a.csv", "content": content}}
+    )
+    (job,) = wait(client)
+    assert job["state"] == "done", job
+    expected = bp.fit(design, bp.simulate(design))
+    assert job["result"]["lines"] == expected.lines()
+    assert len(job["result"]["residuals"]["value"]) == 250
