@@ -1,4 +1,4 @@
-"""SweepAnswer of a sweep: which settings meet the target, which of them takes fewest observations, and
+"""Answer of a sweep: which settings meet the target, which of these takes fewest observations, and
 what each axis changes while the others stay.
 """
 
