@@ -194,11 +194,9 @@ class _Parser(argparse.ArgumentParser):
     @property
     def commands(self) -> dict[str, _Parser]:
         """The parsers of the commands, by name."""
-        return next(
-            dict(one.choices)
-            for one in self._actions
-            if isinstance(one, argparse._SubParsersAction)
-        )
+        # Not by `next`, which a command of this package hides.
+        (found,) = (one for one in self._actions if isinstance(one, argparse._SubParsersAction))
+        return dict(found.choices)
 
     def meant_by(self, unknown: Sequence[str]) -> str:
         """Tell which of the command's options the unknown ones are probably meant for."""

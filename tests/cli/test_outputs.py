@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import ballplate as bp
 import pytest
 from ballplate.cli import main, outputs, parser
 from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
@@ -122,6 +123,19 @@ WALK = {
         {},
         also=("balls.csv",),
     ),
+    "budget": Walk(
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
+        {},
+        also=("balls.csv",),
+    ),
+    "next": Walk(
+        EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
+    ),
+    "curves": Walk({"MAP": "curved-map.yaml"}, {"--plot": "curves.svg"}),
+    "diff": Walk(
+        {"MAP": "map.yaml", "SECOND": "second-map.yaml", "--points": "corners.csv"},
+        {"--csv": "d.csv", "--plot": "d.svg"},
+    ),
     "convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
@@ -141,7 +155,10 @@ WALK = {
     ),
     "reliability": Walk(EXPERIMENT, {"--csv": "o.csv"}, also=("balls.csv",)),
     "map": Walk(
-        {"FILE": "machine.yaml"}, {"--plot": "map.png"}, ("--grid", "2,2,2"), ("measured/exx.csv",)
+        {"FILE": "machine.yaml", "--tasks": "design.yaml"},
+        {"--plot": "map.png"},
+        ("--grid", "2,2,2"),
+        ("measured/exx.csv",),
     ),
     "compensation": Walk(
         {"FILE": "machine.yaml"},
@@ -181,7 +198,7 @@ WALK = {
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
-LEFT_OUT += ("--tasks", "--against", "--compare")
+LEFT_OUT += ("--tasks", "--against", "--compare", "--watch")
 
 
 @pytest.fixture(scope="module")
@@ -207,12 +224,13 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "U6_average_m": 1e-6,
     }
     rows = [done(k, figures) for k in range(2)]
-    made_up(
-        folder / "store.sqlite",
-        "made up",
-        [axis("size", ["1 mm", "2 mm"], [1e-3, 2e-3], "m")],
-        rows,
-    ).close()
+    for name in ("store.sqlite", "other.sqlite"):
+        made_up(
+            folder / name,
+            "made up",
+            [axis("size", ["1 mm", "2 mm"], [1e-3, 2e-3], "m")],
+            rows,
+        ).close()
     readings, certificate = folder / "readings.csv", folder / "certificate.csv"
     arguments = [
         "simulate",
@@ -228,6 +246,9 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "pairs.csv").write_text("first,second\nA,B\n", encoding="utf-8")
     fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
     assert main(fit) == 0
+    shutil.copy(folder / "map.yaml", folder / "second-map.yaml")
+    fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+    bp.write_map(fit.to_map(), folder / "curved-map.yaml")
     return folder
 
 
@@ -313,7 +334,7 @@ def test_every_option_that_names_a_file_is_walked_through() -> None:
         named = {label(one) for one in actions if one.type is Path or one.metavar in METAVARS}
         written = {label(one) for one in actions if isinstance(one, OutputAction)}
         assert written == set(walk.writes), command
-        assert named - written == set(walk.reads), command
+        assert named - written == set(walk.reads) - {"SECOND"}, command
         assert bool(written) == any("--force" in one.option_strings for one in actions), command
 
 

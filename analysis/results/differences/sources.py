@@ -12,11 +12,12 @@ from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.quantities import LengthFunction
-from ballplate.simulator.inputs.tables import read_table
+from ballplate.simulator.inputs.tables import header_names, read_table
 from ballplate.simulator.inputs.yamltree import Mapping, read_tree
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.readings.point_files import NAMING
 from ballplate.simulator.readings.reading_files import AXES, read_readings
 
 from ..fit import Fit
@@ -77,11 +78,13 @@ def map_difference(
 
 
 def read_points(path: Path, dimension: int) -> Array:
-    """Points (n, d) in metres of a CSV file with the columns x_mm, y_mm and, in space, z_mm.
+    """Points (n, d) in metres of a CSV file with the columns x_mm, y_mm and, in space, z_mm; their
+    names, if it has any, are not needed.
 
     :raises ExperimentError: the file is wrong.
     """
-    rows = read_table(path, (), AXES[:dimension])
+    names = tuple(name for name in header_names(path) if name in NAMING)
+    rows = read_table(path, names, AXES[:dimension])
     return np.array([row.lengths for row in rows])
 
 
