@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import webbrowser
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from importlib.resources import files
+from webbrowser import open_new_tab
 
 from .common import add_file, whole
 from .outputs import Needed, UsageError
@@ -57,7 +57,7 @@ def run(options: Namespace) -> int:
         print(address, flush=True)
         note(options, "the studio runs until Ctrl-C")
         if not options.no_browser:
-            webbrowser.open(address)
+            open_new_tab(address)
 
     try:
         serve(session, options.port, tell)
