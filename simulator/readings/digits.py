@@ -11,8 +11,9 @@ from ..machines.protocol import Array
 # Units, in metres, of whose powers of ten tables have the last digits, and the largest exponent.
 UNITS = (1.0, float(LENGTH_UNITS["in"]))
 FINEST = 10
-# A number is a multiple of its last digit to this part of that.
-MULTIPLE = 1e-4
+# A number is a multiple of its last digit to this part of that, and to so many metres: what is more
+# is a digit that was written.
+MULTIPLE, ROUNDING = 1e-4, 1e-12
 # Fewer co-ordinates than these do not tell digits.
 FEWEST = 12
 # Rounding that is told has a standard uncertainty above this part of that of readings.
@@ -25,12 +26,15 @@ def last_digit(x: Array) -> float:
 
     >>> [round(last_digit(np.array([0.1234, 0.5]) * unit), 9) for unit in (1.0, 0.001, 0.0254)]
     [0.0001, 1e-07, 2.54e-06]
+    >>> last_digit(np.array([0.25, 0.5 + 2e-7]))
+    1e-07
     """
     for exponent in range(FINEST + 1):
         for unit in UNITS:
-            count = x / (unit * 10.0**-exponent)
-            if np.abs(count - np.round(count)).max(initial=0.0) <= MULTIPLE:
-                return unit * 10.0**-exponent
+            step = unit * 10.0**-exponent
+            count = x / step
+            if np.abs(count - np.round(count)).max(initial=0.0) <= min(MULTIPLE, ROUNDING / step):
+                return step
     return 0.0
 
 

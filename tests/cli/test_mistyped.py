@@ -53,7 +53,10 @@ def test_every_option_mistyped(capsys: pytest.CaptureFixture[str]) -> None:
     tried = 0
     for name, command in commands().items():
         needed = [
-            "x.yaml" for one in command._actions if not one.option_strings and one.choices is None
+            "x.yaml"
+            for one in command._actions
+            if not one.option_strings and one.choices is None
+            for _ in range(one.nargs if isinstance(one.nargs, int) else 1)
         ]
         needed += ["npl"] if name == "reproduce" else []
         for option in command._option_string_actions:

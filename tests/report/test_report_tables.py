@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.presentation.formats import FORMATS
-from ballplate.report.heatmaps import SHADES, heat_maps
+from ballplate.report.heatmaps import DEFICIENT, SHADES, heat_maps
 from ballplate.report.results import best_and_worst, read_results
 from ballplate.report.series import plots
 from ballplate.report.tables import MOST_BEST, MOST_ROWS, report_tables
@@ -138,7 +138,7 @@ def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> No
     assert [[entry.text.endswith("*") for entry in row] for row in heat.entries] == [
         [False, False], [True, False], [False, False]
     ]  # fmt: skip
-    assert heat.shades[1][0] == -1 and heat.shades[0][0] == 0 and heat.shades[2][1] == SHADES - 1
+    assert heat.shades[1][0] == DEFICIENT and heat.shades[0][0] == 0 and heat.shades[2][1] == SHADES - 1
     assert "*" in heat.note
     lines = [
         line for plot in plots(results) if plot.symbol == "U4" for line in plot.panels[0].lines
