@@ -38,6 +38,8 @@ def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
     with listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((ADDRESS, port))
+        # Before the address is told, so that nobody who follows it at once is refused.
+        listener.listen()
         number, token = listener.getsockname()[1], secrets.token_urlsafe(24)
         config = uvicorn.Config(
             application(session, token, number),

@@ -66,8 +66,8 @@ class ReadingsSettings(Settings):
     names: Text | None = Field(
         None,
         description=(
-            "how reports of measuring programs name features, such as"
-            " {position}_{ball}_{probe}; default: found in the report"
+            "rule by which reports of measuring programs name features, with position, ball and"
+            " probe in braces; default: found in the report"
         ),
     )
     columns: ColumnsSettings | None = Field(

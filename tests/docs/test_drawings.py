@@ -49,7 +49,9 @@ def test_the_stored_drawing_is_the_one_drawn(name: str, draw: Callable[[], Any])
 def test_every_drawing_is_shown_with_words_for_those_who_do_not_see_it() -> None:
     pages = [page.read_text(encoding="utf-8") for page in Path("docs").rglob("*.md")]
     for picture in PICTURES.iterdir():
-        shown = [re.search(rf"{{figure}} \S*{picture.name}\n *:alt: (.+)\n", page) for page in pages]
+        shown = [
+            re.search(rf"{{figure}} \S*{picture.name}\n *:alt: (.+)\n", page) for page in pages
+        ]
         assert any(match and len(match[1]) > 40 for match in shown), picture
 
 

@@ -138,7 +138,11 @@ def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> No
     assert [[entry.text.endswith("*") for entry in row] for row in heat.entries] == [
         [False, False], [True, False], [False, False]
     ]  # fmt: skip
-    assert heat.shades[1][0] == DEFICIENT and heat.shades[0][0] == 0 and heat.shades[2][1] == SHADES - 1
+    assert (
+        heat.shades[1][0] == DEFICIENT
+        and heat.shades[0][0] == 0
+        and heat.shades[2][1] == SHADES - 1
+    )
     assert "*" in heat.note
     lines = [
         line for plot in plots(results) if plot.symbol == "U4" for line in plot.panels[0].lines

@@ -280,6 +280,10 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
         # Tables of single axes, or of errors, beside what is named.
         parts = [f"{part}{end}" for part in (*AXES, *AXIS_ERRORS) for end in (".csv", ".com")]
         written |= {one.with_name(f"{one.stem}-{p}") for one in written if one.name for p in parts}
+    if command == "certificate":
+        written |= {
+            one.with_name(f"{one.stem}-covariance.csv") for one in written if one.suffix == ".csv"
+        }
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
     if not getattr(options, "force", True):
         allowed -= before.keys()
