@@ -69,11 +69,7 @@ def experiment_of(document: DesignDocument, planning: bool = False) -> Experimen
 
 
 def data_of(document: DesignDocument) -> Any:
-    """What the text says, as plain data with what the variant changes; None where it is no YAML."""
-    try:
-        return to_python(experiment_of(document, planning=True).tree)
-    except ExperimentError:
-        pass
+    """What the text says, as plain data; None where it is no YAML."""
     try:
         return to_python(parse_tree(document.text, str(document.path)))
     except ExperimentError:

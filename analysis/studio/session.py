@@ -9,6 +9,7 @@ from threading import RLock
 from typing import Any
 
 from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.yamltree import to_python
 
 from .actions import ActionError, done, settings_of
 from .answers import answer
@@ -58,6 +59,8 @@ class Session:
         self._answer: dict[str, Any] | None = None
         self._kept: dict[str, Any] | None = None
         self._messages: tuple[Message, ...] = ()
+        self._data: Any = None
+        self._variants: tuple[str, ...] = ()
         self._jobs: dict[int, Job] = {}
         self.revision = 0
         self._judge()
@@ -70,9 +73,9 @@ class Session:
                 "revision": self.revision,
                 "file": document.path.name,
                 "variant": document.variant,
-                "variants": list(variants_of(document)),
+                "variants": list(self._variants),
                 "text": document.text,
-                "data": data_of(document),
+                "data": self._data,
                 "saved": document.is_saved,
                 "back": len(document.back),
                 "forward": len(document.forward),
@@ -172,10 +175,14 @@ class Session:
 
     def _judge(self) -> None:
         """Answer anew; where the text is wrong the last answer stays, with what is wrong."""
+        self._variants = variants_of(self._document) if self._document.variant else ()
         try:
-            self._answer = answer(experiment_of(self._document))
+            experiment = experiment_of(self._document)
+            self._data = to_python(experiment.tree)
+            self._answer = answer(experiment)
             self._messages = ()
         except ExperimentError as error:
+            self._data = data_of(self._document)
             self._messages = error.messages
 
     def _choose(self, action: Mapping[str, Any]) -> None:

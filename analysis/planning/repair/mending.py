@@ -87,7 +87,9 @@ def with_experiment(
     :raises ExperimentError: this cannot be written without changing what stands about it, or what
         others refer to.
     """
-    before = {one.name: one for one in load(source, planning=True, text=text)}
+    before = {experiment.name: experiment}
+    if experiment.name is not None:
+        before = {one.name: one for one in load(source, planning=True, text=text)}
     # A variant with more entries of a list has a list of its own, in which the others are changed.
     changes = sorted(
         [

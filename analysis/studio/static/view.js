@@ -30,6 +30,7 @@ export class View {
     this.arrows = new THREE.Group();
     this.scene.add(this.root, this.ghosts, this.arrows);
     this.plates = [];
+    this.labels = new Map();
     this.motion = null;
     this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.drag = null;
@@ -70,7 +71,7 @@ export class View {
       group.remove(child);
       child.traverse((one) => {
         one.geometry?.dispose();
-        if (one.material) [one.material].flat().forEach((m) => { m.map?.dispose(); m.dispose(); });
+        if (one.material) [one.material].flat().forEach((m) => { if (!one.isSprite) m.map?.dispose(); m.dispose(); });
       });
     }
   }
@@ -124,6 +125,16 @@ export class View {
   }
 
   label(text, place, height) {
+    const key = `${text} ${this.dark()}`;
+    if (!this.labels.has(key)) this.labels.set(key, this.written(text));
+    const texture = this.labels.get(key);
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: texture, depthTest: false }));
+    sprite.scale.set((height * texture.image.width) / texture.image.height, height, 1);
+    sprite.position.copy(place);
+    return sprite;
+  }
+
+  written(text) {
     const canvas = document.createElement("canvas");
     const context = canvas.getContext("2d");
     context.font = "48px system-ui, sans-serif";
@@ -133,11 +144,7 @@ export class View {
     context.fillStyle = this.dark() ? "#d4dde8" : "#2b3642";
     context.textBaseline = "middle";
     context.fillText(text, 8, 34);
-    const texture = new THREE.CanvasTexture(canvas);
-    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: texture, depthTest: false }));
-    sprite.scale.set((height * canvas.width) / canvas.height, height, 1);
-    sprite.position.copy(place);
-    return sprite;
+    return new THREE.CanvasTexture(canvas);
   }
 
   map() {
