@@ -344,8 +344,14 @@ export class View {
   }
 
   draw() {
-    this.scene.background = new THREE.Color(this.dark() ? 0x14181e : 0xfbfcfe);
-    this.renderer.render(this.scene, this.camera);
+    // Once for each frame, after the figures, however often it is asked for.
+    if (this.drawing) return;
+    this.drawing = true;
+    requestAnimationFrame(() => {
+      this.drawing = false;
+      this.scene.background = new THREE.Color(this.dark() ? 0x14181e : 0xfbfcfe);
+      this.renderer.render(this.scene, this.camera);
+    });
   }
 
   ray(event) {
