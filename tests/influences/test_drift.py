@@ -342,13 +342,13 @@ def test_declared_drifts_are_covered_in_many_campaigns(drawn: Experiment) -> Non
     assert_covered(coverage(design, design, law, SPREAD, 3000), 3000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
         "drift declared",
-        pytest.param("drift unknown", marks=pytest.mark.long),
-        pytest.param("drift not declared", marks=pytest.mark.long),
+        "drift unknown",
+        "drift not declared",
     ],
 )
 def test_the_page_states_what_is_wrong_otherwise(

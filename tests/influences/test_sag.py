@@ -218,13 +218,13 @@ def test_declared_sag_is_covered_in_many_campaigns(drawn: Experiment) -> None:
     assert_covered(coverage(design, design, law, SPREAD, 3000), 3000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
         "sag declared",
-        pytest.param("sag of another shape", marks=pytest.mark.long),
-        pytest.param("sag not declared", marks=pytest.mark.long),
+        "sag of another shape",
+        "sag not declared",
     ],
 )
 def test_the_page_states_what_is_wrong_otherwise(

@@ -259,13 +259,13 @@ def test_declared_temperatures_are_covered_in_many_campaigns(drawn: Experiment) 
     assert_covered(coverage(drawn, lay_out(drawn), 3000), 3000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
         "declared",
-        pytest.param("values alone", marks=pytest.mark.long),
-        pytest.param("not declared", marks=pytest.mark.long),
+        "values alone",
+        "not declared",
     ],
 )
 def test_the_page_states_what_is_wrong_otherwise(

@@ -23,6 +23,11 @@ from scipy.spatial.distance import pdist
 FOLDER = Path(__file__).parent / "samples"
 CAMPAIGN = FOLDER / "campaign.yaml"
 ROWS = list(csv.DictReader((FOLDER / "index.csv").read_text(encoding="utf-8").splitlines()))
+# One of each kind, which the ordinary tests fit.
+ORDINARY = {
+    *("dmis_points.dmo", "pcdmis_inch.txt", "calypso_chr.txt", "qif_3_0.qif", "german.csv"),
+    *("centres.csv", "part.csv", "one_per_position", "swapped.csv"),
+}
 # What a table does not say of itself.
 OPTIONS = {
     "centres.csv": ["--coordinates", "ball centres"],
@@ -65,7 +70,13 @@ def split(estimates: Any) -> tuple[Any, Any]:
     return machine, np.reshape(places, (16, 3))
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["file"])
+def chosen(row: dict[str, Any]) -> Any:
+    """One of each maker in the ordinary tests, all of them in the long ones."""
+    is_ordinary = row["file"] in ORDINARY
+    return pytest.param(row, id=row["file"], marks=() if is_ordinary else pytest.mark.long)
+
+
+@pytest.mark.parametrize("row", [chosen(row) for row in ROWS])
 def test_an_export_fits_by_one_command(
     row: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
