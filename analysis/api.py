@@ -794,7 +794,8 @@ def plan(
     if order is not None:
         ensure_one_of(tuple(ORDERS), order=order)
     request = Request(criterion, budget, curve, seed, order, tuple(drift))
-    chosen = with_pool(_experiment(experiment))
+    found = load_file(experiment, True) if isinstance(experiment, str | os.PathLike) else ()
+    chosen = found[0] if len(found) == 1 else with_pool(_experiment(experiment))
     taken = None if done is None else _table("done", done)
     before = None if earlier is None else Path(earlier)
     return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)

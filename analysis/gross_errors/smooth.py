@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design, State, locations
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.hat import row_count
 from ballplate.simulator.geometry.motions import AXIS_NAMES
@@ -47,8 +47,13 @@ def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
     were taken in.
     """
     at = LinearisedDesign(design, state, x)
+    # Not at the readings themselves: where these are at few places on a scale, functions of them
+    # differ by their noise, and would explain it.
+    drawn = replace(state, balls=design.balls.places)
+    readings = design.readings
+    scales = locations(design, drawn, readings) - state.probes[readings.probe]
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
-        for words, displacement in build(design, state, x):
+        for words, displacement in build(design, state, scales):
             yield Smooth(words, _rows(at, displacement))
 
 

@@ -15,6 +15,7 @@ from ..presentation.result import Result
 from ..results.adjustments import freedom_words
 from ..results.fit import Fit
 from ..results.study import PlannedUncertainty
+from ..uncertainty.scale import can_stretch
 from .requirements.goals import Goal, Judgement
 
 
@@ -108,12 +109,22 @@ class NextStep(Result):
     def _maximum(self) -> list[str]:
         """The largest U6, where the goal does not tell it."""
         assert self.fit is not None
-        largest = self.fit.quantities["U6"].maximum * self.sigma / self.fit.sigma
-        return [] if math.isnan(largest) else [f"largest U6 {number(1e6 * largest)} µm"]
+        lengths = self.fit.quantities["U6"]
+        if lengths.undetermined == lengths.count:
+            return [f"U6 undetermined of all {lengths.count} lengths"] if lengths.count else []
+        largest = lengths.maximum * self.sigma / self.fit.sigma
+        open_ = lengths.undetermined
+        some = f", {open_} of {lengths.count} undetermined" if open_ else ""
+        return [f"largest U6 {number(1e6 * largest)} µm{some}"]
 
     def _verdict(self) -> str:
         if self.is_met:
-            return "target met: stop"
+            assert self.fit is not None
+            by_itself = not can_stretch(self.fit.design, self.fit.solution.state)
+            own = (
+                " by the machine's own scales, which nothing here vouches for" if by_itself else ""
+            )
+            return f"target met{own}: stop"
         reason = self._reason()
         if self.next is None:
             return f"{reason}; no position is left to read"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment.stated_models import stated_model
 from ballplate.simulator.maps.corrected_points import corrected_with_root
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
 from ballplate.simulator.maps.map_conversion import MapConversion, converted
 
 from ..presentation.formatting import aligned, amount_of, as_data, number, to_uncertainty
@@ -43,8 +43,13 @@ class ConvertedMap(Result):
 
     @property
     def map(self) -> FittedMap:
-        """The new map."""
-        return self.conversion.converted
+        """The new map, which says what it was converted from."""
+        converted = self.conversion.converted
+        name = f"conversion from {self.old.settings['kind']}"
+        residual = 0.0 if self.is_exact else self.residual[0]
+        one = LeftOut(name, CONVERSION, "m", residual, None)
+        earlier = (other for other in converted.left_out if other.kind != CONVERSION)
+        return replace(converted, left_out=(*earlier, one))
 
     @property
     def residual(self) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -19,12 +19,13 @@ from ballplate.simulator.maps.corrected_points import (
     corrected_with_root,
     tips,
 )
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap
 from ballplate.simulator.maps.mapped_lengths import mapped_lengths
 from ballplate.simulator.readings.point_files import GivenPoints
 
 from ..presentation.formatting import aligned, finite, number, to_uncertainty
 from ..presentation.result import Result
+from ..uncertainty.scale import stretches
 from .adjustments import few_degrees_of_freedom, freedom_words
 from .wanted_lengths import WantedLengths
 
@@ -162,6 +163,8 @@ class Correction(Result):
             remedy = f"expanded uncertainties with k = {self.coverage_factor:g} may be too small"
             freedom = fitted.degrees_of_freedom
             found.append(few_degrees_of_freedom(freedom, "sigma", remedy))
+        if not stretches(fitted.model, fitted.volume, fitted.values):
+            found.append(OWN_SCALES)
         if fitted.left_out:
             found.append(left_out_words(fitted))
         return tuple(filter(None, found))
@@ -328,10 +331,33 @@ class Correction(Result):
         ]
 
 
+OWN_SCALES = (
+    "the error model cannot change the scale: lengths are those of the machine's own scales, and U"
+    " does not contain how wrong these may be"
+)
+
+
 def left_out_words(fitted: FittedMap) -> str:
-    """Which estimates of the fit a map does not apply."""
-    names = listing((one.name for one in fitted.left_out), 4)
-    count = len(fitted.left_out)
+    """Which estimates of the fit a map does not apply, and what its conversion has changed."""
+    residual = fitted.conversion_residual
+    words = []
+    if residual is not None:
+        told = (
+            f"corrected points differ by up to {number(1e6 * residual, 3)} µm from those of the map"
+            " before, which U does not contain"
+            if residual
+            else "coefficients that the model before did not have are as it implies, and were not"
+            " estimated from readings"
+        )
+        words.append(f"the map was converted from another error model: {told}")
+    campaign = [one.name for one in fitted.left_out if one.kind != CONVERSION]
+    if campaign:
+        words.append(_of_campaign(campaign))
+    return "; ".join(words)
+
+
+def _of_campaign(estimated: Sequence[str]) -> str:
+    names, count = listing(estimated, 4), len(estimated)
     return (
         f"{count} parameter{'s' * (count > 1)} of influence quantities that the fit estimated"
         f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"

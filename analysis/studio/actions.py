@@ -49,9 +49,14 @@ def done(document: DesignDocument, action: Arguments) -> DesignDocument:
     if not isinstance(name, str) or name not in ACTIONS:
         raise ActionError(f"no action {name!r}; there are {', '.join(ACTIONS)}")
     try:
-        return changed(document, ACTIONS[name](document, action))
+        text = ACTIONS[name](document, action)
     except KeyError as error:
         raise ActionError(f"{name} needs {error}") from None
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ActionError(f"{error.object[error.start]!r} is no character of a file") from None
+    return changed(document, text)
 
 
 def _moved(document: DesignDocument, action: Arguments) -> str:

@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.steps import ProgressStep, Report, counted
+from ballplate.simulator.experiment.changes import changed_tree
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.modules import refused_modules
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from ..presentation.formatting import finite
@@ -68,7 +70,12 @@ def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report
     found: list[dict[str, Any]] = []
     for value in counted(values, "values", len(values), report):
         try:
-            planned = planned_uncertainty(experiment.with_({path: value_of(value)}))
+            changes = {path: value_of(value)}
+            if not document.with_modules:
+                tree = changed_tree(experiment.tree, str(experiment.source), changes)
+                if refused := refused_modules(tree, document.path.parent):
+                    raise ExperimentError(refused)
+            planned = planned_uncertainty(experiment.with_(changes))
         except ExperimentError as error:
             found.append({"value": value, "error": error.messages[0].text})
             continue

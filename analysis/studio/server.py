@@ -95,7 +95,7 @@ class Guard:
         if headers.get("host", "") not in self.hosts:
             return "this address is not the studio's; use the one that the command has printed\n"
         origin = headers.get("origin")
-        if origin is not None and origin.removeprefix("http://") not in self.hosts:
+        if origin is not None and origin not in {f"http://{host}" for host in self.hosts}:
             return "another page may not use the studio\n"
         if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
             return "another page may not use the studio\n"

@@ -189,6 +189,7 @@ class Session:
         names = variants_of(self._document)
         if action.get("name") not in names:
             raise RefusedError(f"no variant {action.get('name')!r}; there are {', '.join(names)}")
+        self._answer = None
         self._become(replace(self._document, variant=action["name"]))
 
     def _keep(self, action: Mapping[str, Any]) -> None:
@@ -216,7 +217,7 @@ class Session:
         trusted = path.resolve() == self._first
         document = opened(path, None, trusted)
         names = variants_of(document)
-        self._kept = None
+        self._kept = self._answer = None
         self._become(replace(document, variant=names[0] if names else None))
 
     def _inside(self, name: str) -> Path:
@@ -226,7 +227,8 @@ class Session:
         """
         folder = self._first.parent
         path = folder / name
-        is_plain = name == Path(name).name and name.lower().endswith(ENDINGS)
+        is_plain = name == Path(name).name and name.isprintable()
+        is_plain &= name.lower().endswith(ENDINGS) and not name.startswith(".")
         if not is_plain or path.resolve().parent != folder:
             raise RefusedError(f'"{name}" is not the name of a design in the folder {folder.name}')
         return path

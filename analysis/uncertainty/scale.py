@@ -13,13 +13,14 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, ErrorModel
 
 from .pairs import PairSummary
 from .summaries import point_pairs
@@ -189,9 +190,20 @@ def scale_row(at: Linearisation) -> Array:
 
 def can_stretch(design: Design, state: State) -> bool:
     """Whether the error model can stretch the volume by the same ratio along all axes."""
-    points = _points(design)
-    offsets = np.broadcast_to(state.probes[design.evaluation.probe], points.shape)
-    jacobian = design.model.jacobian(points, state.a, offsets)
+    offset = state.probes[design.evaluation.probe]
+    return _stretches(design.model, _points(design), state.a, offset)
+
+
+def stretches(model: ErrorModel, volume: Volume, a: Array) -> bool:
+    """Whether an error model with parameters a (n,) can stretch its volume by the same ratio along
+    all axes.
+    """
+    return _stretches(model, _corners(volume), a, np.zeros(len(volume.lower)))
+
+
+def _stretches(model: ErrorModel, points: Array, a: Array, offset: Array) -> bool:
+    offsets = np.broadcast_to(offset, points.shape)
+    jacobian = model.jacobian(points, a, offsets)
     centred = points - points.mean(axis=0)
     columns = (jacobian - jacobian.mean(axis=0)).reshape(centred.size, -1)
     size = np.linalg.norm(columns, axis=0)
@@ -206,7 +218,11 @@ def _points(design: Design) -> Array:
     points = design.evaluation.points
     if len(points) > 1 and np.ptp(points, axis=0).max() > 0:
         return points
-    return np.array(list(product(*zip(*design.machine.volume.corners, strict=True))))
+    return _corners(design.machine.volume)
+
+
+def _corners(volume: Volume) -> Array:
+    return np.array(list(product(*zip(*volume.corners, strict=True))))
 
 
 def _linearised(experiment: Experiment) -> Linearisation | None:

@@ -79,6 +79,10 @@ def resolve_map_prior(
     years = None if fitted is None else _years(settings, fitted, steps, references)
     if fitted is None or years is None or not _is_same(fitted, model, machine, of_file, references):
         return []
+    if fitted.conversion_residual is not None:
+        text = "was converted from another error model, and holds what no readings were asked for"
+        problems.add(of_file, f"{text}; use the map that fit wrote")
+        return []
     kept = np.arange(len(fitted.values))
     free = [
         (name, axis)

@@ -20,13 +20,17 @@ LEAST_SIGMA = 1e-6
 # Eigenvalues of correlations below this, in parts of the largest, are rounding.
 ROUNDING = 1e-13
 
+# Kind of what a map leaves out that was converted from another error model.
+CONVERSION = "conversion"
+
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A parameter that a fit estimated and its map does not apply: of an influence quantity, say.
+    """A parameter that a fit estimated and its map does not apply: of an influence quantity, say;
+    or what a map lacks that was converted from another error model.
 
-    `kind` is as in the estimates of a fit; `value` and `standard_uncertainty` are in `unit`, None
-    where it is undetermined.
+    `kind` is as in the estimates of a fit, or `CONVERSION`; `value` and `standard_uncertainty` are
+    in `unit`, None where it is undetermined.
     """
 
     name: str
@@ -96,6 +100,14 @@ class FittedMap:
     def without_scatter(self) -> bool:
         """Whether sigma, and with it the covariance, is zero but for rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    @property
+    def conversion_residual(self) -> float | None:
+        """By how much, in metres, corrected points differ at most from those of the map that this
+        one was converted from; None where a fit wrote it.
+        """
+        found = [one.value for one in self.left_out if one.kind == CONVERSION]
+        return found[0] if found else None
 
     @cached_property
     def offset_columns(self) -> Integers:

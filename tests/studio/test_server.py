@@ -132,6 +132,33 @@ def test_a_model_in_python_runs_only_from_the_file_that_was_named(client, design
     client.post("/api/start", json={"job": "suggest"})
     assert wait(client)[-1]["state"] == "failed"
     assert not ran.exists()
+    # Nor does a value that a sweep is asked to try, in a design that has none.
+    design.with_name("plain.yaml").write_bytes(design.read_bytes())
+    assert (
+        "error"
+        not in client.post(
+            "/api/do", json={"do": "open", "name": "plain.yaml", "discard": True}
+        ).json()
+    )
+    value = "{kind: python, file: model.py, name: Model}"
+    sweep = {"path": "error_model", "values": [value]}
+    client.post("/api/start", json={"job": "sweep", "settings": sweep})
+    (row,) = wait(client)[-1]["result"]
+    assert "Python" in row["error"] and not ran.exists()
+
+
+def test_figures_of_another_file_are_not_shown_under_a_name(client, design):
+    design.with_name("broken.yaml").write_text("title: [\n")
+    answer = client.post("/api/do", json={"do": "open", "name": "broken.yaml"}).json()
+    assert answer["messages"] and answer["design"] is None
+
+
+def test_a_text_that_no_file_can_hold_is_refused(client):
+    body = '{"do": "text", "text": "title: \\ud800 x"}'
+    headers = {"Content-Type": "application/json"}
+    answer = client.post("/api/do", content=body, headers=headers).json()
+    assert "is no character of a file" in answer["error"]
+    assert "error" not in client.get("/api/state").json()
 
 
 def wait(client, seconds=120.0):

@@ -19,6 +19,9 @@ from .rungs import FILE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+# Criteria closer than this are the same but for rounding.
+SAME_CRITERION = 1e-2
+
 
 @dataclass(frozen=True)
 class LengthChange:
@@ -128,10 +131,15 @@ class Ladder(FitResult):
         elif file.parameters > chosen.parameters:
             told = "has more parameters than the readings call for"
         else:
-            better = file.criteria.bic < chosen.criteria.bic
-            told = "is no poorer or richer form of these; by BIC it is " + (
-                "the better" if better else "the worse"
+            apart = file.criteria.bic - chosen.criteria.bic
+            word = (
+                "as good"
+                if abs(apart) < SAME_CRITERION
+                else "the better"
+                if apart < 0
+                else "the worse"
             )
+            told = f"is no poorer or richer form of these; by BIC it is {word}"
         return (
             f"the file's error model, {file.model.removeprefix(FILE)}, {told}; it changes"
             f" lengths by {self._length(file.change.rms)} µm rms"

@@ -90,6 +90,8 @@ class Validation(FitResult):
         lost = [one for one in self.left_out if not one.converged]
         told = [f"{one.kind} {one.name} is predicted wrongly by the others" for one in self.failed]
         told += [f"without {one.kind} {one.name} the estimate does not converge" for one in lost]
+        if not any(one.predicted for one in self.left_out):
+            told.append("nothing was tested: the rest predicts nothing that can be left out")
         return "; ".join(told)
 
     def headline(self) -> str:
