@@ -5,6 +5,7 @@ told.
 from __future__ import annotations
 
 import ast
+import compileall
 import importlib.util
 import inspect
 import os
@@ -16,8 +17,12 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-# Hundreds of commands are run, each of which would compile all modules anew.
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Hundreds of commands are run, each of which would compile all modules anew: once is enough. None of
+# them writes what it has compiled, since some are run on a disk that takes no more.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    for folder in ("analysis", "simulator", "tests"):
+        compileall.compile_dir(ROOT / folder, quiet=2)
+os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
 
 # Modules of Python that only POSIX has.
 MODULES = ("fcntl", "pty", "resource", "termios")
