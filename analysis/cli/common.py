@@ -8,12 +8,12 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .outputs import PICTURE, UsageError, Writer, add_output, write
-from .telling import tell_notes, warn
+from .telling import note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
@@ -48,6 +48,29 @@ def add_json(parser: ArgumentParser) -> None:
             "print JSON in metres and radians: an object, or an array of them for several"
             " experiments"
         ),
+    )
+
+
+def add_goal(parser: ArgumentParser, quantities: str) -> None:
+    """Add what is to be reached, with examples of quantities, and what replaces the target."""
+    parser.add_argument(
+        "--goal",
+        default="lengths",
+        help=(
+            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
+            f" tasks, or a quantity such as {quantities}"
+        ),
+    )
+    parser.add_argument(
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="share of the lengths that must be within the target; default: all",
+    )
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
 
 
@@ -174,6 +197,13 @@ def write_picture(options: Namespace, draw: Writer) -> None:
         write(options, {options.plot: draw})
     except ValueError as error:
         raise UsageError(f"--plot: {error}") from None
+
+
+def write_noted(options: Namespace, contents: Mapping[Path | None, Writer | str]) -> None:
+    """Write the files of a command, and note each that is written."""
+    if write(options, contents):
+        for path in filter(None, contents):
+            note(options, f"{path} written")
 
 
 def add_page(parser: Any, help: str) -> None:

@@ -10,11 +10,9 @@ from .common import add_json, show
 from .outputs import (
     Output,
     UsageError,
-    Writer,
     add_force,
     add_output,
     check_outputs,
-    text_writer,
     write,
 )
 from .telling import complain
@@ -130,15 +128,11 @@ def run(options: Namespace) -> int:
             Output("output", "-o", path, None, takes_screen=False) for path in paths
         )
         check_outputs(options)
-        write(options, {path: _writer(text) for path, text in paths.items()})
+        write(options, paths)
     show(options, found)
     if paths and not options.json:
         print(f"written: {', '.join(map(str, sorted(paths)))}")
     return 0
-
-
-def _writer(text: str) -> Writer:
-    return text_writer(lambda stream: stream.write(text))
 
 
 def _made(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:

@@ -123,13 +123,9 @@ def run(options: Namespace) -> int:
         )
     except ValueError as error:
         raise UsageError(error) from None
-    writers: dict[Path, Writer] = {}
-    if options.output:
-        writers[options.output] = text_writer(found.write_points)
-    if options.covariance:
-        writers[options.covariance] = text_writer(found.write_covariance)
-    if writers:
-        write(options, writers)
+    contents: dict[Path | None, Writer] = {options.output: text_writer(found.write_points)}
+    contents[options.covariance] = text_writer(found.write_covariance)
+    write(options, contents)
     show(options, found)
     warn(found.warnings)
     return 1 if found.is_open else 0

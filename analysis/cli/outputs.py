@@ -20,6 +20,7 @@ from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
@@ -311,12 +312,23 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     return True
 
 
-def write(options: Namespace, writers: Mapping[Path, Writer]) -> bool:
-    """Write the files of a command, which ends with the status of a file that cannot be used if
-    one of them cannot be written; whether they are.
+def write(options: Namespace, contents: Mapping[Path | None, Writer | str]) -> bool:
+    """Write the files of a command, texts or by writers, less those that no option names.
+
+    The command ends with the status of a file that cannot be used if one of them cannot be written;
+    whether they are.
     """
+    writers = {
+        path: text_writer(partial(_print, content)) if isinstance(content, str) else content
+        for path, content in contents.items()
+        if path is not None
+    }
     options.is_written = write_outputs(writers, options.force) and options.is_written
     return bool(options.is_written)
+
+
+def _print(text: str, stream: TextIO) -> None:
+    stream.write(text)
 
 
 def text_writer(print_to: Callable[[TextIO], object]) -> Writer:

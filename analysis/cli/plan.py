@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_json, add_picture, add_workers, count, number, show, single, whole
-from .outputs import Writer, add_force, add_output, text_writer, write
+from .outputs import Writer, add_force, add_output, write
 from .sheet import sheet_name
 from .telling import note
 
@@ -210,16 +210,14 @@ def run(options: Namespace) -> int:
 
 def _write(campaign: Campaign, options: Namespace) -> None:
     """Write what was asked for."""
-    writers: dict[Path, Writer] = {}
+    contents: dict[Path | None, Writer | str] = {}
     if options.output is not None:
-        text = campaign.to_yaml(options.output.parent)
-        writers[options.output] = text_writer(lambda stream: stream.write(text))
+        contents[options.output] = campaign.to_yaml(options.output.parent)
     if options.sheet is not None:
-        told = campaign.sheet_text(options.sheet.suffix.lower())
-        writers[options.sheet] = text_writer(lambda stream: stream.write(told))
+        contents[options.sheet] = campaign.sheet_text(options.sheet.suffix.lower())
     if options.plot is not None:
         # Numbered as on the run sheet.
-        writers[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot
-    if write(options, writers):
+        contents[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot
+    if write(options, contents):
         for path in filter(None, (options.output, options.sheet)):
             note(options, f"{path} written")

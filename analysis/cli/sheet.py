@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from functools import partial
 from pathlib import Path
-from typing import TextIO
 
-from .common import add_file, add_json, show, single
-from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
-from .telling import note
+from .common import add_file, add_json, show, single, write_noted
+from .outputs import UsageError, add_force, add_output
 
 SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".csv",)
 
@@ -99,14 +96,5 @@ def run(options: Namespace) -> int:
         texts[options.points] = sheet.points(options.ball_diameter)
     if options.json or not texts:
         show(options, sheet)
-    writers: dict[Path, Writer] = {
-        path: text_writer(partial(_print, text)) for path, text in texts.items()
-    }
-    if write(options, writers):
-        for path in texts:
-            note(options, f"{path} written")
+    write_noted(options, texts)
     return 0
-
-
-def _print(text: str, stream: TextIO) -> None:
-    stream.write(text)
