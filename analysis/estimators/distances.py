@@ -27,16 +27,15 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.ball_layouts import pairs
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import (
     NoReadingError,
     noisy_certificate,
     noisy_readings,
-    on_true_machine,
 )
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
 from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
 from ..presentation.result import FitResult, Result
@@ -347,9 +346,7 @@ def compare_estimators(
         _refuse_unknown_places(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
-    on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
-    )
+    on_truth, truth = on_stated_machine(experiment, design)
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
     same, true = _same_pairs(design, on_truth, truth, seed, points)
@@ -361,9 +358,7 @@ def compare_estimators(
                 experiment, design, on_truth, truth, chosen, estimator, across_probes, generator
             )
         except NoReadingError as error:
-            raise ExperimentError(
-                [experiment.message(("true_machine",), f"{error}; state smaller ones")]
-            ) from None
+            raise too_large(experiment, error) from None
         if both is None:
             failed.append(trial)
         else:

@@ -193,7 +193,7 @@ def cross_validate(
     if not dimensions:
         raise refused(experiment.source, "the readings leave nothing to compare")
     square = float((((u.T @ change)[used] / values[used]) ** 2).sum())
-    freedom = min(_freedom(at) for at, _ in fits)
+    freedom = min(at.degrees_of_freedom for at, _ in fits)
     shape = places.shape
     return CrossValidation(
         experiment.label,
@@ -212,10 +212,6 @@ def cross_validate(
     )
 
 
-def _freedom(at: Linearisation) -> int:
-    return at.design.observation_count - at.design.parameter_count + at.deficiency
-
-
 def _fitted(
     experiment: Experiment, observed: ObservedReadings, given: bool
 ) -> tuple[Linearisation, float]:
@@ -224,7 +220,7 @@ def _fitted(
         text = f"the estimate from one campaign's readings has {solution.status}; see ballplate fit"
         raise refused(experiment.source, text)
     at = linearised_fit(observed.design, solution)
-    freedom = _freedom(at)
+    freedom = at.degrees_of_freedom
     is_estimated = not given and freedom > 0
     left = solution.factor.sum_of_squares / max(freedom, 1)
     return at, float(np.sqrt(left)) if is_estimated else 1.0
