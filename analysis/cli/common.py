@@ -8,11 +8,11 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .outputs import PICTURE, UsageError, Writer, add_output, write
+from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
 from .telling import note, tell_notes, warn
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def write_picture(options: Namespace, draw: Writer) -> None:
         raise UsageError(f"--plot: {error}") from None
 
 
-def write_noted(options: Namespace, contents: Mapping[Path | None, Writer | str]) -> None:
+def write_noted(options: Namespace, contents: Contents) -> None:
     """Write the files of a command, and note each that is written."""
     if write(options, contents):
         for path in filter(None, contents):

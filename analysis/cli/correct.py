@@ -11,10 +11,9 @@ from .outputs import UsageError, Writer, add_force, add_output, text_writer, wri
 from .telling import warn
 
 if TYPE_CHECKING:
+    from ballplate.simulator.design.objects import Tasks
     from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.simulator.readings.point_files import GivenPoints
-
-    from ..results.wanted_lengths import WantedLengths
 
 HELP = "correct points by the map of a fit, with their uncertainty"
 DESCRIPTION = (
@@ -131,7 +130,7 @@ def run(options: Namespace) -> int:
     return 1 if found.is_open else 0
 
 
-def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> WantedLengths:
+def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
     from ballplate.simulator.experiment.load import load
 

@@ -47,6 +47,9 @@ BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
 Writer = Callable[[Path], object]
 """Writes a file of the kind that the path's name ends in."""
 
+Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
+"""What files are to hold, texts or by writers; None stands for one that no option names."""
+
 
 @dataclass(frozen=True)
 class Needed:
@@ -312,8 +315,8 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     return True
 
 
-def write(options: Namespace, contents: Mapping[Path | None, Writer | str]) -> bool:
-    """Write the files of a command, texts or by writers, less those that no option names.
+def write(options: Namespace, contents: Contents) -> bool:
+    """Write the files of a command.
 
     The command ends with the status of a file that cannot be used if one of them cannot be written;
     whether they are.

@@ -23,7 +23,7 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ...presentation.formatting import aligned, as_data, number
+from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
 from .lack_of_fit import chance_of, chance_words
 from .left_out import MOST_POINTS
@@ -125,10 +125,7 @@ class CrossValidation(FitResult):
     def to_dict(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
-            "title": self.title,
-            "sum_of_squares": self.sum_of_squares,
-            "dimensions": self.dimensions,
-            "chance": self.chance,
+            **picked(self, "title", "sum_of_squares", "dimensions", "chance"),
             "sigmas": list(self.sigmas),
             "largest_length_difference": {
                 "value": self.lengths[0],
