@@ -8,9 +8,10 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
 from .telling import note, tell_notes, warn
@@ -74,6 +75,22 @@ def add_goal(parser: ArgumentParser, quantities: str) -> None:
     )
 
 
+T = TypeVar("T")
+
+
+def argument_type(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """The type of an argument: what its parser says is wrong with a text is told as it is."""
+
+    @wraps(parse)
+    def parsed(text: str) -> T:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise ArgumentTypeError(str(error)) from None
+
+    return parsed
+
+
 def whole(text: str, least: int = 0) -> int:
     """Read an index or a seed from the command line."""
     if not text.isascii() or not text.isdigit() or int(text) < least:
@@ -108,14 +125,12 @@ def number(text: str, unit: str = "") -> float:
         return math.nan
 
 
+@argument_type
 def day(text: str) -> str:
     """Argument type: a day such as 2026-11-22."""
     from ballplate.simulator.inputs.days import stated_day
 
-    try:
-        return stated_day(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return stated_day(text)
 
 
 def map_path(text: str) -> Path:

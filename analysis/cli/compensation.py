@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_json, show
+from .common import add_json, argument_type, show
 from .outputs import (
     Output,
     UsageError,
@@ -100,15 +100,12 @@ def add_options(parser: ArgumentParser) -> None:
     add_json(parser)
 
 
+@argument_type
 def _lengths(text: str) -> tuple[float, ...]:
-    from ballplate.simulator.inputs.quantities import QuantityError
 
     from ..error_maps.compensation_tables import parse_lengths
 
-    try:
-        return parse_lengths(text)
-    except QuantityError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return parse_lengths(text)
 
 
 def run(options: Namespace) -> int:

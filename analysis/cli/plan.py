@@ -7,7 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, add_picture, add_workers, count, number, show, single, whole
+from .common import (
+    add_file,
+    add_json,
+    add_picture,
+    add_workers,
+    argument_type,
+    count,
+    number,
+    show,
+    single,
+    whole,
+)
 from .outputs import Writer, add_force, add_output, write
 from .sheet import sheet_name
 from .telling import note
@@ -155,15 +166,12 @@ def _hours(text: str) -> float:
     return value
 
 
+@argument_type
 def _drift(text: str) -> str:
-    from ballplate.simulator.inputs.quantities import QuantityError
 
     from ..planning.drift_in_orders import drift_size
 
-    try:
-        drift_size(text)
-    except QuantityError as error:
-        raise ArgumentTypeError(str(error)) from None
+    drift_size(text)
     return text
 
 

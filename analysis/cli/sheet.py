@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
-from .common import add_file, add_json, show, single, write_noted
+from .common import add_file, add_json, argument_type, show, single, write_noted
 from .outputs import UsageError, add_force, add_output
 
 SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".csv",)
@@ -64,13 +64,11 @@ def _points(text: str) -> Path:
     return Path(text)
 
 
+@argument_type
 def _diameter(text: str) -> float:
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
+    from ballplate.simulator.inputs.quantities import parse_length
 
-    try:
-        value = parse_length(text)
-    except QuantityError as error:
-        raise ArgumentTypeError(str(error)) from None
+    value = parse_length(text)
     if not 0.0 < value < 1.0:
         raise ArgumentTypeError(f'expected a length above zero, below 1 m, not "{text}"')
     return value

@@ -206,7 +206,7 @@ def _against_readings(
     # A ball without any reading keeps its place in the drawing.
     start = initial_state(replace(design, readings=readings.select(right)), x[right])
     rotations, origins, shape = start.rotations.copy(), start.origins.copy(), start.balls.copy()
-    for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]):
+    for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]).tolist():
         rotations[k], origins[k] = found.rotations[k], found.origins[k]
     off_drawing = np.zeros(len(readings))
     for k, rows, nominal in read_in_positions(design, readings):
