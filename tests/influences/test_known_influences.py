@@ -88,7 +88,8 @@ def test_plates_whose_balls_have_the_same_names_have_displacements_of_their_own(
     corner = {"x": "100 mm", "y": "100 mm"}
     place = {"plane": "z", "corner": corner, "probes": ["down"]}
     positions = [
-        place | {"name": f"{plate} {turn}", "level": level, "artefact": plate, "quarter_turns": turn}
+        place
+        | {"name": f"{plate} {turn}", "level": level, "artefact": plate, "quarter_turns": turn}
         for plate, level in (("one", "200 mm"), ("two", "600 mm"))
         for turn in (0, 1)
     ]
