@@ -6,7 +6,6 @@ import base64
 import multiprocessing
 import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -28,6 +27,9 @@ Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
 
 # Most computations beside one another.
 MOST_RUNNING = 2
+
+# Seconds for a process that is asked to end.
+PATIENCE = 2.0
 
 # Data sets of Monte Carlo unless another number is asked for.
 TRIALS = 256
@@ -133,50 +135,56 @@ JOBS: Mapping[str, Work] = {
 
 @dataclass
 class Job:
-    """A computation in a process of its own: `state` is running, done, failed or stopped, `step`
-    how far it has come, and `result` what came of it, or why nothing did.
+    """A computation in a process of its own, of the design with a `fingerprint`: `state` is
+    running, done or failed, `step` how far it has come, `result` what came of it, or why nothing
+    did, and `page` one that it has made.
     """
 
     name: str
-    revision: int
+    fingerprint: str
     process: BaseProcess
     connection: Connection
     state: str = "running"
     step: str = ""
     result: Any = None
+    page: str = ""
 
     def look(self) -> None:
         """Take what the process has told since."""
-        with suppress(EOFError, OSError):
+        try:
             while self.state == "running" and self.connection.poll():
                 kind, said = self.connection.recv()
                 if kind == "step":
                     self.step = said
+                elif kind == "page":
+                    self.page = said
                 else:
                     self.state, self.result = kind, said
-        if self.state == "running" and not self.process.is_alive() and not self.connection.poll():
+        except (EOFError, OSError):
             self.state, self.result = "failed", "the computation ended without a result"
 
     def stop(self) -> None:
-        """End the process."""
-        if self.state == "running":
-            self.state = "stopped"
+        """End the process, which may be one that does not listen."""
         self.process.terminate()
-        self.process.join(2.0)
+        self.process.join(PATIENCE)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
         self.connection.close()
 
     def to_dict(self, number: int) -> dict[str, Any]:
         return {
             "id": number,
             "job": self.name,
-            "revision": self.revision,
+            "fingerprint": self.fingerprint,
             "state": self.state,
             "step": self.step,
             "result": self.result,
+            "page": bool(self.page),
         }
 
 
-def started(name: str, document: DesignDocument, settings: Mapping[str, Any], revision: int) -> Job:
+def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) -> Job:
     """Start a computation with the document as it is now.
 
     :raises KeyError: there is no such job.
@@ -189,7 +197,7 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any], re
     process = context.Process(target=_work, args=arguments, daemon=True)
     process.start()
     sender.close()
-    return Job(name, revision, process, receiver)
+    return Job(name, document.fingerprint, process, receiver)
 
 
 def _work(
