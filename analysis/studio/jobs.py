@@ -13,14 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.steps import ProgressStep, Report, counted
-from ballplate.simulator.experiment.changes import changed_tree
+from ballplate.simulator.computing.steps import ProgressStep, Report
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.modules import refused_modules
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from ..presentation.formatting import finite
-from .actions import value_of
 from .document import DesignDocument, experiment_of
 
 Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
@@ -64,34 +60,9 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
 
 
 def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    """U6 and the rank for several values of one key."""
-    from ..results.study import planned_uncertainty
+    from .sweeping import swept
 
-    experiment, path = experiment_of(document), str(settings["path"])
-    values = [str(one) for one in settings["values"]]
-    found: list[dict[str, Any]] = []
-    for value in counted(values, "values", len(values), report):
-        try:
-            changes = {path: value_of(value)}
-            if not document.with_modules:
-                tree = changed_tree(experiment.tree, str(experiment.source), changes)
-                if refused := refused_modules(tree, document.path.parent):
-                    raise ExperimentError(refused)
-            planned = planned_uncertainty(experiment.with_(changes))
-        except ExperimentError as error:
-            found.append({"value": value, "error": error.messages[0].text})
-            continue
-        lengths = planned.quantities.get("U6")
-        found.append(
-            {
-                "value": value,
-                "deficiency": planned.deficiency,
-                "average": None if lengths is None else finite(lengths.average),
-                "maximum": None if lengths is None else finite(lengths.maximum),
-                "within": None if lengths is None else lengths.within_target,
-            }
-        )
-    return found
+    return swept(document, settings["axes"], report)
 
 
 def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
@@ -208,6 +179,8 @@ def _work(
 
     try:
         result = JOBS[name](document, settings, report)
+        if isinstance(result, dict) and (page := result.pop("page", "")):
+            connection.send(("page", page))
     except ExperimentError as error:
         connection.send(("failed", "\n".join(map(str, error.messages))))
     except (ValueError, TypeError, KeyError, ImportError, OSError) as error:
