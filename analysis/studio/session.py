@@ -73,6 +73,8 @@ class Session:
             DesignDocument(path, variant, beginning, None) if is_new else opened(path, variant)
         )
         document, self.note = recovered(document)
+        if is_new and not self.note:
+            self.note = f"{path.name} is new, and begins with an example; Save writes it"
         if variant is None:
             document = _with_first_variant(document)
         self._kept: dict[str, Any] | None = None

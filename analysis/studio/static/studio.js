@@ -140,7 +140,7 @@ function make(name, attributes = {}, ...children) {
 function show() {
   const { design } = state;
   const focused = focus();
-  $("title").textContent = `${state.file}${state.saved ? "" : " •"}${design ? ` — ${design.title}` : ""}`;
+  $("title").textContent = `${state.file}${state.saved ? "" : " (not saved)"}${design ? ` — ${design.title}` : ""}`;
   document.title = `${state.saved ? "" : "• "}${state.file} – ballplate studio`;
   options($("files"), state.files.includes(state.file) ? state.files : [state.file, ...state.files], state.file);
   $("variant-label").hidden = !state.variants.length;
@@ -158,9 +158,10 @@ function show() {
     if (motion !== null && !design.motions.directions.length) motion = null;
     view.motion = motion;
     view.show(design, selected, { withMap: $("show-map").checked });
-    figures(design, state.messages);
+    $("hint").textContent = `Drag a plate along its plane${design.scene.dimension === 3 ? ", with Shift along its normal" : ""}. Drag elsewhere to turn the view.`;
     legend();
-  }
+  } else view.empty();
+  figures(design, state.messages);
   places();
   if (schema) build($("forms"), state.data, schema, state.messages, (path, value, input) => act({ do: "set", path, value }).then((done) => { if (!done) input.classList.add("bad-field"); }));
   view.ghost(suggestions.filter((one) => one.shown).flatMap((one) => one.places));
@@ -192,40 +193,82 @@ function options(select, names, chosen) {
 function legend() {
   const range = view.mapRange();
   $("legend").replaceChildren();
-  if (!range || !range[1] || !$("show-map").checked) return;
+  if (!$("show-map").checked) return;
+  const words = "Map: standard uncertainty of a corrected co-ordinate, ";
+  if (!range || !range.high) {
+    $("legend").append("Map: everything is undetermined, so that there is nothing to colour.");
+    return;
+  }
   $("legend").append(
-    `standard uncertainty of a corrected co-ordinate: ${micro(range[0])} µm `,
-    make("span", { class: "ramp" }), ` ${micro(range[1])} µm; grey: undetermined`,
+    words, make("span", { class: "nowrap" }, `${micro(range.low)} µm `, make("span", { class: "ramp" }), ` ${micro(range.high)} µm`),
+    range.open ? "; grey: undetermined" : "",
   );
 }
 
 function figures(design, messages) {
-  const { rank } = design;
-  const expected = rank.deficiency === (rank.expected ?? 0);
-  const within = design.within;
   const box = $("verdict");
-  box.classList.toggle("bad", messages.length > 0 || rank.deficiency > 0);
-  box.classList.toggle("warn", !messages.length && !rank.deficiency && within !== null && within < 1);
-  box.replaceChildren(...[
-    make("p", {}, make("strong", {}, messages.length ? "The text is wrong; these are the figures before it." : rank.words), messages.length || expected ? "" : ` (the file expects ${rank.expected ?? 0})`),
-    make("p", {}, `${rank.parameters} parameters, ${rank.observations} observations`),
-    design.headline.length ? make("p", {}, design.headline.join(", ")) : null,
-    ...design.target.map((text) => make("p", {}, text)),
-    ...rank.reasons.map((text) => make("p", {}, text)),
-  ].filter((one) => one !== null));
-  $("messages").replaceChildren(...messages.map((one) => make("li", {}, `line ${one.line}${one.path ? `, ${one.path}` : ""}: ${one.text}`)), ...design.doubts.map((text) => make("li", {}, text)));
-  quantities(design);
-  ask_scale();
-  const list = make("ol");
-  design.motions.directions.forEach((one, index) => {
-    const moving = index === motion;
-    list.append(make("li", {},
-      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages); } }, moving ? "stop" : "move"),
-      make("strong", {}, ` ${one.weak ? "weak" : "undetermined"} `), one.words,
-    ));
-  });
+  const rank = design?.rank;
+  const wrong = messages.length > 0;
+  box.classList.toggle("bad", wrong || rank.deficiency > 0);
+  box.classList.toggle("warn", !wrong && !rank.deficiency && design.within !== null && design.within < 1);
+  const lines = [];
+  if (wrong) lines.push(make("strong", {}, design ? "The text is wrong; these are the figures before it." : "The text is wrong; there are no figures yet."));
+  else lines.push(make("strong", {}, rank.words), rank.deficiency === (rank.expected ?? 0) ? "" : ` (the file expects ${rank.expected ?? 0})`);
+  const figured = design ? [
+    `${rank.parameters} parameters, ${rank.observations} observations`,
+    // The target's words have U6 in them.
+    ...(design.target.length ? design.target : design.headline),
+    ...rank.reasons,
+  ] : [];
+  box.replaceChildren(make("p", {}, ...lines), ...figured.map((text) => make("p", {}, text)));
+  $("messages").replaceChildren(
+    ...messages.map((one) => make("li", {},
+      make("button", { class: "link", "data-focus": `line ${one.line} ${one.path}`, title: "show the line", onclick: () => show_line(one.line) }, `line ${one.line}`),
+      `${one.path ? `, ${one.path}` : ""}: ${one.text}`)),
+    ...(design?.doubts ?? []).map((text) => make("li", {}, text)),
+  );
+  if (design) quantities(design);
+  else $("quantities").replaceChildren();
+  if (design && !wrong) ask_scale();
+  else $("scale").replaceChildren();
+  directions(design, messages);
+}
+
+function show_line(line) {
+  unfold_text(true);
+  const text = $("text");
+  const before = text.value.split("\n").slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+  const end = text.value.indexOf("\n", before);
+  text.focus();
+  text.setSelectionRange(before, end < 0 ? text.value.length : end);
+  text.scrollTop = (line - 4) * (text.scrollHeight / Math.max(1, text.value.split("\n").length));
+}
+
+function unfold_text(open) {
+  $("text-box").hidden = !open;
+  $("toggle-text").setAttribute("aria-expanded", String(open));
+}
+
+const MOST_DIRECTIONS = 4; // that are told before a person asks for the others
+function directions(design, messages) {
+  const unfolded = $("motions").querySelector("details")?.open;
   $("motions").replaceChildren();
-  if (design.motions.directions.length) $("motions").append(make("h2", {}, "What the readings do not tell"), list);
+  const found = design?.motions.directions ?? [];
+  if (!found.length) return;
+  const items = found.map((one, index) => {
+    const moving = index === motion;
+    return make("li", {},
+      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages); refocus(`#motions [data-motion="${index}"]`); } }, moving ? "stop" : "move"),
+      make("strong", {}, ` ${one.weak ? "weak" : "undetermined"} `), one.words,
+    );
+  });
+  const rest = items.slice(MOST_DIRECTIONS);
+  $("motions").append(make("h2", {}, "What the readings do not tell"), make("ol", {}, ...items.slice(0, MOST_DIRECTIONS)));
+  if (rest.length) {
+    const more = make("details", {}, make("summary", {}, `${rest.length} more`), make("ol", {}, ...rest));
+    more.open = Boolean(unfolded) || motion >= MOST_DIRECTIONS;
+    $("motions").append(more);
+  }
 }
 
 // What carries scale takes longer than all the rest: it is asked for once nothing moves any more.
@@ -236,7 +279,7 @@ function ask_scale() {
     try {
       const found = await ask("/api/scale");
       if (found.fingerprint !== state.fingerprint) return;
-      $("scale").textContent = found.lines.join(" ");
+      $("scale").replaceChildren(...found.lines.map((line) => make("p", {}, line)));
       $("scale").classList.remove("stale");
     } catch {
       $("scale").textContent = "";
@@ -246,7 +289,8 @@ function ask_scale() {
 
 function quantities(design) {
   const kept = new Map((state.kept?.quantities ?? []).map((one) => [one.symbol, one]));
-  const unit = (row) => (row.unit === "m" ? "µm" : row.unit === "rad" ? "µrad" : row.unit === "1" ? "ppm" : row.unit.replace("m", "µm").replace("rad", "µrad"));
+  const told = { m: "µm", rad: "µrad", 1: "ppm" };
+  const unit = (row) => row.unit.split(", ").map((one) => told[one] ?? one).join(", ");
   const cell = (row, key) => {
     const was = kept.get(row.symbol)?.[key];
     return make("td", {}, micro(row[key]), was !== undefined && state.kept ? make("span", { class: "was" }, `was ${micro(was)}`) : null);
@@ -269,7 +313,7 @@ function places() {
       make("input", { type: "checkbox", checked: true, title: "switch this position off", "aria-label": `read ${place.name}`, onchange: () => act({ do: "off", position: place.name }) }),
       swatch,
       make("button", { class: "name", onclick: () => choose(place.name) }, place.name),
-      make("small", {}, `${place.readings}`),
+      make("small", { title: "readings" }, `${place.readings}`),
     );
   }), ...state.off.map((name) => make("li", { class: "off" },
     make("input", { type: "checkbox", title: "switch this position on", "aria-label": `read ${name}`, onchange: () => act({ do: "on", position: name }) }),
@@ -445,10 +489,7 @@ $("apply").onclick = async () => {
   if (!(await act({ do: "text", text }))) { $("text").value = text; typed = true; $("apply").disabled = false; }
 };
 $("reopen").onclick = () => { typed = false; act({ do: "reopen" }, "read again; undo leads back to the text that was here"); };
-$("toggle-text").onclick = () => {
-  $("text-box").hidden = !$("text-box").hidden;
-  $("toggle-text").setAttribute("aria-expanded", String(!$("text-box").hidden));
-};
+$("toggle-text").onclick = () => unfold_text($("text-box").hidden);
 $("step").onchange = (event) => { view.step = Number(event.target.value); };
 $("show-map").onchange = show;
 $("home").onclick = () => { view.home(); };
