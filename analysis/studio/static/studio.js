@@ -67,7 +67,9 @@ function tell(text, bad = false) {
 }
 
 let queue = Promise.resolve();
+let acting = 0;
 function act(action, said = "") {
+  acting += 1;
   // One after the other: each goes on from the answer before.
   const next = queue.then(async () => {
     const slow = setTimeout(() => tell("computing …"), 400);
@@ -88,7 +90,7 @@ function act(action, said = "") {
       return false;
     }
   });
-  queue = next.catch(() => {});
+  queue = next.catch(() => {}).finally(() => { acting -= 1; });
   return next;
 }
 
@@ -100,18 +102,21 @@ const view = new View($("view"), {
 
 let waiting = null;
 async function preview(action) {
-  waiting = action;
+  // Of the design as it is now: what comes after the drop is of another one.
+  waiting = { ...action, revision: state.revision, session: state.session };
   if (previewing) return;
   previewing = true;
   while (waiting) {
     const next = waiting;
+    const isMeant = () => !acting && state.revision === next.revision;
     waiting = null;
     try {
-      const design = await ask("/api/preview", { ...next, revision: state.revision, session: state.session });
+      const design = isMeant() ? await ask("/api/preview", next) : null;
+      if (!design || !isMeant()) continue;
       tell("");
       figures(design, []);
     } catch (error) {
-      tell(error.message, true);
+      if (isMeant()) tell(error.message, true);
     }
   }
   previewing = false;
@@ -164,7 +169,7 @@ function show() {
   figures(design, state.messages);
   places();
   if (schema) build($("forms"), state.data, schema, state.messages, (path, value, input) => act({ do: "set", path, value }).then((done) => { if (!done) input.classList.add("bad-field"); }));
-  view.ghost(suggestions.filter((one) => one.shown).flatMap((one) => one.places));
+  view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
   if (fits?.fingerprint !== state.fingerprint) fits = null;
   view.residuals(fits, fits?.scale);
   suggested();
@@ -298,8 +303,9 @@ function quantities(design) {
   $("quantities").replaceChildren(
     make("thead", {}, make("tr", {}, make("th", {}, "standard uncertainty of"), make("th", {}, "average"), make("th", {}, "max."), make("th", {}, ""))),
     make("tbody", {}, ...design.quantities.map((row) => make("tr", {},
-      make("td", { title: row.largest ? `largest at ${row.largest}` : undefined }, make("strong", {}, row.symbol), ` ${row.description}`, row.undetermined ? ` (${row.undetermined} of ${row.count} undetermined)` : ""),
-      cell(row, "average"), cell(row, "maximum"), make("td", {}, unit(row)),
+      make("td", { title: row.largest ? `largest at ${row.largest}` : undefined }, make("strong", {}, row.symbol), ` ${row.description}`, row.undetermined && row.undetermined < row.count ? ` (${row.undetermined} of ${row.count} undetermined)` : ""),
+      ...(row.average === null && !state.kept ? [make("td", { colspan: "2" }, "undetermined")] : [cell(row, "average"), cell(row, "maximum")]),
+      make("td", {}, unit(row)),
     ))),
   );
 }
@@ -352,15 +358,21 @@ function details(place) {
   );
 }
 
+function current() {
+  return suggestions.filter((one) => one.fingerprint === state.fingerprint);
+}
+
 function suggested() {
-  $("suggestions").replaceChildren(...suggestions.map((one) => make("li", {},
+  const shown = current();
+  $("suggestions").replaceChildren(...shown.map((one, k) => make("li", {},
     make("div", {}, one.words),
     make("div", {}, one.average === null || one.average === undefined ? (one.deficiency ? `rank deficiency ${one.deficiency} left` : "") : `U6 ${micro(one.average)} µm on average, ${micro(one.maximum)} µm at most`,
-      one.weak ? `; ${one.weak} directions stay weak` : "", one.faint ? "; barely determined" : ""),
+      one.weak ? `; ${one.weak} ${one.weak > 1 ? "directions stay" : "direction stays"} weak` : "", one.faint ? "; barely determined" : ""),
     make("div", { class: "bar" },
-      make("button", { "aria-pressed": String(!!one.shown), onclick: () => { one.shown = !one.shown; show(); } }, one.shown ? "hide" : "show"),
-      make("button", { "data-apply": "", disabled: one.fingerprint !== state.fingerprint, title: one.fingerprint !== state.fingerprint ? "the design has changed since; ask again" : undefined, onclick: () => apply(one) }, "apply"),
+      make("button", { "aria-pressed": String(!!one.shown), "data-focus": `show ${k}`, onclick: () => { one.shown = !one.shown; show(); } }, one.shown ? "hide" : "show"),
+      make("button", { "data-apply": "", "data-focus": `apply ${k}`, onclick: () => apply(one) }, "apply"),
     ))));
+  if (suggestions.length && !shown.length) $("suggestions").append(make("p", {}, "The design has changed since these were asked for; ask again."));
 }
 
 function apply(one) {
@@ -372,7 +384,7 @@ function apply(one) {
 async function start(job, settings = {}) {
   try {
     await ask("/api/start", { job, settings });
-    tell(`${job}: started`);
+    tell("computing beside the studio …");
   } catch (error) {
     tell(error.message, true);
   }
@@ -395,6 +407,7 @@ async function poll() {
     taken.add(job.id);
     if (job.job === "suggest" || job.job === "next") {
       suggestions = job.result.map((one, k) => ({ ...one, places: one.places ?? [one.place], fingerprint: job.fingerprint, shown: k === 0 }));
+      tell("");
       if (!suggestions.length) tell(job.job === "suggest" ? "nothing is undetermined or weak, or nothing was found that helps" : "no further position fits");
       show();
     }
@@ -410,11 +423,13 @@ async function poll() {
 }
 
 function computations(list) {
-  $("jobs").replaceChildren(...list.map((job) => make("li", { "data-state": job.state },
+  // What was suggested is shown with the suggestions.
+  const told = list.filter((job) => job.state !== "done" || !["suggest", "next"].includes(job.job));
+  $("jobs").replaceChildren(...told.map((job) => make("li", { "data-state": job.state },
     make("strong", {}, job.job), ` ${job.state}${job.state === "running" && job.step ? `: ${job.step}` : ""} `,
     make("button", { "data-focus": `job ${job.id}`, onclick: async () => { await ask("/api/stop", { id: job.id }); poll(); } }, job.state === "running" ? "stop" : "close"),
-    job.page ? make("a", { href: `/pages/${job.id}`, target: "_blank", rel: "noopener", "data-page": "" }, "open its page") : null,
-    job.fingerprint === state.fingerprint ? null : make("small", {}, "of an earlier design"),
+    " ", job.page ? make("a", { href: `/pages/${job.id}`, target: "_blank", rel: "noopener", "data-page": "" }, "open its page") : null,
+    job.fingerprint === state.fingerprint ? null : make("small", {}, " of an earlier design"),
     job.state === "failed" ? make("pre", {}, String(job.result)) : null,
     job.state === "done" && job.result?.lines ? make("pre", { tabindex: "0" }, [...(job.result.notes ?? []), ...job.result.lines].join("\n")) : null,
     job.state === "done" && job.job === "sweep" ? table(job.result, job.page) : null,
