@@ -58,7 +58,7 @@ def recovered(document: DesignDocument) -> tuple[DesignDocument, str]:
     try:
         said = json.loads(path.read_bytes())
         text, coded = str(said["text"]), said["content"]
-        content = None if coded is None else base64.b64decode(coded)
+        content = None if coded is None else base64.b64decode(coded, validate=True)
     except FileNotFoundError:
         return document, ""
     except (OSError, ValueError, TypeError, KeyError) as error:

@@ -70,7 +70,7 @@ def swept(
             page = ""
     return {
         "headline": found.headline(),
-        "axes": [axis.name for axis in axes],
+        "axes": [list(axis.paths) for axis in axes],
         "cells": [
             _cell(row, values)
             for row, values in zip(

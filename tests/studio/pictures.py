@@ -85,7 +85,7 @@ def tour(page, folder: Path, design: Path) -> None:
     page.fill("[data-axis=values]", "0.1 um; 0.2 um; 0.4 um")
     page.click("#more-axes")
     page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.balls")
-    page.fill("[data-axis=values] >> nth=1", "[4, 4]; [5, 5]; [7, 7]")
+    page.fill("[data-axis=values] >> nth=1", "[5, 5]; [6, 6]; [7, 7]")
     picture("sweep")
     page.click("#ok")
     page.wait_for_selector("[data-page]")

@@ -436,11 +436,16 @@ function computations(list) {
   )));
 }
 
+// The last keys of paths, which tell enough where there is little room.
+function short(axis) {
+  return axis.split(", ").map((path) => path.split(".").at(-1)).join(", ");
+}
+
 function table(found, hasPage) {
   const some = found.cells.slice(0, MOST_ROWS);
-  const heads = [...found.axes, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"];
+  const heads = [...found.axes.map((paths) => paths.join(", ")), "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"];
   return make("div", { class: "scrolled", tabindex: "0" },
-    make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((one) => make("th", {}, one)))),
+    make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((one) => make("th", { title: one }, short(one))))),
       make("tbody", {}, ...some.map((cell) => make("tr", {}, ...cell.values.map((one) => make("td", {}, one)),
         ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : [make("td", {}, String(cell.deficiency)), make("td", {}, micro(cell.average)), make("td", {}, micro(cell.maximum)), make("td", {}, share(cell.within) || "no target")]))))),
     found.cells.length > MOST_ROWS ? make("p", {}, `${found.cells.length - MOST_ROWS} cells more are on the page`) : null,
