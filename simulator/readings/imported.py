@@ -363,7 +363,7 @@ def _probe(feature: Feature, position: str, design: Design | None, file: str) ->
     )
     if feature.probe:
         text = text.replace("tells which", "does not tell which", 1)
-    raise ExperimentError([feature.mark.message("", text)])
+    raise feature.mark.refused(text)
 
 
 def _counted(counts: Counter[str]) -> list[str]:

@@ -135,16 +135,8 @@ def read_readings(
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
-        raise ExperimentError(
-            [
-                Message(
-                    str(sources[0]),
-                    1,
-                    1,
-                    "",
-                    f"no reading of the balls {names}; read each at least once",
-                )
-            ]
+        raise refused(
+            sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
     doubt = found.doubts + doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     doubt += doubts_about_digits(design, given, uncertainty)

@@ -10,7 +10,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.inputs.tables import header_names, read_table
 from ballplate.simulator.inputs.yamltree import Mapping, read_tree
@@ -177,5 +177,5 @@ def _fit_of(path: Path) -> Fit:
     observed = read_readings(files, lay_out(experiment), settings=experiment.readings)
     found = fit_observed(experiment, observed)
     if not found.converged:
-        raise ExperimentError([experiment.message((), found.complaint)])
+        raise experiment.refused((), found.complaint)
     return found
