@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import finite, number
@@ -89,7 +90,7 @@ class NextStep(Result):
         last = self.read[-1]
         missing = self.missing.get(last, 0)
         part = f" ({missing} of its readings missing)" if missing else ""
-        begin = f"{count} position{'s' * (count != 1)} read, last {last}{part}"
+        begin = f"{number_of(count, 'position')} read, last {last}{part}"
         told = [begin, *self.observed.redone, *self._known(), self._verdict()]
         return ["; ".join(told)]
 
