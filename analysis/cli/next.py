@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from .common import add_file, add_json, number, percentage, show, single
 from .outputs import UsageError
+from .reading_options import add_sources
 from .table_options import add_tables
 
 if TYPE_CHECKING:
@@ -29,19 +30,11 @@ DESCRIPTION = (
 
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
-    readings = parser.add_argument(
-        "readings",
-        metavar="READINGS",
-        nargs="+",
-        type=Path,
-        default=[],
-        help=(
-            "readings so far: one table or several in the order in which they were taken; default:"
-            " those that the experiment file names"
-        ),
+    add_sources(
+        parser,
+        "readings so far: one table or several in the order in which they were taken; default:"
+        " those that the experiment file names",
     )
-    # With nargs="*" none would be looked for behind the first option.
-    readings.required = False
     parser.add_argument(
         "--watch",
         metavar="FOLDER",

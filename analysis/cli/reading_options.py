@@ -19,21 +19,16 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 
-def add_readings(parser: ArgumentParser) -> None:
+# Of a command that fits readings in any case.
+NAMED = "tables of readings or reports; default: readings.files of the experiment file"
+
+
+def add_readings(parser: ArgumentParser, of_readings: str = NAMED) -> None:
     """Add the experiment file, tables of readings and how they are written, values of certificates,
     and what uncertainties are.
     """
     add_file(parser)
-    readings = parser.add_argument(
-        "readings",
-        metavar="READINGS",
-        nargs="+",
-        type=Path,
-        default=[],
-        help="tables of readings or reports; default: readings.files of the experiment file",
-    )
-    # With nargs="*" none would be looked for behind the first option.
-    readings.required = False
+    add_sources(parser, of_readings)
     add_tables(parser)
     parser.add_argument(
         "--certificate",
@@ -52,6 +47,15 @@ def add_readings(parser: ArgumentParser) -> None:
             " file says"
         ),
     )
+
+
+def add_sources(parser: ArgumentParser, of_readings: str) -> None:
+    """Add tables of readings, none or more, with the help `of_readings`."""
+    readings = parser.add_argument(
+        "readings", metavar="READINGS", nargs="+", type=Path, default=[], help=of_readings
+    )
+    # With nargs="*" none would be looked for behind the first option.
+    readings.required = False
 
 
 def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]:
