@@ -44,7 +44,7 @@ def run(options: Namespace) -> int:
     from ..presentation.result import FitResult
     from .common import show
     from .progress import progress
-    from .telling import complain
+    from .telling import complain, warn
 
     if options.other_plate and not options.against:
         raise UsageError("--other-plate goes with --against only; leave it out")
@@ -62,6 +62,7 @@ def run(options: Namespace) -> int:
         with progress(options) as shown:
             result = validate(experiment, observed, options.sigma, shown.show)
     show(options, result)
+    warn(result.cautions)
     if result.complaint:
         complain(result.complaint)
     return 1 if result.complaint else 0

@@ -320,8 +320,14 @@ def adjusted_machine(
 
     `share` is the standard uncertainty of each change as a part of it.
 
-    :raises ValueError: the error model cannot follow a change; the second map is of another volume.
+    :raises ValueError: the error model cannot follow a change; the second map is of another volume,
+        or of the same readings.
     """
+    if second is not None and second.has_readings_of(fitted):
+        raise ValueError(
+            "the second campaign has the readings of the first, from before the changes; name what"
+            " was read after them"
+        )
     corners, other = (np.array(one.volume.corners) for one in (fitted, second or fitted))
     if corners.shape != other.shape or not np.allclose(corners, other):
         raise ValueError("the second campaign is about another volume; compare maps of the same")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Protocol
@@ -21,6 +20,7 @@ from ballplate.simulator.inputs.days import parse_day
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.same_readings import fingerprint
 
 from .estimates import ParameterEstimate
 
@@ -121,14 +121,7 @@ def _left_out(one: ParameterEstimate) -> LeftOut:
 
 def data_of(observed: ObservedReadings) -> MapData:
     """What the readings say, however they were written."""
-    design, readings = observed.design, observed.design.readings
-    found = hashlib.sha256()
-    for names in (design.positions.names, design.balls.names, design.probes.names):
-        found.update("\n".join(names).encode())
-    for one in (readings.position, readings.ball, readings.probe):
-        found.update(np.ascontiguousarray(one, "<i8").tobytes())
-    found.update(np.ascontiguousarray(observed.x, "<f8").tobytes())
-    return MapData(len(readings), found.hexdigest())
+    return MapData(len(observed.design.readings), fingerprint(observed))
 
 
 def _temperatures(observed: ObservedReadings, experiment: Experiment) -> dict[str, float] | None:

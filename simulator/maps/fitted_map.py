@@ -109,6 +109,10 @@ class FittedMap:
         found = [one.value for one in self.left_out if one.kind == CONVERSION]
         return found[0] if found else None
 
+    def has_readings_of(self, other: FittedMap) -> bool:
+        """Whether both maps come from the same readings."""
+        return self.data is not None and self.data == other.data
+
     @cached_property
     def offset_columns(self) -> Integers:
         """Places (l, d) of estimated offsets in b, -1 where an offset is as stated."""

@@ -14,9 +14,12 @@ from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
+from ballplate.simulator.maps.fitted_map import MapData
+from ballplate.simulator.readings.same_readings import is_one_campaign, same_positions
 
 from ...error_maps.volumetric_errors import Volumetric
 from ..fit import Fit
+from ..map_of_fit import data_of
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it
 # can do a motion of its frame.
@@ -80,7 +83,8 @@ class ComparedMap:
     they are as stated. `offsets` are those of probes by name, `probe` the one that is meant where
     none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
     maps of the same model have them in common, as otherwise their spaces of errors would differ by
-    what is of second order. `fit` has the balls of plates. `is_expected`: nothing was measured, and
+    what is of second order. `fit` has the balls of plates, and `data` are the readings that the map
+    comes from, where they are known. `is_expected`: nothing was measured, and
     the map is exact but for what is stated, of which `stated` is the standard uncertainty of
     lengths.
     """
@@ -102,6 +106,7 @@ class ComparedMap:
     stated: LengthFunction | None = None
     shared_balls: Array | None = None
     about: Array | None = None
+    data: MapData | None = None
 
     @property
     def dimension(self) -> int:
@@ -173,6 +178,22 @@ class ComparedMap:
         return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
 
 
+def come_from_same_readings(first: ComparedMap, second: ComparedMap) -> bool:
+    """Whether two maps come from the same readings, or one from part of the other's where both are
+    fits.
+    """
+    if first.fit is not None and second.fit is not None:
+        return is_one_campaign(first.fit.observed, second.fit.observed)
+    return first.data is not None and first.data == second.data
+
+
+def read_once(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
+    """Positions whose readings are the same in two fits."""
+    if first.fit is None or second.fit is None:
+        return ()
+    return same_positions(first.fit.observed, second.fit.observed)
+
+
 def motions(points: Array) -> Array:
     """What small motions of the frame do at `points` (n, d): (n, d, 6), or (n, d, 3) in the plane;
     shifts in metres, turns about the origin in radians.
@@ -208,6 +229,7 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
         design.probes.names[design.evaluation.probe],
         date,
         fit,
+        data=data_of(fit.observed),
     )
 
 

@@ -153,6 +153,7 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         dict(zip(side.probes.names, side.probes.offsets, strict=True)),
         side.probe,
         day or side.date,
+        data=side.data,
     )
 
 
