@@ -157,6 +157,8 @@ def _lines(campaign: Campaign) -> list[str]:
             f"left out of {campaign.criterion}: {campaign.excluded} that no choice from this pool"
             " determines"
         )
+    if campaign.gap is not None:
+        lines += [campaign.gap.words, campaign.gap.remedy]
     lines += _interrupted(campaign)
     if campaign.gains:
         lines += ["", *_gain_table(campaign)]
@@ -341,6 +343,7 @@ def _data(campaign: Campaign) -> dict[str, Any]:
         ],
         "completed": None if campaign.completed is None else campaign.completed.whole.name,
         "left_open": campaign.left_open,
+        "whole_pool": None if campaign.gap is None else campaign.gap.to_dict(),
         "ignored": [candidate.name for candidate in campaign.ignored],
         "gains": [_gain_data(gain) for gain in campaign.gains],
         "left_out": [_gain_data(gain) for gain in campaign.left_out],
