@@ -83,6 +83,13 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         )
         problems.add((), text)
         return Sections(values)
+    if "map" in root.items and "machine" not in root.items:
+        text = (
+            "this is a map that a fit left behind; use it with ballplate correct, map, curves or"
+            " diff, or name it as a prior or true machine with kind: map in an experiment"
+        )
+        problems.add((), text)
+        return Sections(values)
     problems.add_empty()
     absent = [name for name in fields if name not in root.items]
     misspelt = set()
