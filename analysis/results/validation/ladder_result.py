@@ -125,7 +125,9 @@ class Ladder(FitResult):
 
     def _of_file(self, file: Rung) -> str:
         chosen = next(one for one in self.rungs if one.is_recommended)
-        if file.beaten.chance < FALSE_STEP and file.beaten.count:
+        if file.undetermined:
+            told = "is not determined by this design"
+        elif file.beaten.chance < FALSE_STEP and file.beaten.count:
             chance = chance_words(file.beaten.chance)
             told = f"is too poor: {file.beaten.by} explains more (chance {chance})"
         elif file.parameters > chosen.parameters:
@@ -140,10 +142,10 @@ class Ladder(FitResult):
                 else "the worse"
             )
             told = f"is no poorer or richer form of these; by BIC it is {word}"
-        return (
-            f"the file's error model, {file.model.removeprefix(FILE)}, {told}; it changes"
-            f" lengths by {self._length(file.change.rms)} µm rms"
-        )
+        told = f"the file's error model, {file.model.removeprefix(FILE)}, {told}"
+        if self.lengths.undetermined:
+            return told
+        return f"{told}; it changes lengths by {self._length(file.change.rms)} µm rms"
 
     def lines(self) -> list[str]:
         how = "given" if self.sigma_is_given else "estimated"
