@@ -159,6 +159,14 @@ def test_what_is_undetermined_is_told(folder: Path, capsys: pytest.CaptureFixtur
     assert "nan" not in told
 
 
+def test_the_headline_of_what_is_undetermined_states_no_uncertainty(fitted: FittedMap) -> None:
+    nothing = replace(fitted, undetermined=np.diag(fitted.scale))
+    assert bp.correct(nothing, [[0.1, 0.2, 0.3]]).headline() == "1 point, undetermined"
+    told = bp.correct(nothing, [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]).lines()
+    assert told[0].endswith(": 2 points, undetermined") and "µm at most" not in "".join(told)
+    assert bp.correct(fitted, [[0.1, 0.2, 0.3]]).headline().startswith("1 point; U = 2 u = 0.")
+
+
 def test_the_command_writes_what_python_gives(
     fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
