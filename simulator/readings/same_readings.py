@@ -10,10 +10,14 @@ import numpy as np
 from ..inputs.settings import listing
 from .observed_readings import ObservedReadings
 
+# Hexadecimal digits of a position's fingerprint.
+DIGITS = 16
+
 
 def position_fingerprints(observed: ObservedReadings) -> dict[str, str]:
-    """SHA-256 of what the readings of each position say, by its name: balls, probes and scale
-    readings, in whatever order and form tables have them, and whatever positions are called.
+    """Beginnings of the SHA-256 of what the readings of each position say, by its name: balls,
+    probes and scale readings, in whatever order and form tables have them, and whatever positions
+    are called.
     """
     design, readings = observed.design, observed.design.readings
     balls = np.array(design.balls.names)[readings.ball]
@@ -26,7 +30,7 @@ def position_fingerprints(observed: ObservedReadings) -> dict[str, str]:
         rows = order[start:end]
         digest = hashlib.sha256("\n".join([*balls[rows], *probes[rows]]).encode())
         digest.update(np.ascontiguousarray(observed.x[rows], "<f8").tobytes())
-        found[design.positions.names[int(position[start])]] = digest.hexdigest()
+        found[design.positions.names[int(position[start])]] = digest.hexdigest()[:DIGITS]
     return found
 
 

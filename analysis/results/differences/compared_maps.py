@@ -15,7 +15,7 @@ from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
 from ballplate.simulator.maps.fitted_map import MapData
-from ballplate.simulator.readings.same_readings import is_one_campaign, same_positions
+from ballplate.simulator.readings.same_readings import position_fingerprints
 
 from ...error_maps.volumetric_errors import Volumetric
 from ..fit import Fit
@@ -179,19 +179,23 @@ class ComparedMap:
 
 
 def come_from_same_readings(first: ComparedMap, second: ComparedMap) -> bool:
-    """Whether two maps come from the same readings, or one from part of the other's where both are
-    fits.
-    """
-    if first.fit is not None and second.fit is not None:
-        return is_one_campaign(first.fit.observed, second.fit.observed)
-    return first.data is not None and first.data == second.data
+    """Whether two maps come from the same readings, or one from part of the other's."""
+    both = first.data, second.data
+    return both[0] is not None and both[1] is not None and both[0].is_one_campaign(both[1])
 
 
 def read_once(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
-    """Positions whose readings are the same in two fits."""
-    if first.fit is None or second.fit is None:
+    """Positions whose readings two maps have in common, by their names where one is a fit, or how
+    many they are.
+    """
+    if first.data is None or second.data is None:
         return ()
-    return same_positions(first.fit.observed, second.fit.observed)
+    common = first.data.common(second.data)
+    fit = second.fit or first.fit
+    if fit is None or not common:
+        return (f"{len(common)} position{'s' * (len(common) != 1)}",) if common else ()
+    prints = position_fingerprints(fit.observed)
+    return tuple(name for name, one in prints.items() if one in common)
 
 
 def motions(points: Array) -> Array:
@@ -229,7 +233,7 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
         design.probes.names[design.evaluation.probe],
         date,
         fit,
-        data=data_of(fit.observed),
+        data=data_of(fit.observed, fit.experiment),
     )
 
 
