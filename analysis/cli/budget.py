@@ -7,9 +7,8 @@ from argparse import ArgumentParser, Namespace
 from ..results.variance_components.groupings import GROUPINGS
 from .common import add_json, show, single
 from .outputs import UsageError
-from .reading_options import add_readings, observed_readings
+from .reading_options import add_readings, observed_readings, warn_of
 from .table_options import KEYS
-from .telling import complain, warn
 
 HELP = "split uncertainties by their sources: readings, certificates, probes, influences"
 DESCRIPTION = (
@@ -54,7 +53,4 @@ def run(options: Namespace) -> int:
     fitted = fit(experiment, observed, options.sigma)
     if fitted.converged:
         show(options, budget(experiment, fitted, options.by))
-        warn(fitted.cautions)
-    if fitted.complaint:
-        complain(fitted.complaint)
-    return 1 if fitted.complaint else 0
+    return warn_of(fitted)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
+    from ..presentation.result import FitResult
+
 
 # Of a command that fits readings in any case.
 NAMED = "tables of readings or reports; default: readings.files of the experiment file"
@@ -28,7 +30,7 @@ def add_readings(parser: ArgumentParser, of_readings: str = NAMED) -> None:
     and what uncertainties are.
     """
     add_file(parser)
-    add_sources(parser, of_readings)
+    add_readings_argument(parser, of_readings)
     add_tables(parser)
     parser.add_argument(
         "--certificate",
@@ -49,10 +51,10 @@ def add_readings(parser: ArgumentParser, of_readings: str = NAMED) -> None:
     )
 
 
-def add_sources(parser: ArgumentParser, of_readings: str) -> None:
-    """Add tables of readings, none or more, with the help `of_readings`."""
+def add_readings_argument(parser: ArgumentParser, help: str) -> None:
+    """Add tables of readings, which may be left out."""
     readings = parser.add_argument(
-        "readings", metavar="READINGS", nargs="+", type=Path, default=[], help=of_readings
+        "readings", metavar="READINGS", nargs="+", type=Path, default=[], help=help
     )
     # With nargs="*" none would be looked for behind the first option.
     readings.required = False
@@ -79,6 +81,14 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
         experiment = read_certificate(options.certificate, experiment)
     sources = options.readings or named_sources(experiment)
     return experiment, tables(options, experiment, sources, experiment.doubts[stated:])
+
+
+def warn_of(result: FitResult) -> int:
+    """Warn of what a user of an estimate has to know; 1 if there is something to complain of."""
+    warn(result.cautions)
+    if result.complaint:
+        complain(result.complaint)
+    return 1 if result.complaint else 0
 
 
 def tables(

@@ -14,7 +14,7 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.readings.same_readings import read_once_words
 
-from ...presentation.formatting import aligned, finite, number
+from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
 from ..adjustments import FEW
 from .compared_maps import MOTIONS, ComparedMap, come_from_same_readings, read_once
@@ -278,10 +278,7 @@ class MapDifference(Result):
             "tests": [_test_data(one) for one in tested],
             "groups": [
                 {
-                    "kind": group.kind,
-                    "count": group.count,
-                    "undetermined": group.undetermined,
-                    "exceeding": group.exceeding,
+                    **picked(group, "kind", "count", "undetermined", "exceeding"),
                     "share_by_chance": group.by_chance,
                 }
                 for group in found.groups
