@@ -253,7 +253,7 @@ class AdjustedMachine(Result):
                     _shown(self.coverage_factor * pair.standard_uncertainty / shown),
                 )
             ]
-            cells += [] if self.found is None else [_shown(float(self.normalised_errors[i]))]
+            cells += [] if self.found is None else [self._shown_error(i)]
             unit = {"rad": "arcsec", "1": "µm/m", "m": "µm"}[one.unit]
             rows.append([one.name, *cells, unit])
         table = aligned(rows, [False, *[True] * (len(heads) - 1), False])
@@ -263,6 +263,13 @@ class AdjustedMachine(Result):
             " reading)"
         ]
         return [*(one.words for one in self.changes), "", *table, *said, "", self.headline()]
+
+    def _shown_error(self, i: int) -> str:
+        """E_n of a figure; there is none where both campaigns know it exactly, and the same."""
+        both = (self.predicted[i], self.found[i]) if self.found is not None else ()
+        error = float(self.normalised_errors[i])
+        is_exact = all(one.standard_uncertainty <= ROUNDING for one in both)
+        return "-" if is_exact and np.isnan(error) else _shown(error)
 
     def to_dict(self) -> dict[str, Any]:
         return {

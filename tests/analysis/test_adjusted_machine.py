@@ -381,5 +381,6 @@ def test_a_machine_that_is_exactly_known_differs_or_not(tmp_path: Path) -> None:
         "", known, [scale_change("x=5 ppm")], adjusted_map(known, [scale_change("x=5 ppm")])
     )
     assert np.isnan(same.normalised_errors).all() and same.compared == 0
+    assert "undetermined" not in "".join(same.lines()[1:-1])
     other = adjusted_machine("", known, [scale_change("x=5 ppm")], known)
     assert np.isinf(other.normalised_errors[0]) and not other.is_within

@@ -109,12 +109,14 @@ class Ladder(FitResult):
                 ),
             ]
         if self.beaten.count:
+            count, least = self.beaten.count, chance_words(self.beaten.least)
+            some, does = ("the one richer model", "does not explain")
+            if count > 1:
+                some, does = f"none of {count} richer models", "explains"
             why = (
-                f"none of {self.beaten.count} richer models that this design determines explains"
-                f" significantly more; least chance {chance_words(self.beaten.least)}"
+                f"{some} that this design determines {does} significantly more; least chance"
+                f" {least}, of {self.beaten.by}"
             )
-            if self.beaten.by:
-                why += f", of {self.beaten.by}"
         else:
             why = "it is the richest that this design determines"
         found = [f"recommended: {self.recommended}; {why}"]

@@ -119,8 +119,8 @@ def made_table(
     reasons = [*_beyond(machine, made, steps, origin)]
     if not (volumetric or made.has_rotations or without_rotations):
         # At nodes that any format has room for.
-        exact = _of_axes(machine, made, _nodes(machine, made, usual, machine.zero), machine.zero)
-        reasons += _refused_rotations(exact, made)
+        nodes = _nodes(machine, made, usual, machine.zero)
+        reasons += _refused_rotations(_of_axes(machine, made, nodes, machine.zero), made)
     if reasons:
         raise CannotMakeError(*reasons)
     nodes = _nodes(machine, made, steps, origin)
@@ -188,6 +188,7 @@ def _of_axes(
         functions = axis_functions(machine.model, machine.a)
     except NotOfAxesError as error:
         more = "; a volumetric table can hold them" if made.has_volumes else ""
+        more += "; a map that is converted to a kinematic model may have such errors"
         raise CannotMakeError(
             f"a table of single axes cannot hold its errors: {error}{more}"
         ) from None
