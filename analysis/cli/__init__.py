@@ -184,6 +184,9 @@ class _Parser(argparse.ArgumentParser):
     The parsers of commands are of this class as well.
     """
 
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(formatter_class=_Formatter, **settings)
+
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, unknown = self.parse_known_args(args, namespace)
         if unknown:
@@ -227,6 +230,15 @@ class _Parser(argparse.ArgumentParser):
         from ballplate.simulator.inputs.messages import in_one_line
 
         super().error(in_one_line(message))
+
+
+class _Formatter(argparse.HelpFormatter):
+    """Shows arguments that may be left out in brackets, positional ones too."""
+
+    def _format_args(self, action: argparse.Action, default_metavar: str) -> str:
+        if action.nargs == "+" and not action.option_strings and not action.required:
+            return f"[{action.metavar} ...]"
+        return super()._format_args(action, default_metavar)
 
 
 class _Version(argparse.Action):

@@ -48,7 +48,7 @@ LEFT_OUT = (
 )
 # The same, of single classes: how the laboratory's tables are read; and functions in Python, which
 # the text of their module and their options tell.
-LEFT_OUT_OF = {"Experiment": ("readings",), "PythonCalibration": ("functions",)}
+LEFT_OUT_OF = {"Experiment": ("readings",), "Prior": ("data",), "PythonCalibration": ("functions",)}
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second

@@ -83,6 +83,13 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         )
         problems.add((), text)
         return Sections(values)
+    if "map" in root.items and "machine" not in root.items:
+        text = (
+            "this is a map that a fit left behind; use it with ballplate correct, map, curves or"
+            " diff, or name it as a prior or true machine with kind: map in an experiment"
+        )
+        problems.add((), text)
+        return Sections(values)
     problems.add_empty()
     absent = [name for name in fields if name not in root.items]
     misspelt = set()
@@ -97,12 +104,12 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         node_or_none = root.items.get(key)
         if node_or_none is None and key in misspelt:
             continue
-        if node_or_none is None and key == "positions" and "pool" in root.items:
+        is_empty = isinstance(node_or_none, Sequence) and not node_or_none.items
+        if key == "positions" and "pool" in root.items and (node_or_none is None or is_empty):
             if not planning:
-                text = (
-                    "missing; add positions, or choose some from the pool with: ballplate plan FILE"
-                )
-                problems.add((key,), text)
+                missing = "empty" if is_empty else "missing"
+                cure = "add positions, or choose some from the pool with: ballplate plan FILE"
+                problems.add((key,), f"{missing}; {cure}")
             continue
         if node_or_none is None and field.is_required():
             problems.add((key,), f'missing; add "{key}" ({field.description})')
