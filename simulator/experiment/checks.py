@@ -39,11 +39,8 @@ from ..machines.true_machine_settings import (
     TrueMapSettings,
 )
 from ..machines.truth import TruthError, true_machine
-from .curve_files import read_curves
-from .machine_file import load_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
-from .used_maps import read_true_map
 
 TOLERANCE = 1e-9
 
@@ -107,6 +104,9 @@ def _check_model(
 def _machine_of_file(
     file: str, steps: Steps, references: References, doubts: list[Message] | None = None
 ) -> MachineDescription | None:
+    # What reads other files is loaded where one is named: few experiments have any.
+    from .machine_file import load_machine
+
     try:
         return load_machine(references.folder / file, doubts)
     except ExperimentError as error:
@@ -168,6 +168,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         _true_machine_of_file(truth, machine, references)
         return
     if isinstance(truth, TrueMapSettings):
+        from .used_maps import read_true_map
+
         read_true_map(truth, machine, references)
         return
     problems = references.problems
@@ -198,6 +200,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine have the curves of its files, or report what is wrong with them."""
+    from .curve_files import read_curves
+
     problems, curves = references.problems, dict[str, Points]()
     for i, file in enumerate(truth.files):
         steps: Steps = ("true_machine", "files", i)
