@@ -31,7 +31,9 @@ def peak() -> float:
 
 
 def measure(n: int) -> dict[str, float]:
-    """Figures for a grid of n x n balls, in this process; times are the best of three."""
+    """Figures for a grid of n x n balls, in this process: memory of one estimate, and seconds of
+    the processor, the best of three.
+    """
     from ballplate.simulator.estimation.linearisation import linearise
     from ballplate.uncertainty.summaries import point_pairs, uncertainties
 
@@ -53,18 +55,18 @@ def measure(n: int) -> dict[str, float]:
 
     estimate(5)
     base = peak()
-    runs = [estimate(n) for _ in range(3)]
-    design, found = runs[-1][:2]
+    design, found, *first = estimate(n)
+    memory = peak() - base
+    seconds = [first, *(estimate(n)[2:] for _ in range(2))]
     before = peak()
-    del runs[:-1]
     start = time.process_time()
     pairs = uncertainties(found, symbols=("U5",))["U5"]
     return {
         "readings": len(design.readings),
         "pairs": pairs.count,
-        "elimination": min(run[2] for run in runs),
-        "uncertainties": min(run[3] for run in runs),
-        "memory": before - base,
+        "elimination": min(run[0] for run in seconds),
+        "uncertainties": min(run[1] for run in seconds),
+        "memory": memory,
         "U5": time.process_time() - start,
         "U5 memory": peak() - before,
     }
