@@ -5,7 +5,7 @@ read.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.description import MachineDescription, random_part
 from ..machines.error_names import AXIS_ERRORS
 from ..machines.settings import (
     MachineFileSettings,
@@ -41,6 +40,9 @@ from ..machines.true_machine_settings import (
 from ..machines.truth import TruthError, true_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
+
+if TYPE_CHECKING:
+    from ..machines.description import MachineDescription
 
 TOLERANCE = 1e-9
 
@@ -118,6 +120,8 @@ def _true_machine_of_file(
     truth: TrueMachineFileSettings, machine: Machine | None, references: References
 ) -> None:
     """Let the true machine be that of its file, or report what is wrong with it."""
+    from ..machines.description import random_part
+
     steps: Steps = ("true_machine", "file")
     found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:

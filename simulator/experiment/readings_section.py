@@ -4,14 +4,16 @@ written.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
 from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.settings import Forms, NonEmpty, Settings, Text
-from ..machines.description import MachineDescription, true_volumetric
 from ..machines.protocol import TrueMachine
+
+if TYPE_CHECKING:
+    from ..machines.description import MachineDescription
 
 Coordinate = Literal["scale readings", "ball centres", "part"]
 COORDINATES: tuple[Coordinate, ...] = ("scale readings", "ball centres", "part")
@@ -35,6 +37,9 @@ class CompensationSettings(Settings):
     def machine(self) -> TrueMachine:
         """What the correction added to scale readings."""
         assert self._machine is not None
+        # Loaded where a machine file is named: few experiments name any.
+        from ..machines.description import true_volumetric
+
         return true_volumetric(self._machine)
 
 
@@ -130,4 +135,4 @@ class ReadingsSettings(Settings):
 
 def no_settings() -> ReadingsSettings:
     """The settings of an experiment that says nothing of its readings."""
-    return ReadingsSettings.model_validate({})
+    return ReadingsSettings.model_construct()

@@ -7,14 +7,13 @@ A kind of error model is one file with its settings and an `ErrorModelKind`, and
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, PrivateAttr, StringConstraints
 
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings, listing
 from .custom import custom_model
-from .description import MachineDescription, fitted_in_plane, fitted_volumetric
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
@@ -22,6 +21,9 @@ from .model_kinds import Corner, ErrorModelKind
 from .plane import PlaneModel, in_space
 from .protocol import ErrorModel
 from .spatial_metric import SpatialMetricModel
+
+if TYPE_CHECKING:
+    from .description import MachineDescription
 
 
 class MetricSettings(Settings):
@@ -128,6 +130,9 @@ def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorMode
 
 
 def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    # Loaded where a machine file is named: few experiments name any.
+    from .description import fitted_in_plane, fitted_volumetric
+
     assert settings._machine is not None
     machine = settings._machine if len(lower) == 3 else fitted_in_plane(settings._machine)
     model = fitted_volumetric(machine, *in_space(lower, upper), settings.knots)

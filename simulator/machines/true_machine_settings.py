@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
@@ -16,11 +16,13 @@ from .arrangement_settings import (
     arrangement_of,
 )
 from .curves import Interpolation, Points, curves_model
-from .description import MachineDescription, true_volumetric
 from .model_kinds import Corner
 from .plane import PlaneModel
 from .protocol import ErrorModel, TrueMachine
 from .settings import ErrorModelSettings
+
+if TYPE_CHECKING:
+    from .description import MachineDescription
 
 
 class ZeroSettings(Settings):
@@ -131,6 +133,9 @@ class TrueMachineFileSettings(Settings):
 
     def machine(self, dimension: int = 3) -> TrueMachine:
         """The systematic errors of the machine, of two dimensions those at the level."""
+        # Loaded where a machine file is named: few experiments name any.
+        from .description import true_volumetric
+
         assert self._machine is not None
         found = true_volumetric(self._machine)
         if dimension == 3:
