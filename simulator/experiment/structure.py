@@ -16,7 +16,7 @@ from ..geometry.artefacts import AnyArtefactSettings
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.settings import Settings, describe, hint, nearest
-from ..inputs.wording import explain
+from ..inputs.validation import explain_in, type_adapter
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import PositionSettings
@@ -151,11 +151,11 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
     )
     whole = whole or PoolSettings.model_validate({})
     values |= {("pool", "times"): whole.times, ("pool", "limits"): whole.limits}
-    for key, type_of in POOL_ENTRIES.items():
+    for key, kind_of in POOL_ENTRIES.items():
         entries = node.items.get(key)
         if isinstance(entries, Sequence):
             for i, item in enumerate(entries.items):
-                adapter = _of_type(type_of(item))
+                adapter = type_adapter(kind_of(item))
                 values |= _validate([adapter], item, ("pool", key, i), problems)
         elif entries is not None and not (isinstance(entries, Scalar) and entries.value is None):
             found = describe(to_python(entries) if isinstance(entries, Scalar) else {})
@@ -195,8 +195,7 @@ def _validate(
             return {steps: known[adapter]}
         except ValidationError as error:
             refusal = error
-    for explanation in explain(refusal.errors(include_url=False), node, _json_schema(adapter)):
-        problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)
+    explain_in(problems, refusal, adapter, node, steps)
     return {}
 
 
@@ -210,7 +209,7 @@ def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
     if isinstance(said, Scalar) and isinstance(said.value, str):
         own = _kinds(key).get(said.value)
         if own is not None:
-            yield _of_type(own)
+            yield type_adapter(own)
     yield _adapter(key)
 
 
@@ -229,7 +228,7 @@ def _kinds(key: str) -> dict[str, type[Settings]]:
 
 @cache
 def _adapter(key: str) -> TypeAdapter[Any]:
-    return _of_type(_form(key))
+    return type_adapter(_form(key))
 
 
 def _form(key: str) -> Any:
@@ -237,13 +236,3 @@ def _form(key: str) -> Any:
         return ENTRIES[key][1]
     field = ExperimentSettings.model_fields[key]
     return Annotated[field.annotation, field]
-
-
-@cache
-def _of_type(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
-
-
-@cache
-def _json_schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
-    return adapter.json_schema()

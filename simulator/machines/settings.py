@@ -7,13 +7,14 @@ A kind of error model is one file with its settings and an `ErrorModelKind`, and
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal, Union
 
 from pydantic import Field, PrivateAttr, StringConstraints
 
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings, listing
 from .custom import custom_model
+from .described import OfMachineFile
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
@@ -21,9 +22,6 @@ from .model_kinds import Corner, ErrorModelKind
 from .plane import PlaneModel, in_space
 from .protocol import ErrorModel
 from .spatial_metric import SpatialMetricModel
-
-if TYPE_CHECKING:
-    from .description import MachineDescription
 
 
 class MetricSettings(Settings):
@@ -80,7 +78,7 @@ class PythonSettings(Settings):
         self._folder = folder if self.folder is None else folder / self.folder
 
 
-class MachineFileSettings(Settings):
+class MachineFileSettings(OfMachineFile):
     """What a machine file states, as an error model to be estimated: its arrangement and errors,
     not their values.
     """
@@ -96,13 +94,6 @@ class MachineFileSettings(Settings):
             " spaced."
         ),
     )
-
-    # What the file says; filled in when the experiment is loaded.
-    _machine: MachineDescription | None = PrivateAttr(default=None)
-
-    def of(self, machine: MachineDescription) -> None:
-        """Take the machine that the file describes."""
-        self._machine = machine
 
 
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
@@ -133,8 +124,7 @@ def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -
     # Loaded where a machine file is named: few experiments name any.
     from .description import fitted_in_plane, fitted_volumetric
 
-    assert settings._machine is not None
-    machine = settings._machine if len(lower) == 3 else fitted_in_plane(settings._machine)
+    machine = settings.described if len(lower) == 3 else fitted_in_plane(settings.described)
     model = fitted_volumetric(machine, *in_space(lower, upper), settings.knots)
     return model if len(lower) == 3 else PlaneModel(model, 0.0)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
@@ -16,13 +16,11 @@ from .arrangement_settings import (
     arrangement_of,
 )
 from .curves import Interpolation, Points, curves_model
+from .described import OfMachineFile
 from .model_kinds import Corner
 from .plane import PlaneModel
 from .protocol import ErrorModel, TrueMachine
 from .settings import ErrorModelSettings
-
-if TYPE_CHECKING:
-    from .description import MachineDescription
 
 
 class ZeroSettings(Settings):
@@ -105,7 +103,7 @@ class CurvesSettings(Settings):
         )
 
 
-class TrueMachineFileSettings(Settings):
+class TrueMachineFileSettings(OfMachineFile):
     """The machine that a machine file describes."""
 
     kind: Literal["machine"] = Field(description="the machine that a file describes")
@@ -124,23 +122,15 @@ class TrueMachineFileSettings(Settings):
         ),
     )
 
-    # What the file says; filled in when the experiment is loaded.
-    _machine: MachineDescription | None = PrivateAttr(default=None)
-
-    def of(self, machine: MachineDescription) -> None:
-        """Take the machine that the file describes."""
-        self._machine = machine
-
     def machine(self, dimension: int = 3) -> TrueMachine:
         """The systematic errors of the machine, of two dimensions those at the level."""
         # Loaded where a machine file is named: few experiments name any.
         from .description import true_volumetric
 
-        assert self._machine is not None
-        found = true_volumetric(self._machine)
+        found = true_volumetric(self.described)
         if dimension == 3:
             return found
-        level = self._machine.reference[2] if self.level is None else self.level
+        level = self.described.reference[2] if self.level is None else self.level
         return TrueMachine(PlaneModel(found.model, level), found.a)
 
 
