@@ -458,7 +458,7 @@ def fit(
     from .results.fit import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
-    ensure_one_of(ESTIMATORS, estimator=estimator)
+    ensure_one_of(ESTIMATORS, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
@@ -645,10 +645,14 @@ def diff(
     ensure_one_of(("certificate",), shared=shared)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
+    if isinstance(dates, str) or len(dates) != 2:
+        raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
     days = tuple(None if one is None else stated_day(one) for one in dates)
     known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
     is_file = isinstance(points, str | os.PathLike)
     places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
+    if isinstance(places, np.ndarray) and places.ndim != 2:
+        raise ValueError("points: give a list of points, each with its co-ordinates in metres")
     sides = [_side(name, one) for name, one in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
@@ -674,7 +678,7 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     from .results.budget import budget as budget_of
     from .results.fit import Fit
 
-    ensure_one_of(GROUPINGS, by=by)
+    ensure_one_of(GROUPINGS, by=str(by))
     if isinstance(given, Fit):
         if given.experiment is None:
             raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
@@ -707,7 +711,7 @@ def compare(
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
-    ensure_one_of(COMPARED, estimator=estimator)
+    ensure_one_of(COMPARED, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)
@@ -774,7 +778,7 @@ def plan(
     from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
-    ensure_one_of(NAMES, criterion=criterion)
+    ensure_one_of(NAMES, criterion=str(criterion))
     ensure_positive("hours above 0", 1e5, hours=hours)
     ensure_whole(1, positions=positions, readings=readings, workers=workers)
     ensure_whole(0, seed=seed)
@@ -1098,7 +1102,7 @@ def compensation(
     """
     from .error_maps.compensation_tables import made_compensation, of_map, tabled_machine
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
     given = _machine("machine", machine)
     if isinstance(given, Path):
@@ -1134,7 +1138,7 @@ def read_compensation(
     """
     from .error_maps.compensation_tables import read_compensation_files
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
     ensure_type(str, "an arrangement, such as MB2", arrangement=arrangement)
     several = [files] if isinstance(files, str | os.PathLike) else files
