@@ -5,6 +5,8 @@ of a phone, a tablet and a desk: nothing stands outside, no label is cut, nothin
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,10 @@ import ballplate as bp
 import pytest
 from ballplate.report.design_contents import page_of_design
 from ballplate.simulator.inputs.yamltree import to_python
+from ballplate.sweeps.task import CellResult
 
 from tests.report.browser import Browser, browser, program
+from tests.report.stores import axis, done, failed, made_up
 from tests.report.test_page_in_browser import CUT, OUTSIDE
 from tests.report.test_result_pages import CHANGED, FOUR, small
 
@@ -140,6 +144,46 @@ def test_pages_open_alone_at_all_widths(name: str, tmp_path: Path) -> None:
                 tab.open(path)
                 assert tab.value(OUTSIDE) == [], (kind, width)
                 assert tab.value(CUT) == [], (kind, width)
+        _assert_quiet(tab)
+
+
+def test_a_page_of_a_hundred_thousand_settings_is_light(tmp_path: Path) -> None:
+    assert CHROMIUM is not None
+    numbers = [[float(k + 1) for k in range(count)] for count in (100, 50, 20)]
+    axes = [
+        axis(name, [f"{one:g}" for one in values], values, "1")
+        for name, values in zip(("size", "level", "balls"), numbers, strict=True)
+    ]
+
+    def rows() -> Iterator[CellResult]:
+        for k, (size, level, balls) in enumerate(product(*numbers)):
+            if k % 997 == 0:
+                yield failed(k, f"cell {k} is outside of the volume")
+                continue
+            average = 1e-6 * (1.0 + level) / (size * balls)
+            open_ = float(k % 13 == 0)
+            yield done(
+                k,
+                {
+                    "U6_average_m": average,
+                    "U6_maximum_m": 2.0 * average,
+                    "U6_undetermined": open_,
+                    "U6_within_target": 1.0 if average < 1e-8 and not open_ else 0.5,
+                    "rank_deficiency": open_,
+                    "as_expected": 1.0,
+                    "observations": 100.0 * balls,
+                },
+            )
+
+    made_up(tmp_path / "many.sqlite", "many settings", axes, rows()).close()
+    text = bp.sweep_report(tmp_path / "many.sqlite")
+    assert len(text) < 1e6
+    path = tmp_path / "many.html"
+    path.write_text(text, encoding="utf-8")
+    with browser(CHROMIUM, tmp_path) as tab:
+        tab.open(path)
+        assert tab.value("document.querySelectorAll('*').length") < 15_000
+        assert "of 99899 settings meet" in tab.value("document.querySelector('.verdict').innerText")
         _assert_quiet(tab)
 
 
