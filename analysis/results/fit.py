@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
+    from ..presentation.pages.embedded import View
     from .certificates.plate_certificate import PlateCertificate
     from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
@@ -307,6 +308,25 @@ class Fit(FitResult):
                 self.untested,
             )
         )
+
+    def view(self) -> View:
+        """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
+        or weak directions, which move; of a fit that has failed the positions alone.
+        """
+        from ..presentation.pages.embedded import View
+        from .views import judged_pictures, position_picture, residual_pictures
+
+        if self.estimated is None or not self.converged:
+            return View(self.label, self.title, (position_picture(self.design),))
+        target = None if self.experiment is None else self.experiment.target_uncertainty
+        # Without scatter residuals are mere rounding.
+        residuals = () if self.without_scatter else residual_pictures(self.observed, self.solution)
+        at = self.estimated.at
+        pictures = judged_pictures(at, self.verdict, target, self.sigma, residuals)
+        return View(self.label, self.title, pictures)
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() + self.view()._repr_html_()
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is

@@ -91,6 +91,7 @@ def _predict(
         lengths,
         scale,
         influences=influence_uncertainties(at) if with_quantities else (),
+        experiment=experiment,
     )
 
 
