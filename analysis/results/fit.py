@@ -21,6 +21,7 @@ from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
+from ..presentation.formats import as_html
 from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
 from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
@@ -77,6 +78,9 @@ REWEIGHTED = (
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
+
+# Of the table of estimates in a notebook, so that what is below it is seen, too.
+ROWS_BESIDE_VIEW = 12
 
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3
@@ -326,7 +330,7 @@ class Fit(FitResult):
         return View(self.label, self.title, pictures)
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + self.view()._repr_html_()
+        return self._written(as_html, ROWS_BESIDE_VIEW) + self.view()._repr_html_()
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is

@@ -37,7 +37,7 @@
       if (light === null) return;
       dark.media.mediaText = light < 128 ? "screen" : "not all";
       root.style.colorScheme = frame.style.colorScheme = light < 128 ? "dark" : "light";
-      root.style.background = document.body.style.background = "transparent";
+      document.body.classList.add("within");
     };
     const still = frame.previousElementSibling;
     if (still && still.tagName === "IMG") still.style.display = "none";
