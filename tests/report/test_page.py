@@ -9,7 +9,9 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import ballplate as bp
 import pytest
 from ballplate.cli import main
 from ballplate.report.cells import NoExperimentError, experiments
@@ -290,3 +292,14 @@ def test_missing_packages_are_named(
     assert main(["report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 3
     assert "python -m pip install 'ballplate[report]'" in capsys.readouterr().err
     assert main(["report", str(plate_sizes), "--format", "markdown"]) == 0
+
+
+def test_python_writes_the_page_of_a_sweep(
+    plate_sizes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr("ballplate.report.page.page", lambda *given: asked.append(given) or "page")
+    assert bp.page(bp.stored(plate_sizes), tmp_path / "a.html", run_modules=True) == "page"
+    assert (tmp_path / "a.html").read_text(encoding="utf-8") == "page"
+    ((store, results, run_modules, _),) = asked
+    assert Path(store.path) == plate_sizes and results.count("done") == 12 and run_modules

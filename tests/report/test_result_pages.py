@@ -220,17 +220,6 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         main(["run", path, "--report", "a.pdf"])
 
 
-def test_python_writes_the_page_of_a_sweep(
-    plate_sizes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("ballplate.report.page.page", lambda *given: asked.append(given) or "page")
-    assert bp.page(bp.stored(plate_sizes), tmp_path / "a.html", run_modules=True) == "page"
-    assert (tmp_path / "a.html").read_text(encoding="utf-8") == "page"
-    ((store, results, run_modules, _),) = asked
-    assert Path(store.path) == plate_sizes and results.count("done") == 12 and run_modules
-
-
 def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
     with pytest.raises(ValueError, match="predict it anew"):
