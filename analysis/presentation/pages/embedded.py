@@ -17,11 +17,11 @@ from ballplate.simulator.inputs.messages import in_one_line
 
 from ..files import write_file
 from .document import head, shipped
-from .elements import Html, element
+from .elements import Html, element, note
 from .spatial import SpatialPicture, figure_of, still
 
 WIDTH = "44rem"
-# Bytes of all pictures together, beyond which later ones are left out.
+# Bytes of all pictures together, beyond which those that take more are left out.
 MOST_BYTES = 180_000
 
 
@@ -76,26 +76,26 @@ class View:
         return still(self.pictures[0])
 
     def _page(self) -> str:
-        shown = [figure_of(self.pictures[0])]
-        size = len(shown[0])
-        for one in self.pictures[1:]:
-            size += len(figure := figure_of(one))
-            if size > MOST_BYTES:
-                break
-            shown.append(figure)
+        shown: list[tuple[str, Html]] = []
+        left, size = [], 0
+        for one in self.pictures:
+            figure = figure_of(one)
+            if shown and size + len(figure) > MOST_BYTES:
+                left.append(one.label)
+                continue
+            size += len(figure)
+            shown.append((one.label, figure))
         buttons = (
-            element("button", one.label, type="button", aria_pressed="false")
-            for one in self.pictures[: len(shown)]
+            element("button", label, type="button", aria_pressed="false") for label, _ in shown
         )
         choice = element("div", *buttons, class_="controls choice", hidden=True)
-        left = [one.label for one in self.pictures[len(shown) :]]
         told = f"Not shown here, since there is too much of it: {', '.join(left)}." if left else ""
         script = shipped("view.js") + shipped("embedded.js")
         body = element(
             "body",
             choice if len(shown) > 1 else "",
-            *shown,
-            element("p", told, class_="note") if told else "",
+            *(figure for _, figure in shown),
+            note(told) if told else "",
             Html(f"<script>{script}</script>"),
             class_="embedded",
         )
