@@ -302,15 +302,18 @@ def page(
     given: Experiment | PathLike | Prediction | Fit | SweepResult,
     path: PathLike | None = None,
     run_modules: bool = False,
+    compare: PathLike | None = None,
     report: Report = unreported,
 ) -> str:
     """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and `report`
     write: HTML that needs no other file and no network. With a path it is written as well.
 
-    Of an experiment it is the page of its design, with the prediction of `run`. Drawings of a
-    sweep's designs whose error models are in Python need `run_modules`.
+    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
+    drawings of designs whose error models are in Python need `run_modules`, and the store of
+    another one to `compare` with is set beside it.
 
-    :raises ValueError: a fit or a prediction that does not know its experiment.
+    :raises ValueError: a fit or a prediction that does not know its experiment; sweeps that cannot
+        be compared.
     :raises ImportError: what pages of sweeps need is not installed.
     :raises OSError: the file cannot be written.
 
@@ -326,12 +329,15 @@ def page(
     ensure_report(report)
     if path is not None:
         ensure_path("path", path)
+    if (run_modules or compare is not None) and not isinstance(given, SweepResult):
+        raise ValueError("run_modules and compare go with sweeps only; leave them out")
     if isinstance(given, Fit):
         text = given.page()
     elif isinstance(given, SweepResult):
         from .stores import sweep_report
 
-        text = sweep_report(given.store, given.number, "html", run_modules, report)
+        chosen_sweep = given.store, given.number
+        text = sweep_report(*chosen_sweep, "html", run_modules, report, compare)
     else:
         from .report.design_contents import page_of_design
 

@@ -299,7 +299,12 @@ def test_python_writes_the_page_of_a_sweep(
 ) -> None:
     asked: list[tuple[Any, ...]] = []
     monkeypatch.setattr("ballplate.report.page.page", lambda *given: asked.append(given) or "page")
-    assert bp.page(bp.stored(plate_sizes), tmp_path / "a.html", run_modules=True) == "page"
+    result = bp.stored(plate_sizes)
+    told = {"run_modules": True, "compare": plate_sizes}
+    assert bp.page(result, tmp_path / "a.html", **told) == "page"
     assert (tmp_path / "a.html").read_text(encoding="utf-8") == "page"
-    ((store, results, run_modules, _),) = asked
+    ((store, results, run_modules, _, beside),) = asked
     assert Path(store.path) == plate_sizes and results.count("done") == 12 and run_modules
+    assert beside.sentences[1:] == ("All averages are the same.",)
+    with pytest.raises(ValueError, match="compare goes with a page only"):
+        bp.sweep_report(plate_sizes, form="text", compare=plate_sizes)

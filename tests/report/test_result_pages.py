@@ -224,6 +224,8 @@ def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
     with pytest.raises(ValueError, match="predict it anew"):
         bp.page(replace(prediction, experiment=None))
+    with pytest.raises(ValueError, match="go with sweeps only"):
+        bp.page(prediction, run_modules=True)
     with pytest.raises(TypeError, match="neither an experiment nor the path"):
         bp.page(3)  # type: ignore[arg-type]
     with pytest.raises(FileNotFoundError, match="there is no folder"):
