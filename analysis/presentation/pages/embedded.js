@@ -42,9 +42,13 @@
     const still = frame.previousElementSibling;
     if (still && still.tagName === "IMG") still.style.display = "none";
     frame.style.position = "static";
-    new ResizeObserver(() => {
-      frame.style.height = `${Math.ceil(document.body.getBoundingClientRect().height)}px`;
-    }).observe(document.body);
+    const fit = () => {
+      const height = Math.ceil(document.body.getBoundingClientRect().height);
+      // None while the frame is not laid out.
+      if (height) frame.style.height = `${height}px`;
+    };
+    fit();
+    new ResizeObserver(fit).observe(document.body);
     match();
     const changes = new MutationObserver(() => {
       if (!frame.isConnected) changes.disconnect();
