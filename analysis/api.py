@@ -534,10 +534,6 @@ def fit(
     >>> fit(quickstart(), readings, estimator="distances", pairs="braced")
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
-    from ballplate.simulator.experiment.layout import lay_out
-    from ballplate.simulator.readings.certificate_files import read_certificate
-    from ballplate.simulator.readings.reading_files import read_readings
-
     from .estimators.estimator_choice import fit_readings
     from .montecarlo.trials import MOST_TRIALS
     from .results.fit import Fit
@@ -567,12 +563,8 @@ def fit(
         raise ValueError(reason)
     said: dict[str, object] = {"columns": columns, "unit": unit, "coordinates": coordinates}
     said |= {"names": names, "swap_names": swap_names}
-    chosen = _experiment(experiment).with_readings(said)
-    tables, stated = _tables(readings, chosen), len(chosen.doubts)
-    if certificate is not None:
-        chosen = read_certificate(_table("certificate", certificate), chosen)
-    observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
-    observed = replace(observed, of_certificate=chosen.doubts[stated:])
+    given = _experiment(experiment).with_readings(said)
+    chosen, observed = _observed(given, readings, certificate)
     found = fit_readings(
         chosen,
         observed,
@@ -688,10 +680,11 @@ def _observed(
     from ballplate.simulator.readings.reading_files import read_readings
 
     chosen = _experiment(experiment)
-    tables = _tables(readings, chosen)
+    tables, stated = _tables(readings, chosen), len(chosen.doubts)
     if certificate is not None:
         chosen = read_certificate(_table("certificate", certificate), chosen)
-    return chosen, read_readings(tables, lay_out(chosen), settings=chosen.readings)
+    observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
+    return chosen, replace(observed, of_certificate=chosen.doubts[stated:])
 
 
 def diff(

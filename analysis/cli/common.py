@@ -8,12 +8,13 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from .outputs import PICTURE, UsageError, Writer, add_output, write
-from .telling import tell_notes, warn
+from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
+from .telling import note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
@@ -51,6 +52,45 @@ def add_json(parser: ArgumentParser) -> None:
     )
 
 
+def add_goal(parser: ArgumentParser, quantities: str) -> None:
+    """Add what is to be reached, with examples of quantities, and what replaces the target."""
+    parser.add_argument(
+        "--goal",
+        default="lengths",
+        help=(
+            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
+            f" tasks, or a quantity such as {quantities}"
+        ),
+    )
+    parser.add_argument(
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="share of the lengths that must be within the target; default: all",
+    )
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
+    )
+
+
+T = TypeVar("T")
+
+
+def argument_type(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """The type of an argument: what its parser says is wrong with a text is told as it is."""
+
+    @wraps(parse)
+    def parsed(text: str) -> T:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise ArgumentTypeError(str(error)) from None
+
+    return parsed
+
+
 def whole(text: str, least: int = 0) -> int:
     """Read an index or a seed from the command line."""
     if not text.isascii() or not text.isdigit() or int(text) < least:
@@ -85,14 +125,12 @@ def number(text: str, unit: str = "") -> float:
         return math.nan
 
 
+@argument_type
 def day(text: str) -> str:
     """Argument type: a day such as 2026-11-22."""
     from ballplate.simulator.inputs.days import stated_day
 
-    try:
-        return stated_day(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return stated_day(text)
 
 
 def map_path(text: str) -> Path:
@@ -174,6 +212,13 @@ def write_picture(options: Namespace, draw: Writer) -> None:
         write(options, {options.plot: draw})
     except ValueError as error:
         raise UsageError(f"--plot: {error}") from None
+
+
+def write_noted(options: Namespace, contents: Contents) -> None:
+    """Write the files of a command, and note each that is written."""
+    if write(options, contents):
+        for path in filter(None, contents):
+            note(options, f"{path} written")
 
 
 def add_page(parser: Any, help: str) -> None:

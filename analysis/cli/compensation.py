@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_json, show
+from .common import add_json, argument_type, show
 from .outputs import (
     Output,
     UsageError,
-    Writer,
     add_force,
     add_output,
     check_outputs,
-    text_writer,
     write,
 )
 from .telling import complain
@@ -102,15 +100,12 @@ def add_options(parser: ArgumentParser) -> None:
     add_json(parser)
 
 
+@argument_type
 def _lengths(text: str) -> tuple[float, ...]:
-    from ballplate.simulator.inputs.quantities import QuantityError
 
     from ..error_maps.compensation_tables import parse_lengths
 
-    try:
-        return parse_lengths(text)
-    except QuantityError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return parse_lengths(text)
 
 
 def run(options: Namespace) -> int:
@@ -130,15 +125,11 @@ def run(options: Namespace) -> int:
             Output("output", "-o", path, None, takes_screen=False) for path in paths
         )
         check_outputs(options)
-        write(options, {path: _writer(text) for path, text in paths.items()})
+        write(options, paths)
     show(options, found)
     if paths and not options.json:
         print(f"written: {', '.join(map(str, sorted(paths)))}")
     return 0
-
-
-def _writer(text: str) -> Writer:
-    return text_writer(lambda stream: stream.write(text))
 
 
 def _made(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:

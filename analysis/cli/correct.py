@@ -11,10 +11,9 @@ from .outputs import UsageError, Writer, add_force, add_output, text_writer, wri
 from .telling import warn
 
 if TYPE_CHECKING:
+    from ballplate.simulator.design.objects import Tasks
     from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.simulator.readings.point_files import GivenPoints
-
-    from ..results.wanted_lengths import WantedLengths
 
 HELP = "correct points by the map of a fit, with their uncertainty"
 DESCRIPTION = (
@@ -123,19 +122,15 @@ def run(options: Namespace) -> int:
         )
     except ValueError as error:
         raise UsageError(error) from None
-    writers: dict[Path, Writer] = {}
-    if options.output:
-        writers[options.output] = text_writer(found.write_points)
-    if options.covariance:
-        writers[options.covariance] = text_writer(found.write_covariance)
-    if writers:
-        write(options, writers)
+    contents: dict[Path | None, Writer] = {options.output: text_writer(found.write_points)}
+    contents[options.covariance] = text_writer(found.write_covariance)
+    write(options, contents)
     show(options, found)
     warn(found.warnings)
     return 1 if found.is_open else 0
 
 
-def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> WantedLengths:
+def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
     from ballplate.simulator.experiment.load import load
 

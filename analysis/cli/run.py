@@ -6,7 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
-from .outputs import UsageError, add_force, text_writer, write
+from .outputs import UsageError, add_force, write
 from .telling import complain
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _write_page(options: Namespace, prediction: Prediction) -> None:
 
     with progress(options) as shown:
         text = page(prediction, report=shown.show)
-    write(options, {options.report: text_writer(lambda stream: stream.write(text))})
+    write(options, {options.report: text})
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:

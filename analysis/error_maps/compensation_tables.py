@@ -35,6 +35,7 @@ from ballplate.simulator.experiment.compensation.table_formats import (
 from ballplate.simulator.experiment.compensation.volume_tables import VolumeTable
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
+from ballplate.simulator.geometry.grids import grid_points
 from ballplate.simulator.inputs.messages import Message, refused
 from ballplate.simulator.inputs.quantities import format_length, parse_length
 from ballplate.simulator.inputs.settings import listing
@@ -314,9 +315,7 @@ def _open_with(fitted: FittedMap, offsets: Array) -> bool:
     """
     if not fitted.undetermined.shape[1]:
         return False
-    d = fitted.dimension
-    sides = np.linspace(fitted.volume.lower, fitted.volume.upper, CHECKED).T
-    x = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, d)
+    x = grid_points(np.linspace(fitted.volume.lower, fitted.volume.upper, CHECKED).T)
     for offset in offsets:
         p = np.broadcast_to(offset, x.shape)
         by_parameter = fitted.model.jacobian(x, fitted.values, p)

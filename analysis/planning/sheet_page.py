@@ -9,7 +9,8 @@ from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 
-from .drawings import LONGEST_NAME, escaped, place_drawing
+from ..presentation.paper import escaped
+from .drawings import LONGEST_NAME, place_drawing
 from .reading_lists import sequence
 from .schedule import RunSheet, Step
 from .sheet_drawings import artefact_drawing, volume_drawing

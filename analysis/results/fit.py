@@ -22,7 +22,7 @@ from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
-from ..presentation.formatting import aligned, amount_of, finite, number, to_uncertainty
+from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
 from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
@@ -207,10 +207,7 @@ class Fit(FitResult):
             "title": self.title,
             **verdict_data(self.verdict),
             "status": self.solution.status,
-            "sigma": self.sigma,
-            "sigma_is_estimated": self.sigma_is_estimated,
-            "degrees_of_freedom": self.degrees_of_freedom,
-            "too_large": self.too_large,
+            **picked(self, "sigma", "sigma_is_estimated", "degrees_of_freedom", "too_large"),
             "sum_of_squares": finite(self.solution.factor.sum_of_squares),
             "iterations": [
                 {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)}
@@ -220,11 +217,7 @@ class Fit(FitResult):
             **({"tasks": task_data(self.tasks)} if self.tasks else {}),
             "largest_residuals": [
                 {
-                    "position": one.position,
-                    "ball": one.ball,
-                    "probe": one.probe,
-                    "axis": one.axis,
-                    "value": one.value,
+                    **picked(one, "position", "ball", "probe", "axis", "value"),
                     "unit": "m",
                     "standard_uncertainties": finite(self._standardised(one)),
                 }

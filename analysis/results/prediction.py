@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 
+from ..presentation.formatting import picked
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
@@ -188,11 +189,7 @@ def quantity_row(quantity: Quantity) -> dict[str, Any]:
     """A quantity as the row of a table, in its own unit."""
     return {
         "standard uncertainty of": quantity.description,
-        "maximum": quantity.maximum,
-        "average": quantity.average,
-        "unit": quantity.unit,
-        "count": quantity.count,
-        "undetermined": quantity.undetermined,
+        **picked(quantity, "maximum", "average", "unit", "count", "undetermined"),
         "largest at": quantity.largest,
     }
 

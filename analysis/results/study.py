@@ -141,7 +141,7 @@ def fit(
         anew = fit(experiment, observed, "given", monomials)
         return replace(anew, variance_components=found, is_reweighted=True)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    freedom = design.observation_count - design.parameter_count + judged.deficiency
+    freedom = at.degrees_of_freedom
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
     untested = too_many_entries(design)

@@ -445,10 +445,7 @@ def check_size(
         return
     d = machine.dimension
     poses = sum(references.artefacts[one.artefact].role == "plate" for one in positions.values())
-    gauges = {
-        name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
-    }
-    pivots = [one for one in positions.values() if one.artefact in gauges]
+    pivots = _pivots(positions.values(), references)
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     offsets = sum(probe.is_estimated for probe in probes.values())
     shared = errors + pose_size(d) * poses + d * (len(pivots) + offsets)
@@ -492,6 +489,12 @@ def check_derivatives(
         references.problems.add(("evaluation", "points"), text)
 
 
+def _pivots(positions: Iterable[Position], references: References) -> list[Position]:
+    """Positions of Bryan gauges."""
+    kinds = references.artefacts
+    return [one for one in positions if isinstance(kinds[one.artefact], BryanGaugeSettings)]
+
+
 def check_lengths(
     calibrations: Mapping[Steps, Calibration],
     positions: Collection[Position],
@@ -499,11 +502,7 @@ def check_lengths(
 ) -> None:
     """Report length standards and gauges that are read too often."""
     problems = references.problems
-    gauges = {
-        name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
-    }
-    pivots = [one for one in positions if one.artefact in gauges]
-    rows = sum(one.count for one in pivots)
+    rows = sum(one.count for one in _pivots(positions, references))
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..design.objects import Volume
+from ..geometry.grids import even_grid
 from ..inputs.messages import refused
+from ..inputs.yamltree import to_list
 from ..machines.custom import CustomModelError
 from ..machines.protocol import Array, ErrorModel
 from ..maps.fitted_map import FittedMap
@@ -35,7 +37,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "experiment": fitted.experiment,
         "date": fitted.date,
         "program": fitted.program,
-        "error_model": _plain(relative(fitted.settings, folder)),
+        "error_model": to_list(relative(fitted.settings, folder)),
         "files": files,
         "volume": {
             axis: [_length(low), _length(high)]
@@ -81,13 +83,6 @@ def _probe_data(fitted: FittedMap) -> dict[str, Any]:
     return found
 
 
-def _plain(value: Any) -> Any:
-    """What a file says, tuples as lists."""
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
-
-
 def _length(value: float) -> str:
     return f"{value!r} m"
 
@@ -107,7 +102,7 @@ def corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Arra
     volume.
     """
     d = len(volume.lower)
-    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    corners = even_grid(np.zeros(d), np.ones(d), [2] * d)
     points = volume.lower + volume.size * np.concatenate([corners, np.full((1, d), 0.5)])
     offsets = np.broadcast_to(0.1 * volume.size, points.shape)
     return np.asarray(model.error(points, values, offsets))

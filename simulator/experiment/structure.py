@@ -16,7 +16,7 @@ from ..geometry.artefacts import AnyArtefactSettings
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.settings import describe, hint, nearest
-from ..inputs.wording import explain
+from ..inputs.validation import explain_in, type_adapter
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import PositionSettings
@@ -151,11 +151,11 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
     )
     whole = whole or PoolSettings.model_validate({})
     values |= {("pool", "times"): whole.times, ("pool", "limits"): whole.limits}
-    for key, adapter_of in POOL_ENTRIES.items():
+    for key, kind_of in POOL_ENTRIES.items():
         entries = node.items.get(key)
         if isinstance(entries, Sequence):
             for i, item in enumerate(entries.items):
-                values |= _validate(_of_type(adapter_of(item)), item, ("pool", key, i), problems)
+                values |= _validate(type_adapter(kind_of(item)), item, ("pool", key, i), problems)
         elif entries is not None and not (isinstance(entries, Scalar) and entries.value is None):
             found = describe(to_python(entries) if isinstance(entries, Scalar) else {})
             description = PoolSettings.model_fields[key].description
@@ -189,25 +189,14 @@ def _validate(
         known[adapter] = adapter.validate_python(to_python(node))
         return {steps: known[adapter]}
     except ValidationError as error:
-        for explanation in explain(error.errors(include_url=False), node, _json_schema(adapter)):
-            problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)
+        explain_in(problems, error, adapter, node, steps)
         return {}
 
 
 @cache
 def _adapter(key: str) -> TypeAdapter[Any]:
     if key in ENTRIES:
-        return _of_type(ENTRIES[key][1])
+        return type_adapter(ENTRIES[key][1])
     field = ExperimentSettings.model_fields[key]
     annotated: Any = Annotated[field.annotation, field]
-    return _of_type(annotated)
-
-
-@cache
-def _of_type(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
-
-
-@cache
-def _json_schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
-    return adapter.json_schema()
+    return type_adapter(annotated)

@@ -152,9 +152,12 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[int, 
 
 def assert_same_text(one: str, other: str, of: str) -> None:
     """Line by line; the bound of a plan, an iteration's, which ends within a thousandth, to
-    that.
+    that.  Progress, which a busy machine shows for steps that are silent on an idle one, is left
+    out.
     """
-    lines, others = one.splitlines(), other.splitlines()
+    lines, others = (
+        [line for line in text.splitlines() if " so far, " not in line] for text in (one, other)
+    )
     assert len(lines) == len(others), of
     for line, same in zip(lines, others, strict=True):
         if line.startswith(("bound of any choice", "the choice is ")):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 
-from ...presentation.formatting import aligned, finite, number
+from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
 from ..adjustments import FEW
 from .compared_maps import MOTIONS, ComparedMap
@@ -257,10 +257,7 @@ class MapDifference(Result):
             "tests": [_test_data(one) for one in tested],
             "groups": [
                 {
-                    "kind": group.kind,
-                    "count": group.count,
-                    "undetermined": group.undetermined,
-                    "exceeding": group.exceeding,
+                    **picked(group, "kind", "count", "undetermined", "exceeding"),
                     "share_by_chance": group.by_chance,
                 }
                 for group in found.groups

@@ -23,7 +23,7 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ...presentation.formatting import aligned, as_data, number
+from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
 from .lack_of_fit import chance_of, chance_words
 from .left_out import MOST_POINTS
@@ -125,10 +125,7 @@ class CrossValidation(FitResult):
     def to_dict(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
-            "title": self.title,
-            "sum_of_squares": self.sum_of_squares,
-            "dimensions": self.dimensions,
-            "chance": self.chance,
+            **picked(self, "title", "sum_of_squares", "dimensions", "chance"),
             "sigmas": list(self.sigmas),
             "largest_length_difference": {
                 "value": self.lengths[0],
@@ -193,7 +190,7 @@ def cross_validate(
     if not dimensions:
         raise refused(experiment.source, "the readings leave nothing to compare")
     square = float((((u.T @ change)[used] / values[used]) ** 2).sum())
-    freedom = min(_freedom(at) for at, _ in fits)
+    freedom = min(at.degrees_of_freedom for at, _ in fits)
     shape = places.shape
     return CrossValidation(
         experiment.label,
@@ -212,10 +209,6 @@ def cross_validate(
     )
 
 
-def _freedom(at: Linearisation) -> int:
-    return at.design.observation_count - at.design.parameter_count + at.deficiency
-
-
 def _fitted(
     experiment: Experiment, observed: ObservedReadings, given: bool
 ) -> tuple[Linearisation, float]:
@@ -224,7 +217,7 @@ def _fitted(
         text = f"the estimate from one campaign's readings has {solution.status}; see ballplate fit"
         raise refused(experiment.source, text)
     at = linearised_fit(observed.design, solution)
-    freedom = _freedom(at)
+    freedom = at.degrees_of_freedom
     is_estimated = not given and freedom > 0
     left = solution.factor.sum_of_squares / max(freedom, 1)
     return at, float(np.sqrt(left)) if is_estimated else 1.0

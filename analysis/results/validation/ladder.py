@@ -191,7 +191,7 @@ def fit_rung(experiment: Experiment, observed: ObservedReadings, model: LadderMo
         )
         raise refused(experiment.source, text, "error_model")
     at = linearised_fit(design, solution)
-    freedom = design.observation_count - design.parameter_count + at.deficiency
+    freedom = at.degrees_of_freedom
     return RungFit(FittedSum(model, solution.factor.sum_of_squares, freedom), at)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ...presentation.formatting import aligned, finite, number
+from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import FitResult
 from ...uncertainty.summaries import Quantity
 from ..adjustments import freedom_words
@@ -260,10 +260,7 @@ def _rung_data(one: Rung, lengths_are_open: bool) -> dict[str, Any]:
     change: Sequence[float] = (one.change.largest, one.change.rms)
     largest, rms = (None if lengths_are_open else value for value in change)
     return {
-        "model": one.model,
-        "parameters": one.parameters,
-        "degrees_of_freedom": one.degrees_of_freedom,
-        "sum_of_squares": one.sum_of_squares,
+        **picked(one, "model", "parameters", "degrees_of_freedom", "sum_of_squares"),
         "aic": one.criteria.aic,
         "bic": one.criteria.bic,
         "chance": one.beaten.chance if one.beaten.count else None,

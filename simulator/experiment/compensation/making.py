@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...computing.threads import single_threaded
+from ...geometry.grids import grid_points
 from ...machines.protocol import Array, ErrorModel
 from .axis_tables import (
     AxisTable,
@@ -245,7 +246,7 @@ def _compared(
         probes = np.zeros((1, d))
         without = exact.changed(lambda one: one.values * (np.arange(6) < 3))
     sides = [_places(machine, exact, k, origin) for k in range(d)]
-    grid = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, d)
+    grid = grid_points(sides)
     generator = np.random.default_rng(np.random.SeedSequence(0))
     x = np.concatenate([grid, generator.uniform(machine.lower, machine.upper, (RANDOM, d))])
     # The origin last.
