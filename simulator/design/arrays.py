@@ -154,9 +154,7 @@ class Design:
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
-        if len(self.artefacts.names) == 1:
-            return self.balls.names[ball]
-        return f"{self.artefacts.names[self.balls.artefact[ball]]}/{self.balls.names[ball]}"
+        return self.balls.label(ball, self.artefacts.names)
 
 
 @dataclass(frozen=True)

@@ -120,6 +120,11 @@ class Balls:
         """Indices of the balls of an artefact."""
         return np.flatnonzero(self.artefact == artefact)
 
+    def label(self, ball: int, artefacts: tuple[str, ...]) -> str:
+        """Name of a ball, with that of its artefact where there are several."""
+        name = self.names[ball]
+        return name if len(artefacts) == 1 else f"{artefacts[self.artefact[ball]]}/{name}"
+
 
 @dataclass(frozen=True)
 class Positions:

@@ -162,7 +162,14 @@ def read_text(path: Path | GivenText) -> str:
     """
     if isinstance(path, GivenText):
         return path.text
-    file, content = str(path), read_bytes(path)
+    return decoded(read_bytes(path), str(path))
+
+
+def decoded(content: bytes, file: str) -> str:
+    """The text of a UTF-8 file's content; ``file`` is named in messages.
+
+    :raises ExperimentError: it is not UTF-8.
+    """
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -10,7 +10,6 @@ from typing import Any
 from ballplate.simulator.estimation.linearisation import Linearisation
 
 from ...rank.motions import Motion
-from ..formatting import SHOWN
 from .design_views import ball_views, motion_view, point_view, volume_view
 from .document import Page, PageSection, facts_list, origin, written
 from .elements import Html, element, folded, joined, note, sentence, table
@@ -193,7 +192,8 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         for number, one in enumerate(repairs.at(key).each(), start=1):
             changes = joined((change.text("text") for change in one.at("changes").each()), "; ")
             of = ", ".join(map(str, one.data["removes"]))
-            name = f"repair {number}" if key == "complete" else f"of direction {of} alone"
+            many = "s" if len(one.data["removes"]) > 1 else ""
+            name = f"repair {number}" if key == "complete" else f"of direction{many} {of} alone"
             edits = joined(
                 element(
                     "li",
@@ -240,12 +240,11 @@ def _influences(run: QuotedData) -> Html:
         return Html()
     rows = []
     for name, one in zip(run.data["influences"], run.at("influences").each(), strict=True):
-        stated = (
-            one.micro("stated_standard_uncertainty")
-            if one.data["stated_standard_uncertainty"] is not None
-            else "free"
-        )
-        rows.append([name, stated, one.micro("standard_uncertainty"), SHOWN[one.data["unit"]]])
+        u, unit = one.amount("standard_uncertainty", "unit")
+        stated = "unknown"
+        if one.data["stated_standard_uncertainty"] is not None:
+            stated, _ = one.amount("stated_standard_uncertainty", "unit")
+        rows.append([name, stated, u, unit])
     heads = ["influence quantity", "u stated", "u after the readings", "unit"]
     return table("influences", "Influence quantities", heads, rows, (0, 3))
 

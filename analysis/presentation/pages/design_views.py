@@ -15,11 +15,11 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ...rank.motions import Motion, moved_balls, moved_points
 from ..scene import MOST_BALLS, box_edges, hull, projection
 from ..svg import round_number
-from .elements import element, joined
+from .elements import Html, element, joined
 from .spatial import Layer, SpatialPicture
 
-# Positions that are told by their names; of more, by their numbers.
-MOST_NAMES = 8
+# Positions that are told by their names, and letters of these; otherwise by their numbers.
+MOST_NAMES, LETTERS = 8, 20
 # Of the picture's size: the longest half axis of an ellipsoid, and the largest displacement.
 LONGEST_AXIS, LARGEST_MOTION = 0.05, 0.09
 # What moves no point by more, in metres, moves none: a direction moves something by 1e-6.
@@ -36,7 +36,7 @@ def volume_layers(design: Design) -> list[Layer]:
     _, away = projection(d)
     edges, hidden = box_edges(lower, upper, away)
     ends, names = [], []
-    off = 0.1 * float((upper - lower).max())
+    off = 0.14 * float((upper - lower).max())
     for k in range(d):
         # Outside the edges that the eye of still pictures sees in front, and at the left.
         start = lower.copy()
@@ -63,6 +63,8 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
     layers = volume_layers(design)
     labels, names, styli = [], [], []
     read = [k for k in range(len(design.positions.names)) if (design.readings.position == k).any()]
+    told = [design.positions.names[k] for k in read]
+    is_named = len(read) <= MOST_NAMES and max(map(len, told), default=0) <= LETTERS
     for number, k in enumerate(read):
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
@@ -81,7 +83,7 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         centre = outline.mean(axis=0)
         is_flat = design.dimension == 2
         labels.append(centre if is_flat else outline[0] + 0.12 * (outline[0] - centre))
-        names.append(design.positions.names[k] if len(read) <= MOST_NAMES else str(number + 1))
+        names.append(told[number] if is_named else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
         layers.append(Layer("dots", "ink", np.stack([one[1] for one in styli])))
@@ -91,19 +93,20 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         "Positions in the volume: balls that are read, and from one ball of each position the styli"
         " to the machine's reference point."
     )
-    if len(read) > MOST_NAMES:
+    if not is_named:
         caption += " Positions are numbered as in the run sheet."
     if len(design.readings.ball) and max(_counts(design)) > most:
         caption += " Only some of the balls are drawn."
-    caption += turning_words(design)
-    return SpatialPicture(layers, "volume-view", "positions", words, caption)
+    told = joined([caption, turning_words(design)])
+    return SpatialPicture(layers, "volume-view", "positions", words, told)
 
 
-def turning_words(design: Design) -> str:
-    """How a picture is turned."""
+def turning_words(design: Design) -> Html:
+    """How a picture is turned, for screens."""
     if design.dimension == 2:
-        return ""
-    return " Drag it, or press arrow keys while it has the focus, to turn it."
+        return Html()
+    words = " Drag it, or press arrow keys while it has the focus, to turn it."
+    return element("span", words, class_="turning")
 
 
 def point_view(at: Linearisation, factor: float, sigma: float = 1.0) -> SpatialPicture:
@@ -177,7 +180,9 @@ def _ellipsoids(
         f" {times:,.0f} times. They refer to the frame that the error model's constraints"
         " and the poses fix."
     )
-    if len(undetermined):
+    if not len(points):
+        caption = f"{what}: all {len(undetermined)} are undetermined, and have no ellipsoid."
+    elif len(undetermined):
         caption += f" {len(undetermined)} are undetermined: dots without an ellipsoid."
     return SpatialPicture(layers, name, label, what, caption)
 

@@ -65,8 +65,9 @@ class SagSettings(InfluenceSettings):
     shape: Forms[Literal["x", "y", "both"], NonEmpty[TermSettings], TermSettings] | None = Field(
         None,
         description=(
-            "quadratic along x, y or both (default) of the plate, or terms of a polynomial in the"
-            " places of balls, 1 at the outermost"
+            "quadratic along x, y or both (default) of the plate, most at its middle and nothing at"
+            " the outermost balls, or terms of a polynomial in the places of balls, which are 0 at"
+            " the middle and 1 at the outermost"
         ),
     )
     values: Text | None = Field(
