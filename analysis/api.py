@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
     from .planning.sheet import Sheet
+    from .presentation.pages.embedded import View
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
@@ -79,6 +81,7 @@ if TYPE_CHECKING:
     from .simulator.machines.protocol import Array
     from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings.observed_readings import ObservedReadings
+    from .sweeps.running import SweepResult
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -268,6 +271,84 @@ def run(
         chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report
     )
     return replace(predicted, monte_carlo=found)
+
+
+def view(given: Experiment | PathLike | Prediction | Fit) -> View:
+    """A design in space: positions of plates, balls and probes of an experiment; of a prediction or
+    a fit also ellipsoids of uncertainty, residuals, and what undetermined directions move.
+
+    A notebook shows it, to be turned by mouse, buttons or keyboard, and shows it below experiments,
+    predictions and fits by itself. `save(path)` of the result writes a page, or the picture alone.
+
+    >>> view(quickstart())
+    <View of quickstart: positions>
+    >>> view(run(quickstart()))
+    <View of quickstart: positions, points, balls of plate>
+    """
+    from .results.fit import Fit
+    from .results.prediction import Prediction
+
+    if isinstance(given, Fit | Prediction):
+        return given.view()
+    from .presentation.pages.embedded import View
+    from .results.views import position_picture
+    from .simulator.experiment.layout import lay_out
+
+    chosen = _experiment(given)
+    return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
+
+
+def page(
+    given: Experiment | PathLike | Prediction | Fit | SweepResult,
+    path: PathLike | None = None,
+    run_modules: bool = False,
+    compare: PathLike | None = None,
+    report: Report = unreported,
+) -> str:
+    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and `report`
+    write: HTML that needs no other file and no network. With a path it is written as well.
+
+    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
+    drawings of designs whose error models are in Python need `run_modules`, and the store of
+    another one to `compare` with is set beside it.
+
+    :raises ValueError: a fit or a prediction that does not know its experiment; sweeps that cannot
+        be compared.
+    :raises ImportError: what pages of sweeps need is not installed.
+    :raises OSError: the file cannot be written.
+
+    >>> page(fit(quickstart(), simulate(quickstart()))).splitlines()[0]
+    '<!DOCTYPE html>'
+    """
+    from .presentation.files import write_file
+    from .results.fit import Fit
+    from .results.prediction import Prediction
+    from .sweeps.running import SweepResult
+
+    ensure_type(bool, "True or False", run_modules=run_modules)
+    ensure_report(report)
+    if path is not None:
+        ensure_path("path", path)
+    if (run_modules or compare is not None) and not isinstance(given, SweepResult):
+        raise ValueError("run_modules and compare go with sweeps only; leave them out")
+    if isinstance(given, Fit):
+        text = given.page()
+    elif isinstance(given, SweepResult):
+        from .stores import sweep_report
+
+        chosen_sweep = given.store, given.number
+        text = sweep_report(*chosen_sweep, "html", run_modules, report, compare)
+    else:
+        from .report.design_contents import page_of_design
+
+        predicted = given if isinstance(given, Prediction) and given.quantities else None
+        chosen = given.experiment if isinstance(given, Prediction) else _experiment(given)
+        if chosen is None:
+            raise ValueError("the prediction does not know its experiment; predict it anew")
+        text = page_of_design(chosen, predicted or run(chosen), report)
+    if path is not None:
+        write_file(Path(path), text.encode("utf-8", "replace"))
+    return text
 
 
 def simulate(
@@ -1372,3 +1453,19 @@ def _experiment(given: Any) -> Experiment:
     what = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
     kind = type(given).__name__
     raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")
+
+
+def _shown_in_notebook(experiment: Experiment) -> str:
+    """An experiment in a notebook: its table, and its picture, of which it knows nothing."""
+    return experiment._repr_html_() + view(experiment)._repr_html_()
+
+
+def _teach_notebook() -> None:
+    """Let the session of IPython, if this is one, show experiments so."""
+    session = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    if session is not None:
+        formatter = session.display_formatter.formatters["text/html"]
+        formatter.for_type(Experiment, _shown_in_notebook)
+
+
+_teach_notebook()

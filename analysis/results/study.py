@@ -90,6 +90,7 @@ def _predict(
         lengths,
         scale,
         influences=influence_uncertainties(at) if with_quantities else (),
+        experiment=experiment,
     )
 
 
