@@ -13,8 +13,7 @@ import ballplate as bp
 import pytest
 from ballplate.designs import shipped
 
-from tests.report.browser import program
-from tests.studio.chromium import Studio, settled, tab, until
+from tests.studio.chromium import Studio, chromium, settled, tab, until
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 INSTALL = "python -m pip install 'ballplate[browser]', and a Chromium"
@@ -23,7 +22,7 @@ pytest.importorskip("playwright", reason=f"no browser is driven without it: {INS
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.slow,
-    pytest.mark.skipif(program() is None, reason=f"no Chromium on this machine: {INSTALL}"),
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
 ]
 
 # Nothing sticks out of the page, other than inside parts that scroll by themselves.
@@ -169,6 +168,7 @@ def test_an_hour(design: Path) -> None:
         assert all(url.startswith((home, "data:")) for url in page.asked)
 
 
+@pytest.mark.long
 def test_twenty_moves_of_seven_by_seven_balls_are_answered(design: Path) -> None:
     text = Path(shipped("quickstart.yaml")).read_text()
     design.write_text(text.replace("balls: [5, 5]", "balls: [7, 7]"))
@@ -204,6 +204,7 @@ def test_twenty_moves_of_seven_by_seven_balls_are_answered(design: Path) -> None
     )
 
 
+@pytest.mark.long
 def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> None:
     with Studio(design) as studio, tab() as page:
         page.goto(studio.address)
@@ -238,6 +239,7 @@ def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> N
         assert failures == [] and page.errors == []
 
 
+@pytest.mark.long
 def test_the_keyboard_is_enough(design: Path) -> None:
     """Who works without a mouse stays where he was, though parts of the page are made anew."""
     with Studio(design) as studio, tab() as page:
@@ -277,7 +279,7 @@ def test_the_keyboard_is_enough(design: Path) -> None:
         assert page.evaluate("document.activeElement.dataset.path") == path
         reach("#view")
         before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
-        after = press("ArrowUp")["design"]["scene"]["positions"][0]["origin"]
+        after = press("PageUp")["design"]["scene"]["positions"][0]["origin"]
         assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
         assert page.evaluate(at).startswith("The volume")
         state = press("Control+s")

@@ -76,7 +76,9 @@ def test_values_may_name_files_beside_the_design(document, pageless):
             "values": [f"{{kind: balls, file: tables/{name}.csv}}" for name in "ab"],
         }
     ]
-    found = swept(document, axes, unreported)
+    text = document.text.replace("pairs: corner sides", "pairs: all")
+    assert text != document.text
+    found = swept(changed(document, text), axes, unreported)
     assert [cell["reason"] for cell in found["cells"]] == ["", ""], found
     assert len({cell["average"] for cell in found["cells"]}) == 2 and found["page"] == ""
 
