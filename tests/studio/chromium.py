@@ -76,7 +76,8 @@ def tab(width: int = 1400, height: int = 900) -> Iterator:
     path = chromium()
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
-        page = browser.new_page(viewport={"width": width, "height": height})
+        size = {"width": width, "height": height}
+        page = browser.new_context(viewport=size).new_page()
         page.errors, page.asked = [], []
         page.on("pageerror", lambda error: page.errors.append(str(error)))
         page.on(

@@ -128,10 +128,10 @@ def test_an_hour(design: Path) -> None:
         with page.context.new_page() as other:
             other.goto(f"http://127.0.0.1:{studio.port}/")
             until(other, "!!window.studio?.state()?.design")
+            seen = other.evaluate("window.studio.state().revision")
             other.click("#positions button.name >> nth=1")
             other.click("#turn")
-            until(other, "window.studio.state().back > 0 && !window.studio.state().saved")
-            theirs = other.evaluate("window.studio.state()")
+            theirs = settled(other, seen + 1)
         page.evaluate("window.studio.act({do: 'turn', position: 'z low'})")
         assert "another window" in page.inner_text("#notice")
         assert page.evaluate("window.studio.state()")["text"] == theirs["text"]
@@ -225,7 +225,8 @@ def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> N
         page.click("#jobs button >> text=stop")
         until(page, "!document.querySelector('#jobs li')")
         sweep("0.1 um; 0.2 um; 0.4 um")
-        page.wait_for_selector("[data-page]")
+        page.wait_for_selector("#jobs li:not([data-state=running])", timeout=200_000)
+        assert page.locator("[data-page]").count() == 1, page.inner_text("#jobs")
         assert page.locator("#jobs tbody tr").count() == 6
         assert "rank deficiency" in page.inner_text("#jobs thead")
         with page.context.expect_page() as opened:

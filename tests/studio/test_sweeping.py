@@ -21,7 +21,7 @@ def document(tmp_path: Path) -> DesignDocument:
     tables = tmp_path / "tables"
     tables.mkdir()
     for name, length in (("a", 0.5), ("b", 0.75)):
-        rows = [f"{k},{length * (k % 2)},{length * (k // 2)},0" for k in range(4)]
+        rows = [f"{k},{length * (k % 4) / 3},{length * (k // 4) / 3},0" for k in range(16)]
         (tables / f"{name}.csv").write_text("ball,x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
     text = Path(shipped("quickstart.yaml")).read_text()
     return changed(opened(path), text.replace("[5, 5]", "[4, 4]"))
@@ -29,7 +29,7 @@ def document(tmp_path: Path) -> DesignDocument:
 
 def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatch):
     steps = []
-    monkeypatch.setattr("ballplate.studio.sweeping.sweep_report", lambda *_, **__: "the page")
+    monkeypatch.setattr("ballplate.report.page.page", lambda *_: "the page")
     axes = [
         {"paths": ["machine.repeatability"], "values": ["0.1 um", "0.4 um"]},
         {
@@ -66,7 +66,7 @@ def pageless(monkeypatch):
     def fail(*_, **__):
         raise ImportError("matplotlib")
 
-    monkeypatch.setattr("ballplate.studio.sweeping.sweep_report", fail)
+    monkeypatch.setattr("ballplate.report.page.page", fail)
 
 
 def test_values_may_name_files_beside_the_design(document, pageless):
