@@ -539,7 +539,7 @@ def fit(
     from .results.fit import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
-    ensure_one_of(ESTIMATORS, estimator=estimator)
+    ensure_one_of(ESTIMATORS, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
@@ -650,9 +650,9 @@ def cross_validate(
     return compared(chosen, first, _observed(chosen, against, None)[1], sigma, common)
 
 
-def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:
-    """A map in another error model: a kind such as "empirical", settings such as "{kind: kinematic,
-    position_coefficients: 3}", or the path of an experiment file whose model is taken.
+def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
+    """The map of a fit in another error model: a kind such as "empirical", settings such as "{kind:
+    kinematic, position_coefficients: 3}", or the path of an experiment file whose model is taken.
 
     Its `map` is the new one, with its covariance.
 
@@ -660,13 +660,12 @@ def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:
     >>> convert(fitted, "{kind: empirical, coefficients: 5}")
     <ConvertedMap of map: empirical, 195 parameters, the same corrections>
     """
+    from .results.any_map import map_of_source
     from .results.converted_map import convert as converted
-    from .simulator.maps.fitted_map import FittedMap
 
     ensure_type(str, 'an error model such as "empirical"', to=to)
-    if isinstance(fitted, FittedMap):
-        return converted(fitted, to, "map")
-    return converted(load_map(fitted), to, Path(fitted).stem)
+    found, label = map_of_source(_machine("fitted", fitted))
+    return converted(found, to, label)
 
 
 def _observed(
@@ -727,10 +726,14 @@ def diff(
     ensure_one_of(("certificate",), shared=shared)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
+    if isinstance(dates, str) or len(dates) != 2:
+        raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
     days = tuple(None if one is None else stated_day(one) for one in dates)
     known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
     is_file = isinstance(points, str | os.PathLike)
     places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
+    if isinstance(places, np.ndarray) and places.ndim != 2:
+        raise ValueError("points: give a list of points, each with its co-ordinates in metres")
     sides = [_side(name, one) for name, one in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
@@ -756,7 +759,7 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     from .results.budget import budget as budget_of
     from .results.fit import Fit
 
-    ensure_one_of(GROUPINGS, by=by)
+    ensure_one_of(GROUPINGS, by=str(by))
     if isinstance(given, Fit):
         if given.experiment is None:
             raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
@@ -789,7 +792,7 @@ def compare(
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
-    ensure_one_of(COMPARED, estimator=estimator)
+    ensure_one_of(COMPARED, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)
@@ -856,7 +859,7 @@ def plan(
     from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
-    ensure_one_of(NAMES, criterion=criterion)
+    ensure_one_of(NAMES, criterion=str(criterion))
     ensure_positive("hours above 0", 1e5, hours=hours)
     ensure_whole(1, positions=positions, readings=readings, workers=workers)
     ensure_whole(0, seed=seed)
@@ -997,7 +1000,7 @@ def lengths(
 
 
 def map(
-    machine: PathLike | FittedMap,
+    machine: PathLike | Fit | FittedMap,
     grid: Sequence[int] | None = None,
     line: str | Line | None = None,
     error: str | None = None,
@@ -1034,10 +1037,8 @@ def map(
     from .error_maps.realisations import MOST_DRAWS, Draws
     from .error_maps.volumetric_errors import MOST_POINTS
     from .results.any_map import map_errors
-    from .simulator.maps.fitted_map import FittedMap
 
-    if not isinstance(machine, FittedMap):
-        ensure_path("machine", machine)
+    source = _machine("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(bool, "True or False", budget=budget)
@@ -1069,35 +1070,30 @@ def map(
         number,
         at,
     )
-    source = machine if isinstance(machine, FittedMap) else Path(machine)
     draws = None if draw is None else Draws(draw, seed)
     chosen = () if tasks is None else (_experiment(tasks),)
     return map_errors(source, asked, error, probe, draws, budget, chosen)
 
 
 def curves(
-    fitted: FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
+    fitted: Fit | FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
 ) -> ErrorCurves:
     """The error functions of a map at so many positions along each line, or some of them, with
     their expanded uncertainties; squareness errors as angles, and other numbers of its model.
 
-    `fitted` is what `to_map()` of a fit gives, or the path of a map file.
+    `fitted` is a fit, what its `to_map()` gives, or the path of a map file.
 
     >>> curves(fit(quickstart(), simulate(quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
     from .results.any_map import map_of_source
     from .results.error_curves_result import error_curves
-    from .simulator.maps.fitted_map import FittedMap
 
-    if not isinstance(fitted, FittedMap):
-        ensure_path("fitted", fitted)
-        fitted = Path(fitted)
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)
     for name in names:
         ensure_type(str, "the name of a parametric error, such as EXX", errors=name)
-    return error_curves(*map_of_source(fitted), names, points)
+    return error_curves(*map_of_source(_machine("fitted", fitted)), names, points)
 
 
 def load_map(path: PathLike) -> FittedMap:
@@ -1136,14 +1132,14 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
 
 def adjust(
-    fitted: FittedMap | PathLike,
+    fitted: Fit | FittedMap | PathLike,
     scale: str | Iterable[str] = (),
     turn: str | Iterable[str] = (),
-    after: FittedMap | PathLike | None = None,
+    after: Fit | FittedMap | PathLike | None = None,
     share: float = 0.0,
 ) -> AdjustedMachine:
     """What adjustments leave of a fitted machine's errors, and what a campaign `after` them says;
-    both are maps, or files of maps.
+    both are fits, maps, or files of maps.
 
     Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
     as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". The standard uncertainty of each is
@@ -1157,14 +1153,9 @@ def adjust(
     """
     from .results.adjusted_machine import adjusted_machine
     from .results.machine_changes import guideway_turn, scale_change
-    from .simulator.maps.fitted_map import FittedMap
 
-    first, second = (
-        one if one is None or isinstance(one, FittedMap) else load_map(one)
-        for one in (fitted, after)
-    )
-    if first is None:
-        raise TypeError("fitted=None; give what to_map() of a fit gives, or its file")
+    first = _fitted("fitted", fitted)
+    second = None if after is None else _fitted("after", after)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"share={share!r}; give a part of each change, from 0 to 1")
     changes = [scale_change(text) for text in _texts("scale", scale)]
@@ -1173,7 +1164,7 @@ def adjust(
 
 
 def compensation(
-    machine: PathLike | FittedMap,
+    machine: PathLike | Fit | FittedMap,
     format: TableFormatName,
     pitch: str | Sequence[float] | None = None,
     origin: str | Sequence[float] | None = None,
@@ -1191,17 +1182,14 @@ def compensation(
     <MadeCompensation of npl-like: isg, 19, 24, 9 positions>
     """
     from .error_maps.compensation_tables import made_compensation, of_map, tabled_machine
-    from .simulator.maps.fitted_map import FittedMap
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
-    if isinstance(machine, FittedMap):
-        source, remarks = of_map(machine, machine.title)
-        label = machine.title
+    given = _machine("machine", machine)
+    if isinstance(given, Path):
+        label, (source, remarks) = given.stem, tabled_machine(given)
     else:
-        ensure_path("machine", machine)
-        source, remarks = tabled_machine(Path(machine))
-        label = Path(machine).stem
+        label, (source, remarks) = given.title, of_map(given, given.title)
     lengths = _metres("pitch", pitch), _metres("origin", origin)
     flags = volumetric, without_rotations
     return made_compensation(source, label, format, *lengths, sense, *flags, remarks)
@@ -1231,7 +1219,7 @@ def read_compensation(
     """
     from .error_maps.compensation_tables import read_compensation_files
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
     ensure_type(str, "an arrangement, such as MB2", arrangement=arrangement)
     several = [files] if isinstance(files, str | os.PathLike) else files
@@ -1259,7 +1247,7 @@ def _metres(name: str, given: str | Sequence[float] | None) -> tuple[float, ...]
 
 
 def correct(
-    fitted: FittedMap | PathLike,
+    fitted: Fit | FittedMap | PathLike,
     points: Any,
     probe: str | Sequence[str] | None = None,
     lengths: Sequence[Sequence[str | int]] = (),
@@ -1267,7 +1255,7 @@ def correct(
     coverage_factor: float | None = None,
     with_repeatability: bool = False,
 ) -> Correction:
-    """Points corrected by a map, or the file of one, with their uncertainty.
+    """Points corrected by a fit, its map, or the file of that, with their uncertainty.
 
     `points` are an array (n, d) in metres, or a table as `ballplate correct` reads it, with a
     `probe` for those that name none; without any it is that of the map. They are `coordinates`
@@ -1275,7 +1263,7 @@ def correct(
     `lengths` are pairs of names or of indices. The coverage factor is that of the map, or the one
     given; `with_repeatability` the scatter of the readings that are corrected counts, too.
 
-    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> fitted = fit(quickstart(), simulate(quickstart()))
     >>> ends = [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]
     >>> correct(fitted, ends)
     <Correction of quickstart: 2 points; U = 2 u = 0.4325 µm at most>
@@ -1289,13 +1277,12 @@ def correct(
 
     from .results.correction import correction
     from .results.wanted_lengths import between_named
-    from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings import point_files
 
     ensure_one_of(("scale readings", "ball centres"), coordinates=coordinates)
     ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
     ensure_type(bool, "True or False", with_repeatability=with_repeatability)
-    chosen = fitted if isinstance(fitted, FittedMap) else load_map(fitted)
+    chosen = _fitted("fitted", fitted)
     names = chosen.probes.names
     offsets = chosen.drawn_offsets if coordinates == "ball centres" else None
     if isinstance(points, str | os.PathLike | pandas.DataFrame):
@@ -1386,6 +1373,20 @@ def reproduce(
         return reproduce_npl(chosen, trials, folder, report)
     answers = None if results is None else Path(results)
     return score_certified(chosen, answers, folder, report)
+
+
+def _fitted(name: str, given: Fit | FittedMap | PathLike) -> FittedMap:
+    """The map of a fit, of what its to_map() gives, or of a file."""
+    found = _machine(name, given)
+    return load_map(found) if isinstance(found, Path) else found
+
+
+def _machine(name: str, given: Fit | FittedMap | PathLike) -> FittedMap | Path:
+    """The map of a fit, or of what its to_map() gives; the path of a file as such."""
+    from .results.fit import Fit
+
+    side = _side(name, given)
+    return side.to_map() if isinstance(side, Fit) else side
 
 
 def _side(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:

@@ -132,6 +132,8 @@ class Campaign(Selection, Result):
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
                 " determines"
             )
+        if self.gap is not None:
+            lines += [self.gap.words, self.gap.remedy]
         lines += _interrupted(self)
         if self.gains:
             lines += ["", *_gain_table(self)]
@@ -165,6 +167,7 @@ class Campaign(Selection, Result):
             ],
             "completed": None if self.completed is None else self.completed.whole.name,
             "left_open": self.left_open,
+            "whole_pool": None if self.gap is None else self.gap.to_dict(),
             "ignored": [candidate.name for candidate in self.ignored],
             "gains": [_gain_data(gain) for gain in self.gains],
             "left_out": [_gain_data(gain) for gain in self.left_out],

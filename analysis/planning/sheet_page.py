@@ -70,6 +70,7 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
 @media (max-width: 40em) { .words { display: block; } }
 @media print {
   body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
+  td { overflow-wrap: anywhere; }
   .fields { grid-template-columns: repeat(3, 1fr); }
   .step .fields { grid-template-columns: 1fr 1fr 1fr 2fr; }
   .wide { overflow: visible; }
@@ -154,7 +155,9 @@ def _order(sheet: RunSheet) -> str:
 
 def _table(heads: list[str], rows: list[str], numbers: set[int]) -> str:
     cells = [
-        f'<th class="number">{head}</th>' if k in numbers else f"<th>{head}</th>"
+        f'<th scope="col" class="number">{head}</th>'
+        if k in numbers
+        else f'<th scope="col">{head}</th>'
         for k, head in enumerate(heads)
     ]
     return f'<div class="wide"><table><tr>{"".join(cells)}</tr>{"".join(rows)}</table></div>'

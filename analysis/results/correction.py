@@ -129,12 +129,12 @@ class Correction(Result):
     def headline(self) -> str:
         u = self.expanded_uncertainties
         open_ = int(np.isnan(u).any(axis=1).sum())
+        count = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
+        if np.isnan(u).all():
+            return f"{count}, undetermined"
         told = f", {open_} of them undetermined" if open_ else ""
-        largest = np.nanmax(u) if np.isfinite(u).any() else np.nan
-        return (
-            f"{len(self.points)} points{told}; U = {self.coverage_factor:g} u ="
-            f" {number(1e6 * float(largest))} µm at most"
-        )
+        largest = float(np.nanmax(u))
+        return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
 
     @property
     def notes(self) -> tuple[str, ...]:

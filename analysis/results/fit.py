@@ -12,6 +12,7 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
+from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -41,7 +42,7 @@ from .estimates import (
     labels,
 )
 from .fit_contents import fit_contents
-from .map_of_fit import map_of
+from .map_of_fit import counted_twice, map_of
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -505,6 +506,13 @@ class Fit(FitResult):
         degrees of freedom, and of what was not tested.
         """
         found = []
+        twice = counted_twice(self.experiment, self.observed)
+        if twice:
+            found.append(
+                "the map that is prior knowledge comes from readings that are fitted here too"
+                f" ({listing(twice)}): they count twice, and uncertainties are too small; leave the"
+                " prior out, or these readings"
+            )
         if self.too_large:
             times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
             cure = (

@@ -225,14 +225,13 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         "in the file",
     ]
     made_table = table("repairs", "Changes, cheapest first, each verified", heads, rows, (0, 1, 5))
-    return joined(
-        [
-            sentence("Each of these determines what is open.", now)
-            if repairs.data["complete"]
-            else "",
-            made_table,
-        ]
-    )
+    whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
+    told = "Each of these determines what is open."
+    if not whole:
+        told = "None of these determines all that is open."
+    elif parts:
+        told = "Each repair determines what is open; the other changes determine a part of it."
+    return joined([sentence(told, now), made_table])
 
 
 def _influences(run: QuotedData) -> Html:

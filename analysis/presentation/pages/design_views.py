@@ -13,13 +13,11 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...rank.motions import Motion, moved_balls, moved_points
-from ..scene import MOST_BALLS, box_edges, hull, projection
+from ..scene import MOST_BALLS, box_edges, hull, names_fit, projection
 from ..svg import round_number
 from .elements import Html, element, joined
 from .spatial import Layer, SpatialPicture
 
-# Positions that are told by their names, and letters of these; otherwise by their numbers.
-MOST_NAMES, LETTERS = 8, 20
 # Of the picture's size: the longest half axis of an ellipsoid, and the largest displacement.
 LONGEST_AXIS, LARGEST_MOTION = 0.05, 0.09
 # What moves no point by more, in metres, moves none: a direction moves something by 1e-6.
@@ -64,7 +62,7 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
     labels, names, styli = [], [], []
     read = [k for k in range(len(design.positions.names)) if (design.readings.position == k).any()]
     told = [design.positions.names[k] for k in read]
-    is_named = len(read) <= MOST_NAMES and max(map(len, told), default=0) <= LETTERS
+    is_named = names_fit(told)
     for number, k in enumerate(read):
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
