@@ -13,6 +13,7 @@ from ballplate.simulator.design.arrays import locations
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.quantities import Target
@@ -23,7 +24,7 @@ from ..rank.motions import moved_balls, moved_points, null_motions, weak_motions
 from ..rank.verdict import Verdict, verdict
 from ..results.parts import scale_lines, target_lines
 from ..results.prediction import length_headline, rank_words
-from ..uncertainty.error_map import error_map
+from ..uncertainty.error_map import point_map
 from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, uncertainties
 
@@ -36,15 +37,15 @@ MAP_NODES = 11
 
 @single_threaded
 def answer(experiment: Experiment) -> dict[str, Any]:
-    """Everything about a design that a page shows, as plain data in metres, with the seconds that
-    the engine took.
+    """What a page shows of a design at once, as plain data in metres, with the seconds that the
+    engine took.
     """
     start = perf_counter()
     design, target = lay_out(experiment), experiment.target_uncertainty
     at = linearise(design)
     judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities = uncertainties(at, target=target)
-    scale = scale_of(experiment, at)
+    found_map = _map(at)
     engine = perf_counter() - start
     lengths = quantities.get("U6")
     return {
@@ -63,13 +64,20 @@ def answer(experiment: Experiment) -> dict[str, Any]:
         "headline": length_headline(quantities),
         "target": [] if target is None else target_lines(lengths),
         "within": None if lengths is None else lengths.within_target,
-        "scale": scale_lines(scale),
         "motions": _motions(at, judged, target),
-        "map": _map(experiment),
+        "map": found_map,
         "doubts": list(experiment.doubts),
         "engine": engine,
         "seconds": perf_counter() - start,
     }
+
+
+@single_threaded
+def scale_answer(experiment: Experiment) -> list[str]:
+    """What carries the scale of a design, in words: it is told after the rest, since the design is
+    evaluated once more without each of those that may.
+    """
+    return scale_lines(scale_of(experiment, linearise(lay_out(experiment))))
 
 
 def _row(quantity: Quantity) -> dict[str, Any]:
@@ -126,8 +134,7 @@ def _motions(at: Linearisation, judged: Verdict, target: Target | None) -> dict[
     """
     design = at.design
     volume, read, offsets = design.machine.volume, design.readings, design.probes.offsets
-    sides = [np.linspace(*ends, NODES) for ends in zip(volume.lower, volume.upper, strict=True)]
-    nodes = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(sides))
+    nodes = even_grid(volume.lower, volume.upper, [NODES] * len(volume.lower))
     of_nodes = np.full(len(nodes), design.evaluation.probe)
     of_plates = read.select(design.plate_readings)
     places = np.concatenate([nodes + offsets[of_nodes], locations(design, at.state, of_plates)])
@@ -156,9 +163,9 @@ def _motions(at: Linearisation, judged: Verdict, target: Target | None) -> dict[
     }
 
 
-def _map(experiment: Experiment) -> dict[str, Any]:
+def _map(at: Linearisation) -> dict[str, Any]:
     """Standard uncertainty of corrected points through the volume, None where undetermined."""
-    found = error_map(experiment, MAP_NODES)
+    found = point_map(at, MAP_NODES)
     return {
         "x": found.x.tolist(),
         "y": found.y.tolist(),
@@ -170,5 +177,4 @@ def _map(experiment: Experiment) -> dict[str, Any]:
             }
             for one in found.slices
         ],
-        "within": found.within,
     }

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.yamltree import parse_tree, read_bytes, read_text, to_python
+from ballplate.simulator.inputs.yamltree import decoded, parse_tree, read_bytes, to_python
 
 # Texts before the present one that are kept.
 MOST_STEPS = 200
@@ -42,6 +44,12 @@ class DesignDocument:
     forward: tuple[str, ...] = ()
 
     @property
+    def fingerprint(self) -> str:
+        """What tells this design from others, and from itself after a change."""
+        said = f"{self.path}\0{self.variant}\0{self.text}"
+        return hashlib.blake2b(said.encode("utf-8", "surrogatepass"), digest_size=12).hexdigest()
+
+    @property
     def is_saved(self) -> bool:
         return self.content is not None and self.content == encoded(self)
 
@@ -51,8 +59,8 @@ def opened(path: Path, variant: str | None = None, with_modules: bool = True) ->
 
     :raises ExperimentError: the file cannot be read as text.
     """
-    text = read_text(path)
-    return DesignDocument(path, variant, text, read_bytes(path), with_modules)
+    content = read_bytes(path)
+    return DesignDocument(path, variant, decoded(content, str(path)), content, with_modules)
 
 
 def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:
@@ -154,19 +162,36 @@ def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:
     ensure_as_read(document)
     content = encoded(document)
     target = document.path.resolve()
-    with tempfile.NamedTemporaryFile(dir=target.parent, prefix=".ballplate-", delete=False) as file:
-        beside = Path(file.name)
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+    mode = target.stat().st_mode if target.exists() else 0o666 & ~_mask()
+    replace_file(target, content, mode, lambda: ensure_as_read(document))
+    return replace(document, content=content)
+
+
+def replace_file(
+    target: Path,
+    content: bytes,
+    mode: int,
+    ensure: Callable[[], None] = lambda: None,
+    is_lasting: bool = True,
+) -> None:
+    """Write a file as a whole; `ensure` may still refuse when everything is written. What is not
+    lasting outlives this program, and not a failure of power.
+
+    :raises OSError: it cannot be written.
+    """
+    number, name = tempfile.mkstemp(dir=target.parent, prefix=".ballplate-")
+    beside = Path(name)
     try:
-        mode = target.stat().st_mode if target.exists() else 0o666 & ~_mask()
+        with open(number, "wb") as file:
+            file.write(content)
+            file.flush()
+            if is_lasting:
+                os.fsync(file.fileno())
         beside.chmod(mode)
-        ensure_as_read(document)
+        ensure()
         beside.replace(target)
     finally:
         beside.unlink(missing_ok=True)
-    return replace(document, content=content)
 
 
 def _mask() -> int:

@@ -6,7 +6,6 @@ import base64
 import multiprocessing
 import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -14,20 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.steps import ProgressStep, Report, counted
-from ballplate.simulator.experiment.changes import changed_tree
+from ballplate.simulator.computing.steps import ProgressStep, Report
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.modules import refused_modules
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from ..presentation.formatting import finite
-from .actions import value_of
 from .document import DesignDocument, experiment_of
 
 Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
 
 # Most computations beside one another.
 MOST_RUNNING = 2
+
+# Seconds for a process that is asked to end.
+PATIENCE = 2.0
 
 # Data sets of Monte Carlo unless another number is asked for.
 TRIALS = 256
@@ -62,34 +60,9 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
 
 
 def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    """U6 and the rank for several values of one key."""
-    from ..results.study import planned_uncertainty
+    from .sweeping import swept
 
-    experiment, path = experiment_of(document), str(settings["path"])
-    values = [str(one) for one in settings["values"]]
-    found: list[dict[str, Any]] = []
-    for value in counted(values, "values", len(values), report):
-        try:
-            changes = {path: value_of(value)}
-            if not document.with_modules:
-                tree = changed_tree(experiment.tree, str(experiment.source), changes)
-                if refused := refused_modules(tree, document.path.parent):
-                    raise ExperimentError(refused)
-            planned = planned_uncertainty(experiment.with_(changes))
-        except ExperimentError as error:
-            found.append({"value": value, "error": error.messages[0].text})
-            continue
-        lengths = planned.quantities.get("U6")
-        found.append(
-            {
-                "value": value,
-                "deficiency": planned.deficiency,
-                "average": None if lengths is None else finite(lengths.average),
-                "maximum": None if lengths is None else finite(lengths.maximum),
-                "within": None if lengths is None else lengths.within_target,
-            }
-        )
-    return found
+    return swept(document, settings["axes"], report)
 
 
 def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
@@ -133,50 +106,56 @@ JOBS: Mapping[str, Work] = {
 
 @dataclass
 class Job:
-    """A computation in a process of its own: `state` is running, done, failed or stopped, `step`
-    how far it has come, and `result` what came of it, or why nothing did.
+    """A computation in a process of its own, of the design with a `fingerprint`: `state` is
+    running, done or failed, `step` how far it has come, `result` what came of it, or why nothing
+    did, and `page` one that it has made.
     """
 
     name: str
-    revision: int
+    fingerprint: str
     process: BaseProcess
     connection: Connection
     state: str = "running"
     step: str = ""
     result: Any = None
+    page: str = ""
 
     def look(self) -> None:
         """Take what the process has told since."""
-        with suppress(EOFError, OSError):
+        try:
             while self.state == "running" and self.connection.poll():
                 kind, said = self.connection.recv()
                 if kind == "step":
                     self.step = said
+                elif kind == "page":
+                    self.page = said
                 else:
                     self.state, self.result = kind, said
-        if self.state == "running" and not self.process.is_alive() and not self.connection.poll():
+        except (EOFError, OSError):
             self.state, self.result = "failed", "the computation ended without a result"
 
     def stop(self) -> None:
-        """End the process."""
-        if self.state == "running":
-            self.state = "stopped"
+        """End the process, which may be one that does not listen."""
         self.process.terminate()
-        self.process.join(2.0)
+        self.process.join(PATIENCE)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
         self.connection.close()
 
     def to_dict(self, number: int) -> dict[str, Any]:
         return {
             "id": number,
             "job": self.name,
-            "revision": self.revision,
+            "fingerprint": self.fingerprint,
             "state": self.state,
             "step": self.step,
             "result": self.result,
+            "page": bool(self.page),
         }
 
 
-def started(name: str, document: DesignDocument, settings: Mapping[str, Any], revision: int) -> Job:
+def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) -> Job:
     """Start a computation with the document as it is now.
 
     :raises KeyError: there is no such job.
@@ -189,7 +168,7 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any], re
     process = context.Process(target=_work, args=arguments, daemon=True)
     process.start()
     sender.close()
-    return Job(name, revision, process, receiver)
+    return Job(name, document.fingerprint, process, receiver)
 
 
 def _work(
@@ -200,6 +179,8 @@ def _work(
 
     try:
         result = JOBS[name](document, settings, report)
+        if isinstance(result, dict) and (page := result.pop("page", "")):
+            connection.send(("page", page))
     except ExperimentError as error:
         connection.send(("failed", "\n".join(map(str, error.messages))))
     except (ValueError, TypeError, KeyError, ImportError, OSError) as error:

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import hmac
 import json
+import logging
+import math
+import secrets
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -19,7 +22,6 @@ from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import (
     HTMLResponse,
-    JSONResponse,
     PlainTextResponse,
     RedirectResponse,
     Response,
@@ -43,6 +45,20 @@ POLICY = (
 )
 
 
+PAGE_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox; base-uri 'none';"
+    " form-action 'none'; frame-ancestors 'none'"
+)
+
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+
+logger = logging.getLogger(__name__)
+
+
 def application(session: Session, token: str, port: int) -> Starlette:
     """The application of a session that is served on the loopback address."""
     hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
@@ -57,15 +73,12 @@ def application(session: Session, token: str, port: int) -> Starlette:
                 _answering(lambda request, body: session.preview(body)),
                 methods=["POST"],
             ),
-            Route(
-                "/api/settings",
-                _answering(lambda request, body: session.settings(str(body["position"]))),
-                methods=["POST"],
-            ),
             Route("/api/schema", _answering(lambda request, body: _schema())),
             Route("/api/jobs", _answering(lambda request, body: session.jobs())),
             Route("/api/start", _answering(_starting(session)), methods=["POST"]),
             Route("/api/stop", _answering(_stopping(session)), methods=["POST"]),
+            Route("/api/scale", _answering(lambda request, body: session.scale())),
+            Route("/pages/{number:int}", _made_page(session)),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
     )
@@ -104,8 +117,6 @@ class Guard:
             given = request.query_params["token"]
         if not hmac.compare_digest(given.encode(), self.token.encode()):
             return "open the address that the command has printed, with its token\n"
-        if int(headers.get("content-length") or 0) > MOST_BYTES:
-            return f"more than {MOST_BYTES // 10**6} MB; leave some of it out\n"
         return None
 
 
@@ -120,16 +131,22 @@ def _page(page: str, token: str, port: int) -> Callable[[Request], Awaitable[Res
             away = RedirectResponse("/", 303)
             away.set_cookie(_cookie(port), token, httponly=True, samesite="strict", path="/")
             return away
-        import secrets
-
         nonce = secrets.token_urlsafe(16)
-        headers = {
-            "Content-Security-Policy": POLICY.format(nonce=nonce),
-            "Cache-Control": "no-store",
-            "Referrer-Policy": "no-referrer",
-            "X-Content-Type-Options": "nosniff",
-        }
+        headers = HEADERS | {"Content-Security-Policy": POLICY.format(nonce=nonce)}
         return HTMLResponse(page.replace("{{nonce}}", nonce), headers=headers)
+
+    return show
+
+
+def _made_page(session: Session) -> Callable[[Request], Awaitable[Response]]:
+    """A page that a computation has made, which may run nothing and ask nobody."""
+
+    async def show(request: Request) -> Response:
+        try:
+            text = await run_in_threadpool(session.page, request.path_params["number"])
+        except RefusedError as error:
+            return PlainTextResponse(f"{error}\n", 404)
+        return HTMLResponse(text, headers=HEADERS | {"Content-Security-Policy": PAGE_POLICY})
 
     return show
 
@@ -145,27 +162,66 @@ def _answering(
         body: Any = {}
         if request.method == "POST":
             if not request.headers.get("content-type", "").startswith("application/json"):
-                return JSONResponse({"error": "send JSON"}, 415)
+                return _error("send JSON", 415)
+            content = await _content(request)
+            if content is None:
+                return _error(f"more than {MOST_BYTES // 10**6} MB; leave some of it out", 413)
             try:
-                body = json.loads(await request.body())
-            except ValueError:
-                return JSONResponse({"error": "this is no JSON"}, 400)
+                body = json.loads(content)
+            except (ValueError, RecursionError):
+                return _error("this is no JSON", 400)
             if not isinstance(body, dict):
-                return JSONResponse({"error": "send an object"}, 400)
+                return _error("send an object", 400)
         try:
-            found = await run_in_threadpool(work, request, body)
+            return _json(await run_in_threadpool(work, request, body))
         except ExperimentError as error:
             text = "; ".join(
                 f"{one.path}: {one.text}" if one.path else one.text for one in error.messages
             )
-            return JSONResponse({"error": text})
-        except (ActionError, KeyError, TypeError, ValueError) as error:
-            return JSONResponse({"error": str(error)})
-        except RefusedError as error:
-            return JSONResponse({"error": str(error)})
-        return JSONResponse(found)
+            return _error(text)
+        except KeyError as error:
+            return _error(f"the request needs {error}")
+        except (ActionError, RefusedError) as error:
+            return _error(str(error))
+        except Exception as error:
+            # Nothing has changed by it; whoever looks after the program finds it in the terminal.
+            logger.exception("the studio failed to answer %s", request.url.path)
+            reason = f"{type(error).__name__}: {error}"
+            return _error(f"the studio failed, and the design is as it was: {reason}")
 
     return respond
+
+
+async def _content(request: Request) -> bytes | None:
+    """The body of a request, whether its length is stated or not; None where it is too large."""
+    parts, size = [], 0
+    async for part in request.stream():
+        size += len(part)
+        if size > MOST_BYTES:
+            return None
+        parts.append(part)
+    return b"".join(parts)
+
+
+def _json(data: Any, status: int = 200) -> Response:
+    try:
+        text = json.dumps(data, allow_nan=False)
+    except ValueError:
+        # A file may say .nan or .inf, of which JSON has none.
+        text = json.dumps(_without_nan(data))
+    return Response(text, status, media_type="application/json")
+
+
+def _without_nan(data: Any) -> Any:
+    if isinstance(data, float) and not math.isfinite(data):
+        return f"{data}"
+    if isinstance(data, dict):
+        return {key: _without_nan(value) for key, value in data.items()}
+    return [_without_nan(value) for value in data] if isinstance(data, list | tuple) else data
+
+
+def _error(text: str, status: int = 200) -> Response:
+    return _json({"error": text}, status)
 
 
 def _acting(session: Session) -> Callable[[Request, dict[str, Any]], Any]:

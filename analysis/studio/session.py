@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.yamltree import to_python
 
 from .actions import ActionError, done, settings_of
-from .answers import answer
+from .answers import answer, scale_answer
 from .document import (
     ChangedOnDiskError,
     DesignDocument,
@@ -26,6 +27,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
+from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
 
@@ -34,10 +36,24 @@ class RefusedError(Exception):
     """What was asked for is not allowed, or not possible now; the text says why."""
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """A document with the answer to it; where its text is wrong, the answer before and what is
+    wrong.
+    """
+
+    document: DesignDocument
+    answer: dict[str, Any] | None
+    messages: tuple[Message, ...]
+    data: Any
+    variants: tuple[str, ...]
+
+
 class Session:
     """What one person does in the studio; every method may be called from any thread.
 
-    `revision` counts the changes, so that a page which shows an earlier state changes nothing.
+    `revision` counts the changes, so that a page which shows an earlier state changes nothing, and
+    `name` tells the session from one that was here before.
     Only files in the folder of the one that was opened first are opened or written, and error
     models in Python run only from files that the command itself has named.
     """
@@ -45,77 +61,97 @@ class Session:
     def __init__(self, path: Path, variant: str | None = None, beginning: str = "") -> None:
         """Open a file; where there is none yet, begin with a text that is not saved.
 
-        :raises ExperimentError: the file cannot be read, or there is none and no text either.
+        :raises ExperimentError: the file cannot be read, or there is none and no text either; or
+            its folder cannot be.
         """
         self._lock = RLock()
         self._first = path.resolve()
+        if not self._first.parent.is_dir():
+            raise refused(path, "there is no such folder; make it, or name another")
         is_new = bool(beginning) and not path.exists()
-        self._document = (
+        document = (
             DesignDocument(path, variant, beginning, None) if is_new else opened(path, variant)
         )
+        document, self.note = recovered(document)
+        if is_new and not self.note:
+            self.note = f"{path.name} is new, and begins with an example; Save writes it"
         if variant is None:
-            names = variants_of(self._document)
-            self._document = replace(self._document, variant=names[0] if names else None)
-        self._answer: dict[str, Any] | None = None
+            document = _with_first_variant(document)
         self._kept: dict[str, Any] | None = None
-        self._messages: tuple[Message, ...] = ()
-        self._data: Any = None
-        self._variants: tuple[str, ...] = ()
+        self._off: dict[str, dict[str, Any]] = {}
         self._jobs: dict[int, Job] = {}
         self.revision = 0
-        self._judge()
+        self.name = secrets.token_hex(4)
+        self._now = self._judged(document, None)
 
     def state(self) -> dict[str, Any]:
         """Everything that the page shows, as plain data."""
         with self._lock:
-            document = self._document
+            now = self._now
+            document, answer = now.document, now.answer
+            there = {one["name"] for one in answer["scene"]["positions"]} if answer else set()
             return {
+                "session": self.name,
                 "revision": self.revision,
+                "fingerprint": document.fingerprint,
                 "file": document.path.name,
                 "variant": document.variant,
-                "variants": list(self._variants),
+                "variants": list(now.variants),
                 "text": document.text,
-                "data": self._data,
+                "data": now.data,
                 "saved": document.is_saved,
                 "back": len(document.back),
                 "forward": len(document.forward),
-                "messages": [_message_data(one) for one in self._messages],
-                "design": self._answer,
+                "messages": [_message_data(one) for one in now.messages],
+                "design": answer,
+                "off": [name for name in self._off if name not in there],
                 "kept": self._kept,
                 "files": [one.name for one in self._files()],
                 "jobs": list(JOBS),
+                "note": self.note,
             }
 
+    @property
+    def is_saved(self) -> bool:
+        with self._lock:
+            return self._now.document.is_saved or not self._now.document.back
+
     def act(self, action: Mapping[str, Any]) -> None:
-        """Do something with the design.
+        """Do something with the design; where it fails in any way all is as before.
 
         :raises ActionError: it is unknown or incomplete.
         :raises ExperimentError: the file cannot say it.
         :raises RefusedError: it is not allowed.
         """
         with self._lock:
-            seen = action.get("revision")
-            if seen is not None and seen != self.revision:
-                raise RefusedError("the design has changed in another window; look again")
+            self._ensure_seen(action)
             control = self._controls().get(str(action.get("do")))
             if control is None:
-                self._become(done(self._document, action))
+                self._become(done(self._now.document, action))
             else:
                 control(action)
 
     def preview(self, action: Mapping[str, Any]) -> dict[str, Any]:
         """What the design would be after an action that is not made.
 
-        :raises ActionError, ExperimentError: as for `act`.
+        :raises ActionError, ExperimentError, RefusedError: as for `act`.
         """
         with self._lock:
-            document = self._document
+            self._ensure_seen(action)
+            document = self._now.document
         return answer(experiment_of(done(document, action)))
 
-    def settings(self, position: str) -> dict[str, Any]:
-        """What a file says of a position, to put it back later."""
+    def scale(self) -> dict[str, Any]:
+        """What carries the scale of the design, in words, and which design that is.
+
+        :raises ExperimentError: the text is wrong.
+        """
         with self._lock:
-            return settings_of(self._document, position)
+            document = self._now.document
+        return {
+            "fingerprint": document.fingerprint,
+            "lines": scale_answer(experiment_of(document)),
+        }
 
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
@@ -130,7 +166,7 @@ class Session:
             if sum(job.state == "running" for job in self._jobs.values()) >= MOST_RUNNING:
                 raise RefusedError(f"{MOST_RUNNING} computations are running; stop one of them")
             number = max(self._jobs, default=0) + 1
-            self._jobs[number] = started(name, self._document, settings, self.revision)
+            self._jobs[number] = started(name, self._now.document, settings)
             return number
 
     def jobs(self) -> list[dict[str, Any]]:
@@ -139,6 +175,17 @@ class Session:
             for job in self._jobs.values():
                 job.look()
             return [job.to_dict(number) for number, job in self._jobs.items()]
+
+    def page(self, number: int) -> str:
+        """The page that a computation has made.
+
+        :raises RefusedError: it has made none.
+        """
+        with self._lock:
+            job = self._jobs.get(number)
+            if job is None or not job.page:
+                raise RefusedError(f"computation {number} has no page")
+            return job.page
 
     def stop(self, number: int) -> None:
         """Stop a computation and forget it.
@@ -159,66 +206,100 @@ class Session:
     def _controls(self) -> dict[str, Callable[[Mapping[str, Any]], None]]:
         """What is done with the file rather than with the design in it."""
         return {
-            "undo": lambda action: self._become(undone(self._document)),
-            "redo": lambda action: self._become(redone(self._document)),
+            "undo": lambda action: self._become(undone(self._now.document)),
+            "redo": lambda action: self._become(redone(self._now.document)),
             "variant": self._choose,
             "keep": self._keep,
             "save": self._save,
             "open": self._open,
-            "reopen": lambda action: self._become(reopened(self._document)),
+            "reopen": lambda action: self._become(reopened(self._now.document)),
+            "off": self._switch_off,
+            "on": self._switch_on,
         }
 
-    def _become(self, document: DesignDocument) -> None:
-        self._document = document
-        self.revision += 1
-        self._judge()
+    def _ensure_seen(self, action: Mapping[str, Any]) -> None:
+        """Make sure that the page shows what it is about to change.
 
-    def _judge(self) -> None:
-        """Answer anew; where the text is wrong the last answer stays, with what is wrong."""
-        self._variants = variants_of(self._document) if self._document.variant else ()
+        :raises RefusedError: it shows something else.
+        """
+        if action.get("session", self.name) != self.name:
+            raise RefusedError("the studio was started anew; this page shows an earlier design")
+        if action.get("revision", self.revision) != self.revision:
+            raise RefusedError("the design has changed in another window; look again")
+
+    def _become(self, document: DesignDocument, before: dict[str, Any] | None = None) -> None:
+        """Go on with another document; `before` is shown where its text is wrong, by default the
+        answer until now.
+        """
+        if before is None and document.path == self._now.document.path:
+            before = self._now.answer if document.variant == self._now.document.variant else None
+        self._now = self._judged(document, before)
+        self.revision += 1
+        self.note = ""
+        keep(document)
+
+    def _judged(self, document: DesignDocument, before: dict[str, Any] | None) -> _Judged:
+        variants = variants_of(document) if document.variant else ()
         try:
-            experiment = experiment_of(self._document)
-            self._data = to_python(experiment.tree)
-            self._answer = answer(experiment)
-            self._messages = ()
+            experiment = experiment_of(document)
+            found = answer(experiment)
         except ExperimentError as error:
-            self._data = data_of(self._document)
-            self._messages = error.messages
+            return _Judged(document, before, error.messages, data_of(document), variants)
+        return _Judged(document, found, (), to_python(experiment.tree), variants)
 
     def _choose(self, action: Mapping[str, Any]) -> None:
-        names = variants_of(self._document)
+        names = variants_of(self._now.document)
         if action.get("name") not in names:
             raise RefusedError(f"no variant {action.get('name')!r}; there are {', '.join(names)}")
-        self._answer = None
-        self._become(replace(self._document, variant=action["name"]))
+        self._become(replace(self._now.document, variant=action["name"]))
 
     def _keep(self, action: Mapping[str, Any]) -> None:
-        if self._messages:
+        if self._now.messages:
             raise RefusedError("the text is wrong; mend it before the design is kept")
-        self._kept = None if action.get("off") else self._answer
+        self._kept = None if action.get("off") else self._now.answer
         self.revision += 1
+
+    def _switch_off(self, action: Mapping[str, Any]) -> None:
+        """Take a position out, and remember what the file said of it."""
+        name, document = str(action.get("position")), self._now.document
+        settings = settings_of(document, name)
+        self._become(done(document, {"do": "remove", "position": name}))
+        self._off[name] = settings
+
+    def _switch_on(self, action: Mapping[str, Any]) -> None:
+        name = str(action.get("position"))
+        if name not in self._off:
+            raise RefusedError(f'no position "{name}" was switched off')
+        self._become(done(self._now.document, {"do": "add", "settings": self._off[name]}))
+        del self._off[name]
 
     def _save(self, action: Mapping[str, Any]) -> None:
         name = action.get("name")
         path = None if name is None else self._inside(str(name))
+        before = self._now.document
         try:
-            self._document = saved(self._document, path)
+            document = saved(before, path)
         except ChangedOnDiskError as error:
             raise RefusedError(str(error)) from None
         except OSError as error:
             reason = error.strerror or str(error)
-            raise RefusedError(f"{self._document.path.name} cannot be written: {reason}") from None
+            raise RefusedError(
+                f"{(path or before.path).name} cannot be written: {reason}"
+            ) from None
+        self._now = replace(self._now, document=document)
         self.revision += 1
+        give_up(before)
 
     def _open(self, action: Mapping[str, Any]) -> None:
-        path = self._inside(str(action.get("name", "")))
-        if not self._document.is_saved and not action.get("discard"):
-            raise RefusedError(f"{self._document.path.name} has changes that are not saved")
+        path, before = self._inside(str(action.get("name", ""))), self._now.document
+        if not before.is_saved and not action.get("discard"):
+            raise RefusedError(f"{before.path.name} has changes that are not saved")
         trusted = path.resolve() == self._first
         document = opened(path, None, trusted)
-        names = variants_of(document)
-        self._kept = self._answer = None
-        self._become(replace(document, variant=names[0] if names else None))
+        give_up(before)
+        document, note = recovered(document)
+        self._become(_with_first_variant(document))
+        self._kept, self._off, self.note = None, {}, note
 
     def _inside(self, name: str) -> Path:
         """The path of a design in the folder.
@@ -234,11 +315,20 @@ class Session:
         return path
 
     def _files(self) -> list[Path]:
-        return sorted(
-            one
-            for one in self._first.parent.iterdir()
-            if one.suffix.lower() in ENDINGS and one.is_file()
-        )
+        try:
+            return sorted(
+                one
+                for one in self._first.parent.iterdir()
+                if one.suffix.lower() in ENDINGS and not one.name.startswith(".") and one.is_file()
+            )
+        except OSError:
+            # The folder is gone, or may not be read any more.
+            return []
+
+
+def _with_first_variant(document: DesignDocument) -> DesignDocument:
+    names = variants_of(document)
+    return replace(document, variant=names[0] if names else None)
 
 
 def _message_data(message: Message) -> dict[str, Any]:

@@ -82,14 +82,22 @@ def named_by(source: Path) -> list[Path]:
         root = read_tree(source)
     except ExperimentError:
         return []
+    return named_in([("", root)], source.parent)
+
+
+def named_in(nodes: Sequence[tuple[str, Node]], folder: Path) -> list[Path]:
+    """Files that nodes at paths of an experiment name, as seen from a folder, those that they name,
+    and modules, as far as they are there.
+    """
     found: set[Path] = set()
-    for scalar in path_scalars(root, ""):
-        text = str(scalar.value)
-        named = [Path(text)] if Path(text).is_absolute() else _there(source.parent, text)
-        for path in named:
-            found |= {path, *_of_machine_file(path)}
-    for folder, scalar in _modules([("", root)], source.parent):
-        found |= _imported(folder, str(scalar.value).partition(":")[0])
+    for key, node in nodes:
+        for scalar in path_scalars(node, key):
+            text = str(scalar.value)
+            named = [Path(text)] if Path(text).is_absolute() else _there(folder, text)
+            for path in named:
+                found |= {path, *_of_machine_file(path)}
+    for place, scalar in _modules(nodes, folder):
+        found |= _imported(place, str(scalar.value).partition(":")[0])
     return sorted(found)
 
 

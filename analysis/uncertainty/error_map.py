@@ -6,11 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.functions import displacements
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 
+from .quantities import evaluation_points
 from .summaries import point_pairs
 
 # Points along x and y of a slice.
@@ -52,24 +55,44 @@ def error_map(experiment: Experiment, nodes: int = POINTS) -> ErrorMap:
     """The error map's uncertainty at `nodes` points along x and y, with the probe with which the
     experiment is evaluated, at zero machine error.
     """
-    design = lay_out(experiment)
+    at = linearise(lay_out(experiment))
+    found, target = point_map(at, nodes), experiment.target_uncertainty
+    if target is None:
+        return found
+    pairs = point_pairs(_on_grid(at, nodes), target.standard)[1]
+    return replace(found, within=pairs.within / pairs.count)
+
+
+def point_map(at: Linearisation, nodes: int) -> ErrorMap:
+    """The error map's uncertainty for a design that is linearised already, without the distances
+    between its points.
+    """
+    on_grid = _on_grid(at, nodes)
+    values = displacements(on_grid, evaluation_points(on_grid.design)).uncertainties
+    x, y, levels = _sides(at.design, nodes)
+    of_levels = np.sqrt((values**2).mean(axis=1)).reshape(len(levels), len(y), len(x))
+    slices = [
+        Slice(name, level, found) for (name, level), found in zip(levels, of_levels, strict=True)
+    ]
+    return ErrorMap(x, y, tuple(slices), None)
+
+
+def _sides(design: Design, nodes: int) -> tuple[Array, Array, list[tuple[str, float | None]]]:
+    """The grid's x and y, and its levels with their names."""
     volume = design.machine.volume
     x, y = (np.linspace(volume.lower[k], volume.upper[k], nodes) for k in (0, 1))
-    levels: list[tuple[str, float | None]] = [("", None)]
-    sides = [y, x]
-    if design.dimension == 3:
-        heights = np.linspace(volume.lower[2], volume.upper[2], len(LEVELS))
-        levels = list(zip(LEVELS, heights.tolist(), strict=True))
-        sides = [heights, y, x]
+    if design.dimension == 2:
+        return x, y, [("", None)]
+    heights = np.linspace(volume.lower[2], volume.upper[2], len(LEVELS))
+    return x, y, list(zip(LEVELS, heights.tolist(), strict=True))
+
+
+def _on_grid(at: Linearisation, nodes: int) -> Linearisation:
+    """The same linearisation, evaluated at the grid: what readings determine does not depend on
+    where they are evaluated.
+    """
+    x, y, levels = _sides(at.design, nodes)
+    sides = [y, x] if at.design.dimension == 2 else [np.array([z for _, z in levels]), y, x]
     grid = np.stack(np.meshgrid(*sides, indexing="ij")[::-1], axis=-1)
-    points = grid.reshape(-1, design.dimension)
-    design = replace(design, evaluation=replace(design.evaluation, points=points))
-    target = experiment.target_uncertainty
-    limit = None if target is None else target.standard
-    of_points, pairs = point_pairs(linearise(design), limit)
-    values = np.sqrt((of_points**2).mean(axis=1)).reshape(len(levels), len(y), len(x))
-    slices = [
-        Slice(name, level, found) for (name, level), found in zip(levels, values, strict=True)
-    ]
-    within = None if target is None else pairs.within / pairs.count
-    return ErrorMap(x, y, tuple(slices), within)
+    evaluation = replace(at.design.evaluation, points=grid.reshape(-1, at.design.dimension))
+    return replace(at, design=replace(at.design, evaluation=evaluation))

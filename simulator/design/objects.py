@@ -217,3 +217,12 @@ class Tasks:
     points: Array
     probes: Integers
     targets: tuple[Target | None, ...]
+
+    def beside(self, other: Tasks) -> Tasks:
+        """Both, one after the other."""
+        return Tasks(
+            self.names + other.names,
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.probes, other.probes]),
+            self.targets + other.targets,
+        )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import stat
+from collections import abc
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -161,7 +162,14 @@ def read_text(path: Path | GivenText) -> str:
     """
     if isinstance(path, GivenText):
         return path.text
-    file, content = str(path), read_bytes(path)
+    return decoded(read_bytes(path), str(path))
+
+
+def decoded(content: bytes, file: str) -> str:
+    """The text of a UTF-8 file's content; ``file`` is named in messages.
+
+    :raises ExperimentError: it is not UTF-8.
+    """
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -209,6 +217,13 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
             " positions",
         )
     return builder.root
+
+
+def to_list(value: Any) -> Any:
+    """Plain data with lists for tuples."""
+    if isinstance(value, abc.Mapping):
+        return {key: to_list(item) for key, item in value.items()}
+    return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def to_python(node: Node) -> Any:

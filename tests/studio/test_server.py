@@ -1,6 +1,8 @@
 """What the studio answers, and whom it refuses."""
 
+import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ pytest.importorskip("starlette", reason="the studio is an extra")
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
 from ballplate.studio.server import application
-from ballplate.studio.session import Session
+from ballplate.studio.session import RefusedError, Session
 from starlette.testclient import TestClient
 
 PORT, TOKEN = 8123, "a-token-of-the-tests"
@@ -49,6 +51,8 @@ REQUESTS = [
     ("GET", "/api/state"),
     ("GET", "/api/jobs"),
     ("GET", "/api/schema"),
+    ("GET", "/api/scale"),
+    ("GET", "/pages/1"),
     ("GET", "/static/studio.js"),
     ("POST", "/api/do"),
     ("POST", "/api/start"),
@@ -116,37 +120,6 @@ def test_files_outside_the_folder_are_refused(client, design, tmp_path_factory, 
     assert elsewhere.read_bytes() == design.read_bytes()
 
 
-def test_a_model_in_python_runs_only_from_the_file_that_was_named(client, design):
-    ran = design.with_name("ran")
-    design.with_name("model.py").write_text(f"open({str(ran)!r}, 'w').close()\n")
-    text = design.read_text()
-    start = text.index("error_model:")
-    end = text.index("# The machine that")
-    other = text[:start] + "error_model: {kind: python, file: model.py, name: Model}\n" + text[end:]
-    design.with_name("other.yaml").write_text(other)
-    answer = client.post("/api/do", json={"do": "open", "name": "other.yaml"}).json()
-    assert any("Python" in one["text"] for one in answer["messages"])
-    assert not ran.exists()
-    # Nor does a change there, or a computation, run it.
-    client.post("/api/do", json={"do": "set", "path": ["title"], "value": "mine"})
-    client.post("/api/start", json={"job": "suggest"})
-    assert wait(client)[-1]["state"] == "failed"
-    assert not ran.exists()
-    # Nor does a value that a sweep is asked to try, in a design that has none.
-    design.with_name("plain.yaml").write_bytes(design.read_bytes())
-    assert (
-        "error"
-        not in client.post(
-            "/api/do", json={"do": "open", "name": "plain.yaml", "discard": True}
-        ).json()
-    )
-    value = "{kind: python, file: model.py, name: Model}"
-    sweep = {"path": "error_model", "values": [value]}
-    client.post("/api/start", json={"job": "sweep", "settings": sweep})
-    (row,) = wait(client)[-1]["result"]
-    assert "Python" in row["error"] and not ran.exists()
-
-
 def test_figures_of_another_file_are_not_shown_under_a_name(client, design):
     design.with_name("broken.yaml").write_text("title: [\n")
     answer = client.post("/api/do", json={"do": "open", "name": "broken.yaml"}).json()
@@ -180,6 +153,10 @@ def test_figures_are_those_of_run(client, design):
         expected = predict(experiment).quantities[row["symbol"]]
         assert row["average"] == expected.average and row["maximum"] == expected.maximum
     assert found["rank"]["deficiency"] == 0 and found["within"] == expected.within_target
+    scale = client.get("/api/scale").json()
+    told = predict(experiment, with_scale=True).lines()
+    assert scale["fingerprint"] == answer.json()["fingerprint"]
+    assert scale["lines"] and all(line in told for line in scale["lines"])
 
 
 def test_a_change_in_another_window_is_not_lost(client):
@@ -197,6 +174,149 @@ def test_saving_over_what_another_program_wrote_is_refused(client, design):
     assert design.read_bytes().endswith(b"# another hand\n")
     answer = client.post("/api/do", json={"do": "save", "name": "mine.yaml"}).json()
     assert answer["file"] == "mine.yaml" and answer["saved"]
+
+
+def test_a_request_is_limited_though_its_length_is_not_stated(client, monkeypatch, session):
+    monkeypatch.setattr("ballplate.studio.server.MOST_BYTES", 2000)
+    headers = {"Content-Type": "application/json"}
+    taken = []
+
+    def parts():
+        yield b'{"do": "text", "text": "'
+        for _ in range(1000):
+            taken.append(1)
+            yield b"x" * 100
+        yield b'"}'
+
+    before = session.state()["text"]
+    answer = client.post("/api/do", content=parts(), headers=headers)
+    assert answer.status_code == 413 and "leave some of it out" in answer.json()["error"]
+    long = client.post("/api/do", content=b'{"do": "' + b"x" * 3000 + b'"}', headers=headers)
+    assert long.status_code == 413
+    assert session.state()["text"] == before
+    assert client.post("/api/do", json={"do": "undo"}).status_code == 200
+
+
+@pytest.mark.parametrize("failure", [RuntimeError("broken"), MemoryError(), RecursionError()])
+def test_what_fails_while_it_is_judged_changes_nothing(client, session, monkeypatch, failure):
+    before = client.get("/api/state").json()
+
+    def fail(experiment):
+        raise failure
+
+    with monkeypatch.context() as patch:
+        patch.setattr("ballplate.studio.session.answer", fail)
+        for action in (
+            {"do": "turn", "position": "z low"},
+            {"do": "off", "position": "z low"},
+            {"do": "text", "text": before["text"] + "# more\n"},
+        ):
+            answer = client.post("/api/do", json=action).json()
+            assert "the design is as it was" in answer["error"]
+    assert client.get("/api/state").json() == before
+    assert "error" not in client.post("/api/do", json={"do": "turn", "position": "z low"}).json()
+
+
+@pytest.mark.parametrize(
+    "value", [".nan", ".inf", '"\\ud800"', "2026-11-22", "0x1F", "!!binary aGk="]
+)
+def test_whatever_a_text_says_the_state_is_an_answer(client, value):
+    text = client.get("/api/state").json()["text"]
+    for old, new in (
+        ("title: 5 x 5 ball plate in six positions", "title: "),
+        ("repeatability: 0.2 um", "repeatability: "),
+    ):
+        assert old in text
+        said = text.replace(old, new + value)
+        answer = client.post("/api/do", json={"do": "text", "text": said})
+        assert "error" not in answer.json() and answer.json()["text"] == said
+
+        def refuse(constant):
+            raise AssertionError(constant)
+
+        # A browser knows no NaN and no Infinity.
+        json.loads(client.get("/api/state").text, parse_constant=refuse)
+        client.post("/api/do", json={"do": "undo"})
+
+
+def test_positions_that_are_off_are_there_after_a_reload_and_once(client):
+    client.post("/api/do", json={"do": "off", "position": "y low"})
+    state = client.get("/api/state").json()
+    assert state["off"] == ["y low"] and "name: y low" not in state["text"]
+    state = client.post("/api/do", json={"do": "undo"}).json()
+    assert state["off"] == [] and "name: y low" in state["text"]
+    client.post("/api/do", json={"do": "redo"})
+    state = client.post("/api/do", json={"do": "on", "position": "y low"}).json()
+    assert state["off"] == [] and state["text"].count("name: y low") == 1
+    assert (
+        "was switched off"
+        in client.post("/api/do", json={"do": "on", "position": "y"}).json()["error"]
+    )
+
+
+def test_a_page_of_an_earlier_studio_changes_nothing(client, session, design):
+    state = client.get("/api/state").json()
+    other = Session(design)
+    assert other.revision == state["revision"] and other.name != state["session"]
+    turn = {"do": "turn", "position": "z low", "session": state["session"], "revision": 0}
+    with pytest.raises(RefusedError, match="started anew"):
+        other.act(turn)
+    with pytest.raises(RefusedError, match="started anew"):
+        other.preview(turn)
+    session.act(turn)
+
+
+def test_requests_in_parallel_lose_no_change(session):
+    """Each of many actions at once is either made, or refused since another came first."""
+    made = []
+
+    def act(k):
+        try:
+            session.act({"do": "set", "path": ["title"], "value": f"t{k}"})
+            made.append(f"t{k}")
+        except RefusedError:
+            pass
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(act, range(6)))
+    state = session.state()
+    assert sorted(made) == [f"t{k}" for k in range(6)]
+    assert state["revision"] == state["back"] == 6
+    titles = {state["data"]["title"]}
+    for _ in range(5):
+        session.act({"do": "undo"})
+        titles.add(session.state()["data"]["title"])
+    assert titles == set(made)
+
+
+def test_the_session_goes_on_when_file_or_folder_are_gone(client, design):
+    client.post("/api/do", json={"do": "turn", "position": "z low"})
+    text = client.get("/api/state").json()["text"]
+    design.unlink()
+    assert "no such file" in client.post("/api/do", json={"do": "reopen"}).json()["error"]
+    design.mkdir()
+    assert "cannot be written" in client.post("/api/do", json={"do": "save"}).json()["error"]
+    assert "folder" in client.post("/api/do", json={"do": "reopen"}).json()["error"]
+    folder = design.parent
+    folder.rename(folder.with_name("elsewhere"))
+    assert "error" in client.post("/api/do", json={"do": "save", "name": "mine.yaml"}).json()
+    answer = client.post("/api/do", json={"do": "turn", "position": "z low"}).json()
+    assert "error" not in answer and answer["files"] == []
+    folder.with_name("elsewhere").rename(folder)
+    answer = client.post("/api/do", json={"do": "undo"}).json()
+    assert answer["text"] == text
+
+
+def test_a_computation_whose_process_is_killed_has_failed_and_may_be_of_an_earlier_design(
+    client, session
+):
+    client.post("/api/start", json={"job": "monte carlo", "settings": {"trials": 500_000}})
+    state = client.post("/api/do", json={"do": "turn", "position": "z low"}).json()
+    session._jobs[1].process.kill()
+    (job,) = wait(client)
+    assert job["state"] == "failed" and "without a result" in job["result"]
+    assert job["fingerprint"] != state["fingerprint"]
+    assert job["fingerprint"] == client.post("/api/do", json={"do": "undo"}).json()["fingerprint"]
 
 
 def test_a_wrong_text_keeps_the_figures_with_what_is_wrong(client):

@@ -63,18 +63,32 @@ function element(name, attributes = {}, ...children) {
   return made;
 }
 
+// Only sections that are open have fields, and only those whose data have changed are made anew.
 export function build(container, data, schema, messages, onSet) {
-  const open = new Set([...container.querySelectorAll("details[open]")].map((one) => one.dataset.section));
-  container.replaceChildren();
   for (const section of SECTIONS) {
     const part = schema.properties?.[section];
     if (!part) continue;
-    const details = element("details", { "data-section": section });
-    details.open = open.has(section);
-    const description = resolve(part, schema).description ?? part.description ?? "";
-    details.append(element("summary", { title: description }, section.replaceAll("_", " ")));
-    fields(details, [section], data?.[section], part, schema, messages, onSet, section);
-    container.append(details);
+    let details = container.querySelector(`:scope > [data-section="${section}"]`);
+    if (!details) {
+      details = element("details", { "data-section": section });
+      const description = resolve(part, schema).description ?? part.description ?? "";
+      details.append(element("summary", { title: description }, section.replaceAll("_", " ")), element("div"));
+      details.addEventListener("toggle", () => details.fill());
+      container.append(details);
+    }
+    const wrong = messages.filter((one) => one.path === section || one.path.startsWith(`${section}.`) || one.path.startsWith(`${section}[`));
+    details.classList.toggle("wrong", wrong.length > 0);
+    const said = JSON.stringify([data?.[section], wrong]);
+    details.fill = () => {
+      if (!details.open || details.said === said) return;
+      details.said = said;
+      const open = new Set([...details.querySelectorAll("details[open]")].map((one) => one.dataset.of));
+      const box = element("div");
+      fields(box, [section], data?.[section], part, schema, messages, onSet, section);
+      box.querySelectorAll("details").forEach((one) => { one.open = open.has(one.dataset.of); });
+      details.lastElementChild.replaceWith(box);
+    };
+    details.fill();
   }
 }
 
@@ -141,6 +155,6 @@ function adding(into, path, data, possible, root, onSet, label) {
     if (key.value.trim() && value.value.trim()) onSet([...path, key.value.trim()], value.value, value);
   };
   value.addEventListener("change", set);
-  const more = element("details", {}, element("summary", {}, `add to ${label.replaceAll("_", " ")}`), key, names, value);
+  const more = element("details", { "data-of": path.join(".") }, element("summary", {}, `add to ${label.replaceAll("_", " ")}`), key, names, value);
   into.append(more);
 }

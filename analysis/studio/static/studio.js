@@ -7,11 +7,13 @@ let state = null;
 let schema = null;
 let selected = null;
 let motion = null;
-let parked = {}; // positions that are switched off, as the file states them
 let suggestions = [];
 let fits = null;
 let previewing = null;
 let polling = null;
+let typed = false; // the text beside the design has changes that are not applied
+let lost = null; // waits for a studio that does not answer
+let scaling = null; // asks for what carries scale, once nothing else is asked
 
 async function ask(path, body) {
   const options = body === undefined ? {} : {
@@ -21,7 +23,8 @@ async function ask(path, body) {
   try {
     response = await fetch(path, options);
   } catch {
-    throw new Error("the studio does not answer; start it again with the same command, and reload the page");
+    await_studio();
+    throw new Error("The studio does not answer. Start it again with the same command: changes that are not saved are kept, and are there again.");
   }
   const text = await response.text();
   let data;
@@ -34,30 +37,61 @@ async function ask(path, body) {
   return data;
 }
 
+function await_studio() {
+  clearTimeout(lost);
+  lost = setTimeout(async () => {
+    lost = null;
+    try {
+      state = await ask("/api/state");
+      show();
+      tell("the studio answers again");
+    } catch (error) {
+      tell(error.message, true);
+    }
+  }, 2000);
+}
+
+// What another window did, or a studio that was started anew, is shown instead of what was here.
+async function refresh() {
+  try {
+    const found = await ask("/api/state");
+    if (found.session !== state.session || found.revision !== state.revision) { state = found; show(); }
+  } catch (error) {
+    tell(error.message, true);
+  }
+}
+
 function tell(text, bad = false) {
   $("notice").textContent = text;
   $("notice").classList.toggle("bad", bad);
 }
 
 let queue = Promise.resolve();
+let acting = 0;
 function act(action, said = "") {
+  acting += 1;
   // One after the other: each goes on from the answer before.
-  queue = queue.then(async () => {
+  const next = queue.then(async () => {
+    const slow = setTimeout(() => tell("computing …"), 400);
     const started = performance.now();
     try {
-      state = await ask("/api/do", { ...action, revision: state.revision });
-      if (said) tell(said);
-      else tell("");
+      state = await ask("/api/do", { ...action, revision: state.revision, session: state.session });
+      const answered = performance.now();
+      clearTimeout(slow);
+      tell(said);
       show();
-      window.studio.latency.push(performance.now() - started);
+      window.studio.latency.push({ answered: answered - started, shown: performance.now() - started });
       return true;
     } catch (error) {
+      clearTimeout(slow);
       tell(error.message, true);
-      show();
+      if (/another window|started anew/.test(error.message)) await refresh();
+      else show();
       return false;
     }
   });
-  return queue;
+  queue = next.catch(() => {}).finally(() => { acting -= 1; });
+  return next;
 }
 
 const view = new View($("view"), {
@@ -68,18 +102,21 @@ const view = new View($("view"), {
 
 let waiting = null;
 async function preview(action) {
-  waiting = action;
+  // Of the design as it is now: what comes after the drop is of another one.
+  waiting = { ...action, revision: state.revision, session: state.session };
   if (previewing) return;
   previewing = true;
   while (waiting) {
     const next = waiting;
+    const isMeant = () => !acting && state.revision === next.revision;
     waiting = null;
     try {
-      const design = await ask("/api/preview", next);
+      const design = isMeant() ? await ask("/api/preview", next) : null;
+      if (!design || !isMeant()) continue;
       tell("");
       figures(design, []);
     } catch (error) {
-      tell(error.message, true);
+      if (isMeant()) tell(error.message, true);
     }
   }
   previewing = false;
@@ -87,8 +124,10 @@ async function preview(action) {
 
 function choose(name) {
   selected = name;
+  const focused = focus();
   view.show(state.design, selected, { withMap: $("show-map").checked });
   places();
+  refocus(focused);
 }
 
 const micro = (value) => (value === null || value === undefined || Number.isNaN(value) ? "undetermined" : `${Number((1e6 * value).toPrecision(3))}`);
@@ -107,7 +146,8 @@ function make(name, attributes = {}, ...children) {
 
 function show() {
   const { design } = state;
-  $("title").textContent = `${state.file}${state.saved ? "" : " •"}${design ? ` — ${design.title}` : ""}`;
+  const focused = focus();
+  $("title").textContent = `${state.file}${state.saved ? "" : " (not saved)"}${design ? ` — ${design.title}` : ""}`;
   document.title = `${state.saved ? "" : "• "}${state.file} – ballplate studio`;
   options($("files"), state.files.includes(state.file) ? state.files : [state.file, ...state.files], state.file);
   $("variant-label").hidden = !state.variants.length;
@@ -116,7 +156,8 @@ function show() {
   $("redo").disabled = !state.forward;
   $("save").disabled = state.saved;
   $("keep").textContent = state.kept ? "Stop comparing" : "Keep to compare";
-  if (document.activeElement !== $("text")) $("text").value = state.text;
+  if (!typed && $("text").value !== state.text) $("text").value = state.text;
+  $("apply").disabled = !typed;
   if (design) {
     if (!design.scene.positions.some((place) => place.name === selected)) selected = null;
     if (motion !== null && motion >= design.motions.directions.length) motion = null;
@@ -124,15 +165,32 @@ function show() {
     if (motion !== null && !design.motions.directions.length) motion = null;
     view.motion = motion;
     view.show(design, selected, { withMap: $("show-map").checked });
-    figures(design, state.messages);
+    $("hint").textContent = `Drag a plate along its plane${design.scene.dimension === 3 ? ", with Shift along its normal" : ""}. Drag elsewhere to turn the view.`;
     legend();
-  }
+  } else view.empty();
+  figures(design, state.messages);
   places();
-  if (schema) build($("forms"), state.data, schema, state.messages, (path, value) => act({ do: "set", path, value }));
-  const ghosts = suggestions.filter((one) => one.shown).flatMap((one) => one.places);
-  view.ghost(ghosts);
-  view.residuals(null);
+  if (schema) build($("forms"), state.data, schema, state.messages, (path, value, input) => act({ do: "set", path, value }).then((done) => { if (!done) input.classList.add("bad-field"); }));
+  view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
+  if (fits?.fingerprint !== state.fingerprint) fits = null;
+  view.residuals(fits, fits?.scale);
   suggested();
+  refocus(focused);
+}
+
+// Parts of the page are made anew; whoever works with the keyboard stays where he was.
+function focus() {
+  const one = document.activeElement;
+  if (!one || one === document.body) return null;
+  if (one.id) return `#${CSS.escape(one.id)}`;
+  const owner = one.closest("[id]");
+  const name = ["data-path", "data-key", "data-motion", "data-focus", "aria-label"].find((key) => one.hasAttribute(key));
+  return owner && name ? `#${CSS.escape(owner.id)} [${name}="${CSS.escape(one.getAttribute(name))}"]` : null;
+}
+
+function refocus(selector) {
+  const one = selector && document.querySelector(selector);
+  if (one && one !== document.activeElement) one.focus({ preventScroll: true });
 }
 
 function options(select, names, chosen) {
@@ -142,45 +200,104 @@ function options(select, names, chosen) {
 function legend() {
   const range = view.mapRange();
   $("legend").replaceChildren();
-  if (!range || !range[1] || !$("show-map").checked) return;
+  if (!$("show-map").checked) return;
+  const words = "Map: standard uncertainty of a corrected co-ordinate, ";
+  if (!range || !range.high) {
+    $("legend").append("Map: everything is undetermined, so that there is nothing to colour.");
+    return;
+  }
   $("legend").append(
-    `standard uncertainty of a corrected co-ordinate: ${micro(range[0])} µm `,
-    make("span", { class: "ramp" }), ` ${micro(range[1])} µm; grey: undetermined`,
+    words, make("span", { class: "nowrap" }, `${micro(range.low)} µm `, make("span", { class: "ramp" }), ` ${micro(range.high)} µm`),
+    range.open ? "; grey: undetermined" : "",
   );
 }
 
 function figures(design, messages) {
-  const { rank } = design;
-  const expected = rank.deficiency === (rank.expected ?? 0);
-  const within = design.within;
   const box = $("verdict");
-  box.classList.toggle("bad", messages.length > 0 || rank.deficiency > 0);
-  box.classList.toggle("warn", !messages.length && !rank.deficiency && within !== null && within < 1);
-  box.replaceChildren(...[
-    make("p", {}, make("strong", {}, messages.length ? "The text is wrong; these are the figures before it." : rank.words), messages.length || expected ? "" : ` (the file expects ${rank.expected ?? 0})`),
-    make("p", {}, `${rank.parameters} parameters, ${rank.observations} observations`),
-    design.headline.length ? make("p", {}, design.headline.join(", ")) : null,
-    ...design.target.map((text) => make("p", {}, text)),
-    ...rank.reasons.map((text) => make("p", {}, text)),
-  ].filter((one) => one !== null));
-  $("messages").replaceChildren(...messages.map((one) => make("li", {}, `line ${one.line}${one.path ? `, ${one.path}` : ""}: ${one.text}`)), ...design.doubts.map((text) => make("li", {}, text)));
-  quantities(design);
-  $("scale").textContent = design.scale.join(" ");
-  const list = make("ol");
-  design.motions.directions.forEach((one, index) => {
-    const moving = index === motion;
-    list.append(make("li", {},
-      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages); } }, moving ? "stop" : "move"),
-      make("strong", {}, ` ${one.weak ? "weak" : "undetermined"} `), one.words,
-    ));
-  });
+  const rank = design?.rank;
+  const wrong = messages.length > 0;
+  box.classList.toggle("bad", wrong || rank.deficiency > 0);
+  box.classList.toggle("warn", !wrong && !rank.deficiency && design.within !== null && design.within < 1);
+  const lines = [];
+  if (wrong) lines.push(make("strong", {}, design ? "The text is wrong; these are the figures before it." : "The text is wrong; there are no figures yet."));
+  else lines.push(make("strong", {}, rank.words), rank.deficiency === (rank.expected ?? 0) ? "" : ` (the file expects ${rank.expected ?? 0})`);
+  const figured = design ? [
+    `${rank.parameters} parameters, ${rank.observations} observations`,
+    // The target's words have U6 in them.
+    ...(design.target.length ? design.target : design.headline),
+    ...rank.reasons,
+  ] : [];
+  box.replaceChildren(make("p", {}, ...lines), ...figured.map((text) => make("p", {}, text)));
+  $("messages").replaceChildren(
+    ...messages.map((one) => make("li", {},
+      make("button", { class: "link", "data-focus": `line ${one.line} ${one.path}`, title: "show the line", onclick: () => show_line(one.line) }, `line ${one.line}`),
+      `${one.path ? `, ${one.path}` : ""}: ${one.text}`)),
+    ...(design?.doubts ?? []).map((text) => make("li", {}, text)),
+  );
+  if (design) quantities(design);
+  else $("quantities").replaceChildren();
+  if (design && !wrong) ask_scale();
+  else $("scale").replaceChildren();
+  directions(design, messages);
+}
+
+function show_line(line) {
+  unfold_text(true);
+  const text = $("text");
+  const before = text.value.split("\n").slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+  const end = text.value.indexOf("\n", before);
+  text.focus();
+  text.setSelectionRange(before, end < 0 ? text.value.length : end);
+  text.scrollTop = (line - 4) * (text.scrollHeight / Math.max(1, text.value.split("\n").length));
+}
+
+function unfold_text(open) {
+  $("text-box").hidden = !open;
+  $("toggle-text").setAttribute("aria-expanded", String(open));
+}
+
+const MOST_DIRECTIONS = 4; // that are told before a person asks for the others
+function directions(design, messages) {
+  const unfolded = $("motions").querySelector("details")?.open;
   $("motions").replaceChildren();
-  if (design.motions.directions.length) $("motions").append(make("h2", {}, "What the readings do not tell"), list);
+  const found = design?.motions.directions ?? [];
+  if (!found.length) return;
+  const items = found.map((one, index) => {
+    const moving = index === motion;
+    return make("li", {},
+      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages); refocus(`#motions [data-motion="${index}"]`); } }, moving ? "stop" : "move"),
+      make("strong", {}, ` ${one.weak ? "weak" : "undetermined"} `), one.words,
+    );
+  });
+  const rest = items.slice(MOST_DIRECTIONS);
+  $("motions").append(make("h2", {}, "What the readings do not tell"), make("ol", {}, ...items.slice(0, MOST_DIRECTIONS)));
+  if (rest.length) {
+    const more = make("details", {}, make("summary", {}, `${rest.length} more`), make("ol", {}, ...rest));
+    more.open = Boolean(unfolded) || motion >= MOST_DIRECTIONS;
+    $("motions").append(more);
+  }
+}
+
+// What carries scale takes longer than all the rest: it is asked for once nothing moves any more.
+function ask_scale() {
+  clearTimeout(scaling);
+  $("scale").classList.add("stale");
+  scaling = setTimeout(async () => {
+    try {
+      const found = await ask("/api/scale");
+      if (found.fingerprint !== state.fingerprint) return;
+      $("scale").replaceChildren(...found.lines.map((line) => make("p", {}, line)));
+      $("scale").classList.remove("stale");
+    } catch {
+      $("scale").textContent = "";
+    }
+  }, 400);
 }
 
 function quantities(design) {
   const kept = new Map((state.kept?.quantities ?? []).map((one) => [one.symbol, one]));
-  const unit = (row) => (row.unit === "m" ? "µm" : row.unit === "rad" ? "µrad" : row.unit === "1" ? "ppm" : row.unit.replace("m", "µm").replace("rad", "µrad"));
+  const told = { m: "µm", rad: "µrad", 1: "ppm" };
+  const unit = (row) => row.unit.split(", ").map((one) => told[one] ?? one).join(", ");
   const cell = (row, key) => {
     const was = kept.get(row.symbol)?.[key];
     return make("td", {}, micro(row[key]), was !== undefined && state.kept ? make("span", { class: "was" }, `was ${micro(was)}`) : null);
@@ -188,8 +305,9 @@ function quantities(design) {
   $("quantities").replaceChildren(
     make("thead", {}, make("tr", {}, make("th", {}, "standard uncertainty of"), make("th", {}, "average"), make("th", {}, "max."), make("th", {}, ""))),
     make("tbody", {}, ...design.quantities.map((row) => make("tr", {},
-      make("td", { title: row.largest ? `largest at ${row.largest}` : undefined }, make("strong", {}, row.symbol), ` ${row.description}`, row.undetermined ? ` (${row.undetermined} of ${row.count} undetermined)` : ""),
-      cell(row, "average"), cell(row, "maximum"), make("td", {}, unit(row)),
+      make("td", { title: row.largest ? `largest at ${row.largest}` : undefined }, make("strong", {}, row.symbol), ` ${row.description}`, row.undetermined && row.undetermined < row.count ? ` (${row.undetermined} of ${row.count} undetermined)` : ""),
+      ...(row.average === null && !state.kept ? [make("td", { colspan: "2" }, "undetermined")] : [cell(row, "average"), cell(row, "maximum")]),
+      make("td", {}, unit(row)),
     ))),
   );
 }
@@ -200,28 +318,18 @@ function places() {
     const swatch = make("span", { class: "swatch" });
     swatch.style.background = colourOf(index);
     return make("li", { class: place.name === selected ? "chosen" : "" },
-      make("input", { type: "checkbox", checked: true, title: "read this position", "aria-label": `read ${place.name}`, onchange: () => switchOff(place.name) }),
+      make("input", { type: "checkbox", checked: true, title: "switch this position off", "aria-label": `read ${place.name}`, onchange: () => act({ do: "off", position: place.name }) }),
       swatch,
-      make("button", { class: "name", onclick: () => choose(place.name) }, place.name),
-      make("small", {}, `${place.readings}`),
+      make("button", { class: "name", "aria-label": `choose ${place.name}`, onclick: () => choose(place.name) }, place.name),
+      make("small", { title: "readings" }, `${place.readings}`),
     );
-  }), ...Object.entries(parked).map(([name, settings]) => make("li", { class: "off" },
-    make("input", { type: "checkbox", title: "read this position", "aria-label": `read ${name}`, onchange: () => { delete parked[name]; act({ do: "add", settings }); } }),
+  }), ...state.off.map((name) => make("li", { class: "off" },
+    make("input", { type: "checkbox", title: "switch this position on", "aria-label": `read ${name}`, onchange: () => act({ do: "on", position: name }) }),
     make("span", { class: "swatch" }), make("span", {}, `${name} (off)`),
   )));
   const place = list.find((one) => one.name === selected);
   $("position").hidden = !place;
   if (place) details(place);
-}
-
-async function switchOff(name) {
-  try {
-    const settings = await ask("/api/settings", { position: name });
-    if (await act({ do: "remove", position: name })) parked[name] = settings;
-  } catch (error) {
-    tell(error.message, true);
-  }
-  places();
 }
 
 function details(place) {
@@ -252,15 +360,21 @@ function details(place) {
   );
 }
 
+function current() {
+  return suggestions.filter((one) => one.fingerprint === state.fingerprint);
+}
+
 function suggested() {
-  $("suggestions").replaceChildren(...suggestions.map((one) => make("li", {},
+  const shown = current();
+  $("suggestions").replaceChildren(...shown.map((one, k) => make("li", {},
     make("div", {}, one.words),
     make("div", {}, one.average === null || one.average === undefined ? (one.deficiency ? `rank deficiency ${one.deficiency} left` : "") : `U6 ${micro(one.average)} µm on average, ${micro(one.maximum)} µm at most`,
-      one.weak ? `; ${one.weak} directions stay weak` : "", one.faint ? "; barely determined" : ""),
+      one.weak ? `; ${one.weak} ${one.weak > 1 ? "directions stay" : "direction stays"} weak` : "", one.faint ? "; barely determined" : ""),
     make("div", { class: "bar" },
-      make("button", { "aria-pressed": String(!!one.shown), onclick: () => { one.shown = !one.shown; show(); } }, one.shown ? "hide" : "show"),
-      make("button", { "data-apply": "", disabled: one.revision !== state.revision, title: one.revision !== state.revision ? "the design has changed since; ask again" : undefined, onclick: () => apply(one) }, "apply"),
+      make("button", { "aria-pressed": String(!!one.shown), "data-focus": `show ${k}`, onclick: () => { one.shown = !one.shown; show(); } }, one.shown ? "hide" : "show"),
+      make("button", { "data-apply": "", "data-focus": `apply ${k}`, onclick: () => apply(one) }, "apply"),
     ))));
+  if (suggestions.length && !shown.length) $("suggestions").append(make("p", {}, "The design has changed since these were asked for; ask again."));
 }
 
 function apply(one) {
@@ -272,13 +386,14 @@ function apply(one) {
 async function start(job, settings = {}) {
   try {
     await ask("/api/start", { job, settings });
-    tell(`${job}: started`);
+    tell("computing beside the studio …");
   } catch (error) {
     tell(error.message, true);
   }
   poll();
 }
 
+const MOST_ROWS = 60; // of a sweep's cells in its table here
 const taken = new Set();
 async function poll() {
   clearTimeout(polling);
@@ -293,14 +408,15 @@ async function poll() {
     if (job.state !== "done" || taken.has(job.id)) continue;
     taken.add(job.id);
     if (job.job === "suggest" || job.job === "next") {
-      suggestions = job.result.map((one, k) => ({ ...one, places: one.places ?? [one.place], revision: job.revision, shown: k === 0 }));
+      suggestions = job.result.map((one, k) => ({ ...one, places: one.places ?? [one.place], fingerprint: job.fingerprint, shown: k === 0 }));
+      tell("");
       if (!suggestions.length) tell(job.job === "suggest" ? "nothing is undetermined or weak, or nothing was found that helps" : "no further position fits");
       show();
     }
     if (job.job === "fit" && job.result.residuals) {
       const sizes = job.result.residuals.value.map((one) => Math.hypot(...one));
-      fits = { ...job.result.residuals, scale: (0.06 * view.size) / Math.max(...sizes, 1e-12) };
-      view.residuals(fits, fits.scale);
+      fits = { ...job.result.residuals, fingerprint: job.fingerprint, scale: (0.06 * view.size) / Math.max(...sizes, 1e-12) };
+      show();
       tell(`residuals are drawn ${Number(fits.scale.toPrecision(2)).toLocaleString("en")} times their size`);
     }
   }
@@ -309,31 +425,59 @@ async function poll() {
 }
 
 function computations(list) {
-  $("jobs").replaceChildren(...list.map((job) => make("li", { "data-state": job.state },
+  // What was suggested is shown with the suggestions.
+  const told = list.filter((job) => job.state !== "done" || !["suggest", "next"].includes(job.job));
+  $("jobs").replaceChildren(...told.map((job) => make("li", { "data-state": job.state },
     make("strong", {}, job.job), ` ${job.state}${job.state === "running" && job.step ? `: ${job.step}` : ""} `,
-    make("button", { onclick: async () => { await ask("/api/stop", { id: job.id }); poll(); } }, job.state === "running" ? "stop" : "close"),
+    make("button", { "data-focus": `job ${job.id}`, onclick: async () => { await ask("/api/stop", { id: job.id }); poll(); } }, job.state === "running" ? "stop" : "close"),
+    " ", job.page ? make("a", { href: `/pages/${job.id}`, target: "_blank", rel: "noopener", "data-page": "" }, "open its page") : null,
+    job.fingerprint === state.fingerprint ? null : make("small", {}, " of an earlier design"),
     job.state === "failed" ? make("pre", {}, String(job.result)) : null,
-    job.state === "done" && job.result?.lines ? make("pre", {}, [...(job.result.notes ?? []), ...job.result.lines].join("\n")) : null,
-    job.state === "done" && job.job === "sweep" ? table(job.result) : null,
+    job.state === "done" && job.result?.lines ? make("pre", { tabindex: "0" }, [...(job.result.notes ?? []), ...job.result.lines].join("\n")) : null,
+    job.state === "done" && job.job === "sweep" ? table(job.result, job.page) : null,
   )));
 }
 
-function table(rows) {
-  return make("table", {}, make("thead", {}, make("tr", {}, ...["value", "deficiency", "U6 average µm", "U6 max. µm", "within target"].map((one) => make("th", {}, one)))),
-    make("tbody", {}, ...rows.map((row) => make("tr", {}, make("td", {}, row.value), ...(row.error ? [make("td", { colspan: "4" }, row.error)] : [make("td", {}, String(row.deficiency)), make("td", {}, micro(row.average)), make("td", {}, micro(row.maximum)), make("td", {}, share(row.within))])))));
+// The last keys of paths, which tell enough where there is little room.
+function short(axis) {
+  return axis.split(", ").map((path) => path.split(".").at(-1)).join(", ");
 }
 
-function dialog(question, fields) {
+function table(found, hasPage) {
+  const some = found.cells.slice(0, MOST_ROWS);
+  const heads = [...found.axes.map((paths) => paths.join(", ")), "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"];
+  return make("div", { class: "scrolled", tabindex: "0" },
+    make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((one) => make("th", { title: one }, short(one))))),
+      make("tbody", {}, ...some.map((cell) => make("tr", {}, ...cell.values.map((one) => make("td", {}, one)),
+        ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : [make("td", {}, String(cell.deficiency)), make("td", {}, micro(cell.average)), make("td", {}, micro(cell.maximum)), make("td", {}, share(cell.within) || "no target")]))))),
+    found.cells.length > MOST_ROWS ? make("p", {}, `${found.cells.length - MOST_ROWS} cells more are on the page`) : null,
+    hasPage ? null : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'"),
+  );
+}
+
+// A dialogue with some fields, true if it was confirmed.
+function opened(question, fields) {
   $("question").textContent = question;
-  $("fields").replaceChildren(...fields.map(([name, value]) => make("label", {}, name, make("input", { name, value }))));
+  $("fields").replaceChildren(...fields);
   $("dialog").returnValue = "";
   $("dialog").showModal();
   return new Promise((resolve) => {
-    $("dialog").addEventListener("close", () => {
-      const ok = $("dialog").returnValue === "ok";
-      resolve(ok ? [...$("fields").querySelectorAll("input")].map((one) => one.value) : null);
-    }, { once: true });
+    $("dialog").addEventListener("close", () => resolve($("dialog").returnValue === "ok"), { once: true });
   });
+}
+
+async function dialog(question, fields) {
+  const inputs = fields.map(([name, value]) => [name, make("input", { name, value })]);
+  const confirmed = await opened(question, inputs.map(([name, input]) => make("label", {}, name, input)));
+  return confirmed ? inputs.map(([, input]) => input.value) : null;
+}
+
+// Paths of all values of a design, entries of lists by their names where they have any.
+function keys(data, path) {
+  if (Array.isArray(data)) return data.flatMap((one, k) => keys(one, `${path}[${one?.name ?? k}]`));
+  if (data === null || typeof data !== "object") return [path];
+  const below = Object.entries(data).flatMap(([key, one]) => keys(one, path ? `${path}.${key}` : key));
+  return path ? [path, ...below] : below;
 }
 
 async function fit(file) {
@@ -355,24 +499,34 @@ $("files").onchange = async (event) => {
   const name = event.target.value;
   const discard = !state.saved;
   if (discard && !(await dialog(`${state.file} has changes that are not saved. Leave them?`, []))) { show(); return; }
-  parked = {};
   suggestions = [];
   await act({ do: "open", name, discard });
   view.home();
 };
 $("variants").onchange = (event) => act({ do: "variant", name: event.target.value });
-$("apply").onclick = () => act({ do: "text", text: $("text").value });
-$("reopen").onclick = () => act({ do: "reopen" }, "read again; undo leads back to the text that was here");
-$("toggle-text").onclick = () => {
-  $("text-box").hidden = !$("text-box").hidden;
-  $("toggle-text").setAttribute("aria-expanded", String(!$("text-box").hidden));
+$("text").addEventListener("input", () => { typed = $("text").value !== state.text; $("apply").disabled = !typed; });
+$("apply").onclick = async () => {
+  const text = $("text").value;
+  typed = false;
+  if (!(await act({ do: "text", text }))) { $("text").value = text; typed = true; $("apply").disabled = false; }
 };
+$("reopen").onclick = () => { typed = false; act({ do: "reopen" }, "read again; undo leads back to the text that was here"); };
+$("toggle-text").onclick = () => unfold_text($("text-box").hidden);
 $("step").onchange = (event) => { view.step = Number(event.target.value); };
 $("show-map").onchange = show;
 $("home").onclick = () => { view.home(); };
 $("sweep").onclick = async () => {
-  const answer = await dialog("U6 for several values of one key", [["path", "machine.repeatability"], ["values, separated by ;", "0.1 um; 0.2 um; 0.4 um"]]);
-  if (answer) start("sweep", { path: answer[0], values: answer[1].split(";").map((one) => one.trim()).filter(Boolean) });
+  const paths = keys(state.data, "");
+  const list = make("datalist", { id: "paths" }, ...paths.map((path) => new Option(path, path)));
+  const row = (path, values) => make("fieldset", {},
+    make("label", {}, "keys, separated by commas", make("input", { list: "paths", value: path, "data-axis": "paths", autocomplete: "off" })),
+    make("label", {}, "values, separated by semicolons", make("input", { value: values, "data-axis": "values", autocomplete: "off" })));
+  const rows = make("div", {}, row("machine.repeatability", "0.1 um; 0.2 um; 0.4 um"));
+  const more = make("button", { type: "button", id: "more-axes", onclick: () => { rows.append(row("", "")); rows.lastElementChild.querySelector("input").focus(); } }, "Another axis");
+  if (!(await opened("Compute every combination of some values", [rows, list, more]))) return;
+  const part = (one, key, mark) => one.querySelector(`[data-axis=${key}]`).value.split(mark).map((text) => text.trim()).filter(Boolean);
+  const axes = [...rows.children].map((one) => ({ paths: part(one, "paths", ","), values: part(one, "values", ";") })).filter((one) => one.paths.length);
+  start("sweep", { axes });
 };
 document.querySelectorAll("[data-job]").forEach((button) => { button.onclick = () => start(button.dataset.job); });
 $("readings").onchange = (event) => { if (event.target.files[0]) fit(event.target.files[0]); event.target.value = ""; };
@@ -405,13 +559,15 @@ $("view").addEventListener("keydown", (event) => {
   } else return;
   event.preventDefault();
 });
-window.addEventListener("beforeunload", (event) => { if (state && !state.saved) event.preventDefault(); });
+window.addEventListener("beforeunload", (event) => { if (typed) event.preventDefault(); });
+window.addEventListener("focus", () => { if (state) refresh(); });
 
 window.studio = { view, latency: [], state: () => state, act, flow };
 try {
   [state, schema] = await Promise.all([ask("/api/state"), ask("/api/schema")]);
   motion = state.design?.rank.deficiency ? 0 : null;
   show();
+  if (state.note) tell(state.note);
   poll();
 } catch (error) {
   tell(error.message, true);

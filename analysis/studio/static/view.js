@@ -59,6 +59,8 @@ export class View {
     this.high = this.vector(upper);
     this.size = this.high.distanceTo(this.low);
     this.box();
+    // Many sheets above one another stay transparent.
+    this.thin = Math.min(1, 8 / Math.max(1, design.scene.positions.length));
     if (withMap) this.map();
     design.scene.positions.forEach((place, index) => this.plate(place, index));
     if (first || other) this.home();
@@ -116,11 +118,14 @@ export class View {
     const geometry = new THREE.BufferGeometry().setFromPoints(corners);
     this.root.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })));
     "xyz".slice(0, this.design.scene.dimension).split("").forEach((name, axis) => {
-      // Along edges that are in front and on the left as the volume is seen first.
-      const end = axis === 2 ? new THREE.Vector3(this.low.x, this.high.y, this.high.z) : this.low.clone();
-      end.setComponent(axis, this.high.getComponent(axis) + (axis === 2 ? 0.04 : 0.05) * this.size);
+      // Beside the middle of edges that are outermost as the volume is seen first.
+      const at = this.low.clone().add(this.high).multiplyScalar(0.5);
+      const away = 0.1 * this.size;
+      if (axis === 0) at.set(at.x, this.low.y - away, this.low.z);
+      if (axis === 1) at.set(this.low.x - away, at.y, this.low.z);
+      if (axis === 2) at.set(this.high.x + 0.7 * away, this.low.y - 0.7 * away, at.z);
       const metres = this.high.getComponent(axis) - this.low.getComponent(axis);
-      this.root.add(this.label(`${name}  ${Math.round(1000 * metres)} mm`, end, 0.038 * this.size));
+      this.root.add(this.label(`${name}  ${Math.round(1e4 * metres) / 10} mm`, at, 0.038 * this.size));
     });
   }
 
@@ -129,6 +134,7 @@ export class View {
     if (!this.labels.has(key)) this.labels.set(key, this.written(text));
     const texture = this.labels.get(key);
     const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: texture, depthTest: false }));
+    sprite.renderOrder = 10;
     sprite.scale.set((height * texture.image.width) / texture.image.height, height, 1);
     sprite.position.copy(place);
     return sprite;
@@ -179,8 +185,18 @@ export class View {
   }
 
   mapRange() {
-    const values = this.design.map.slices.flatMap((slice) => slice.values.flat()).filter((v) => v !== null);
-    return values.length ? [Math.min(...values), Math.max(...values)] : null;
+    const every = this.design.map.slices.flatMap((slice) => slice.values.flat());
+    const values = every.filter((v) => v !== null);
+    return values.length ? { low: Math.min(...values), high: Math.max(...values), open: values.length < every.length } : null;
+  }
+
+  // Nothing to show: the text has been wrong since it was opened.
+  empty() {
+    this.design = null;
+    this.move(null);
+    this.clear(this.root);
+    this.plates = [];
+    this.draw();
   }
 
   plate(place, index, ghost = false) {
@@ -244,7 +260,7 @@ export class View {
     const geometry = new THREE.BufferGeometry().setFromPoints(corners);
     geometry.setIndex([0, 1, 2, 0, 2, 3]);
     const mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
-      color: colour, transparent: true, opacity: ghost ? 0.08 : chosen ? 0.3 : 0.13, side: THREE.DoubleSide, depthWrite: false,
+      color: colour, transparent: true, opacity: ghost ? 0.08 : chosen ? 0.3 : 0.13 * this.thin, side: THREE.DoubleSide, depthWrite: false,
     }));
     const line = new THREE.LineLoop(new THREE.BufferGeometry().setFromPoints(corners), new THREE.LineBasicMaterial({ color: colour, transparent: ghost, opacity: ghost ? 0.7 : 1 }));
     return [mesh, line];
@@ -301,6 +317,7 @@ export class View {
   }
 
   swing() {
+    if (!this.design) return;
     const data = this.design.motions;
     const direction = this.motion === null ? null : data.directions[this.motion];
     if (direction && this.lines) this.lines.geometry.setFromPoints(this.lattice(direction.nodes, data.nodes));
@@ -325,10 +342,11 @@ export class View {
   }
 
   home() {
+    if (!this.design) return;
     const middle = this.low.clone().add(this.high).multiplyScalar(0.5);
     const flat = this.design.scene.dimension === 2;
     const from = flat ? new THREE.Vector3(0, -0.001, 1) : new THREE.Vector3(-0.75, -1.15, 0.72);
-    const narrow = Math.max(1, 0.95 / Math.max(this.camera.aspect, 0.2));
+    const narrow = Math.max(1, 1.15 / Math.max(this.camera.aspect, 0.2));
     this.camera.position.copy(middle).addScaledVector(from.normalize(), 1.62 * this.size * narrow);
     this.controls.target.copy(middle);
     this.controls.update();

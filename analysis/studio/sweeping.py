@@ -1,0 +1,170 @@
+"""A sweep from the studio: some keys of the design as it is on the page, every value of each with
+every value of the others.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from ballplate.simulator.computing.steps import Report
+from ballplate.simulator.experiment.changes import changed_tree, node_of
+from ballplate.simulator.experiment.modules import refused_modules
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltext import flow
+from ballplate.simulator.inputs.yamltree import Mark, Node
+
+from ..presentation.formatting import finite
+from ..sweeps.bundle import Bundle, bundle_of, names_of, unpack
+from ..sweeps.load import load_sweep
+from ..sweeps.local import local_runner
+from ..sweeps.named_files import named_in
+from ..sweeps.running import SweepResult, compute_sweep, enter, result_of, writable_store
+from ..sweeps.store import Store
+from .actions import ActionError, value_of
+from .document import DesignDocument, encoded, experiment_of
+
+# More are for a sweep file, whose store can be continued.
+MOST_CELLS = 2000
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Paths that take the same values, as a person has typed them."""
+
+    paths: tuple[str, ...]
+    values: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return " ".join(self.paths)
+
+
+def swept(
+    document: DesignDocument, said: Iterable[Mapping[str, Any]], report: Report
+) -> dict[str, Any]:
+    """Compute a sweep over axes, each with `paths` and `values`: what is told of each cell, and
+    the `page`, empty where what it needs is not installed.
+
+    :raises ActionError: an axis is incomplete, or there are too many cells.
+    :raises ExperimentError: the text is wrong, a path leads nowhere, or a value would run a model
+        in Python in a design that the user has not opened by name.
+    """
+    axes = [_axis(one) for one in said]
+    cells = math.prod(len(one.values) for one in axes)
+    if not axes or cells > MOST_CELLS:
+        some = f"{cells} combinations; at most {MOST_CELLS} are possible here"
+        raise ActionError(some if axes else "a sweep needs a key")
+    tree = experiment_of(document).tree
+    if not document.with_modules:
+        _ensure_no_modules(document, tree, axes)
+    with tempfile.TemporaryDirectory() as folder:
+        file = _written(document, tree, axes, Path(folder))
+        with writable_store(file.with_suffix(".sqlite")) as store:
+            found = _computed(file, store, report)
+            page = _page(store, document.with_modules)
+    return {
+        "headline": found.headline(),
+        "axes": [list(axis.paths) for axis in axes],
+        "cells": [
+            _cell(row, values)
+            for row, values in zip(
+                found.rows(), product(*(one.values for one in axes)), strict=True
+            )
+        ],
+        "page": page,
+    }
+
+
+def _computed(file: Path, store: Store, report: Report) -> SweepResult:
+    sweep = load_sweep(file)
+    bundle = bundle_of(sweep)
+    entered = enter(store, sweep, bundle, beside=False)
+    runner = nullcontext(local_runner(sweep, bundle, workers=1))
+    summary = compute_sweep(store, sweep, entered, runner, report=report)
+    return result_of(store, sweep, entered, summary)
+
+
+def _page(store: Store, with_modules: bool) -> str:
+    from ..report.results import read_results
+
+    try:
+        from ..report.page import page
+
+        return page(store, read_results(store, None), with_modules)
+    except ImportError:
+        return ""
+
+
+def _cell(row: Mapping[str, Any], values: Sequence[str]) -> dict[str, Any]:
+    figures = {
+        "deficiency": row.get("rank_deficiency"),
+        "average": row.get("U6_average_m"),
+        "maximum": row.get("U6_maximum_m"),
+        "within": row.get("U6_within_target"),
+    }
+    return {"values": list(values), "reason": row["reason"]} | {
+        key: finite(value) if isinstance(value, float) else None for key, value in figures.items()
+    }
+
+
+def _axis(said: Mapping[str, Any]) -> _Axis:
+    paths, values = (tuple(str(one).strip() for one in said[key]) for key in ("paths", "values"))
+    if not all(paths) or not paths or not values:
+        raise ActionError("an axis needs a key and its values")
+    return _Axis(paths, values)
+
+
+def _ensure_no_modules(document: DesignDocument, tree: Node, axes: Sequence[_Axis]) -> None:
+    """Make sure that no cell has a model in Python.
+
+    :raises ExperimentError: one has.
+    """
+    for values in product(*(one.values for one in axes)):
+        changes = {
+            path: value_of(value)
+            for axis, value in zip(axes, values, strict=True)
+            for path in axis.paths
+        }
+        changed = changed_tree(tree, str(document.path), changes)
+        if refused := refused_modules(changed, document.path.parent):
+            raise ExperimentError(refused)
+
+
+def _written(document: DesignDocument, tree: Node, axes: Sequence[_Axis], folder: Path) -> Path:
+    """The sweep's file in a folder, with the design as it is on the page and copies of the files
+    that it names.
+    """
+    mark = Mark("sweep", 0, 0)
+    nodes = [("", tree)] + [
+        (path, node_of(value_of(value), mark))
+        for axis in axes
+        for path in axis.paths
+        for value in axis.values
+    ]
+    source = Path(os.path.abspath(document.path))
+    try:
+        names = names_of(sorted({source, *named_in(nodes, source.parent)}))
+        contents = ((name, path) for path, name in names.items() if path != source)
+        files = tuple((name, Path(path).read_bytes()) for name, path in contents)
+    except (OSError, ValueError) as error:
+        raise ActionError(f"the files that the design names cannot be copied: {error}") from None
+    name = names[source]
+    design = unpack(Bundle(name, name, (*files, (name, encoded(document)))), folder)
+    lines = [f"title: {flow(experiment_of(document).title)}", f"base: {flow(design.name)}"]
+    if document.variant is not None:
+        lines.append(f"variant: {flow(document.variant)}")
+    lines.append("axes:")
+    for axis in axes:
+        said = {"paths": list(axis.paths), "values": [value_of(one) for one in axis.values]}
+        lines.append(f"  {flow(axis.name)}: {flow(said)}")
+    file = design.with_name(".ballplate-sweep.yaml")
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return file

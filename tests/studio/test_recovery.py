@@ -1,0 +1,200 @@
+"""What is not saved when a studio ends, however it ends."""
+
+import json
+from pathlib import Path
+
+import pytest
+from ballplate.designs import shipped
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.studio.jobs import JOBS
+from ballplate.studio.recovery import kept_in
+from ballplate.studio.session import RefusedError, Session
+from ballplate.studio.sweeping import swept
+
+MODEL = """import numpy as np
+from ballplate.models import Parameter, Reported
+
+open({ran!r}, "w").close()
+
+
+class Axes:
+    dimension = 3
+    parameters = (Parameter("scale", "1", "scale", "common scale", 1.0),)
+
+    def jacobian(self, x, a, p):
+        return x[:, :, None] + 0.0
+
+    def error(self, x, a, p):
+        return self.jacobian(x, a, p) @ a + p
+
+    def reported(self):
+        return Reported(("scale",), ("1",), np.eye(1))
+
+
+def build(lower, upper):
+    return Axes()
+"""
+SETTINGS = "{kind: python, object: 'model:build'}"
+
+
+@pytest.fixture
+def design(tmp_path: Path) -> Path:
+    path = tmp_path / "plate.yaml"
+    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    return path
+
+
+def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
+    session = Session(design)
+    assert not kept_in(design).exists()
+    session.act({"do": "turn", "position": "z low"})
+    text = session.state()["text"]
+    assert kept_in(design).stat().st_mode & 0o077 == 0
+    # The first session is gone without another word.
+    again = Session(design)
+    state = again.state()
+    assert state["text"] == text and not state["saved"] and "not saved" in state["note"]
+    again.act({"do": "undo"})
+    assert again.state()["text"] == design.read_text() and again.state()["note"] == ""
+    assert not kept_in(design).exists()
+    again.act({"do": "redo"})
+    again.act({"do": "save"})
+    assert design.read_text() == text and not kept_in(design).exists()
+    assert Session(design).state()["note"] == ""
+
+
+def test_a_file_that_has_changed_since_is_not_overwritten_by_what_was_not_saved(design):
+    Session(design).act({"do": "turn", "position": "z low"})
+    written = design.read_bytes() + b"# another hand\n"
+    design.write_bytes(written)
+    again = Session(design)
+    assert "changed since" in again.state()["note"]
+    with pytest.raises(RefusedError, match="has changed on disk"):
+        again.act({"do": "save"})
+    assert design.read_bytes() == written
+    again.act({"do": "undo"})
+    assert again.state()["text"] == written.decode()
+
+
+def test_a_new_file_is_not_written_before_it_is_saved_and_not_lost(tmp_path):
+    design, beginning = tmp_path / "new.yaml", Path(shipped("quickstart.yaml")).read_text()
+    session = Session(design, beginning=beginning)
+    assert "is new" in session.state()["note"] and list(tmp_path.iterdir()) == []
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    again = Session(design, beginning=beginning)
+    assert again.state()["data"]["title"] == "mine" and not design.exists()
+
+
+def test_changes_that_are_left_on_purpose_are_gone(design):
+    other = design.with_name("other.yaml")
+    other.write_bytes(design.read_bytes())
+    for name in ("other.yaml", "plate.yaml"):
+        session = Session(design)
+        session.act({"do": "turn", "position": "z low"})
+        session.act({"do": "open", "name": name, "discard": True})
+        assert session.state()["saved"] and not kept_in(design).exists()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"text": 1}', '{"text": "x", "content": "?"}'])
+def test_what_cannot_be_read_is_told(design, content):
+    kept_in(design).write_text(content)
+    state = Session(design).state()
+    assert "cannot be read" in state["note"] and state["saved"]
+
+
+def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, monkeypatch):
+    def fail(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("ballplate.studio.recovery.replace_file", fail)
+    session = Session(design)
+    session.act({"do": "turn", "position": "z low"})
+    assert session.state()["back"] == 1 and not kept_in(design).exists()
+
+
+def test_a_folder_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(ExperimentError, match="no such folder"):
+        Session(tmp_path / "nowhere" / "plate.yaml", beginning="title: x\n")
+
+
+def in_python(text: str) -> str:
+    start, end = text.index("error_model:"), text.index("# The machine that")
+    return text[:start] + f"error_model: {SETTINGS}\n" + text[end:]
+
+
+@pytest.fixture
+def ran(design: Path) -> Path:
+    """What a model beside the design leaves when it is run."""
+    found = design.with_name("ran")
+    design.with_name("model.py").write_text(MODEL.format(ran=str(found)))
+    return found
+
+
+def test_a_model_in_python_runs_from_the_file_that_was_named_and_from_no_other(design, ran):
+    named = design.with_name("named.yaml")
+    named.write_text(in_python(design.read_text()))
+    design.with_name("other.yaml").write_bytes(named.read_bytes())
+    session = Session(design)
+    session.act({"do": "open", "name": "other.yaml"})
+    assert any("Python" in one["text"] for one in session.state()["messages"])
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    session.act({"do": "undo"})
+    session.act({"do": "reopen"})
+    session.act({"do": "save", "name": "copy.yaml"})
+    assert not ran.exists()
+    # Whom the command has named may run it: the test above can fail.
+    state = Session(named).state()
+    assert ran.exists() and state["messages"] == []
+
+
+def test_no_change_brings_a_model_in_python_into_a_file_that_was_not_named(design, ran):
+    design.with_name("other.yaml").write_bytes(design.read_bytes())
+    session = Session(design)
+    session.act({"do": "open", "name": "other.yaml"})
+    text = session.state()["text"]
+    settings = {"kind": "python", "object": "model:build"}
+    for action in (
+        {"do": "text", "text": in_python(text)},
+        {"do": "set", "path": ["error_model", "kind"], "value": "python"},
+        {"do": "set", "path": ["true_machine"], "value": SETTINGS},
+        {"do": "repair", "edits": [{"path": ["true_machine"], "value": settings, "is_new": False}]},
+        {"do": "add", "settings": settings},
+    ):
+        session.act(action)
+        assert session.state()["messages"]
+        for name in ("suggest", "next", "monte carlo", "plan", "sweep", "fit"):
+            with pytest.raises(ExperimentError):
+                work = {"axes": [{"paths": ["title"], "values": ["x"]}], "name": "", "content": ""}
+                JOBS[name](session._now.document, work, lambda step: None)
+        for name in ("turn", "copy", "stand"):
+            with pytest.raises(ExperimentError):
+                session.preview({"do": name, "position": "z low", "across": "x"})
+        session.act({"do": "undo"})
+        assert session.state()["messages"] == [] and not ran.exists()
+
+
+def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design, ran):
+    design.with_name("other.yaml").write_bytes(design.read_bytes())
+    session = Session(design)
+    session.act({"do": "open", "name": "other.yaml"})
+    for axes in (
+        [{"paths": ["error_model"], "values": [SETTINGS]}],
+        [
+            {"paths": ["error_model.kind"], "values": ["kinematic", "python"]},
+            {"paths": ["error_model.object"], "values": ["'model:build'"]},
+        ],
+    ):
+        with pytest.raises(ExperimentError, match="Python"):
+            swept(session._now.document, axes, lambda step: None)
+    assert not ran.exists()
+
+
+def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran):
+    session = Session(design)
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    said = json.loads(kept_in(design).read_text())
+    for text in (in_python(said["text"]), in_python(said["text"]) + "title: [\n"):
+        kept_in(design).write_text(json.dumps(said | {"text": text}))
+        state = Session(design).state()
+        assert "were not taken up" in state["note"] and state["saved"]
+        assert kept_in(design).exists() and not ran.exists()
