@@ -70,6 +70,11 @@ def left_out() -> dict[str, str]:
     return {name: module for name, module in sorted(found.items()) if module}
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    # Files are handed out in the order below, not by the number of their tests.
+    config.option.loadscopereorder = False
+
+
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
     is_test = collection_path.suffix == ".py" and not IS_POSIX
     return True if is_test and module_needed(collection_path) else None

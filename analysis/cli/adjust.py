@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_json, map_path, percentage, show
-from .outputs import UsageError, add_force, add_output, write
-from .reading_options import add_readings, observed_readings
-from .telling import complain, note, warn
+from .common import add_json, map_path, percentage, show, write_noted
+from .outputs import UsageError, add_force, add_output
+from .reading_options import add_readings, observed_readings, warn_of
+from .telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
@@ -99,8 +99,7 @@ def run(options: Namespace) -> int:
         raise UsageError(error) from None
     if options.output:
         predicted = found.predicted_map
-        if write(options, {options.output: lambda path: write_map(predicted, path)}):
-            note(options, f"{options.output} written")
+        write_noted(options, {options.output: lambda path: write_map(predicted, path)})
     show(options, found)
     warn(found.notes)
     return 1 if complaint or (found.found is not None and not found.is_within) else 0
@@ -133,9 +132,7 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
     chosen = Namespace(**{**vars(options), "files": [file], "readings": readings})
     experiment, observed = observed_readings(chosen)
     result = fit(experiment, observed, options.sigma)
-    warn(result.cautions)
-    if result.complaint:
-        complain(result.complaint)
+    warn_of(result)
     return (result.to_map() if result.converged else None), bool(result.complaint)
 
 

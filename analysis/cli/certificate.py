@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
-from functools import partial
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
-from .common import add_json, number, show
-from .outputs import Output, OutputAction, UsageError, Writer, add_force, text_writer, write
-from .reading_options import add_readings, observed_readings
-from .telling import complain, note, warn
+from .common import add_json, coverage_factor, show, write_noted
+from .outputs import Output, OutputAction, UsageError, add_force
+from .reading_options import add_readings, observed_readings, warn_of
 
 ENDINGS = (".html", ".csv", ".xml", ".json")
 
@@ -76,7 +74,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--coverage-factor",
         metavar="K",
-        type=_factor,
+        type=coverage_factor,
         help="coverage factor of U; default: that of the file, or 2",
     )
     parser.add_argument(
@@ -105,13 +103,6 @@ def _balls(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(","))
 
 
-def _factor(text: str) -> float:
-    value = number(text)
-    if not 0.0 < value <= 100.0:
-        raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
-    return value
-
-
 def _stated(text: str) -> tuple[str, str]:
     key, sign, value = (part.strip() for part in text.partition("="))
     if not sign or not value:
@@ -125,9 +116,7 @@ def run(options: Namespace) -> int:
 
     experiment, observed = observed_readings(options)
     result = fit(experiment, observed, options.sigma)
-    warn(result.cautions)
-    if result.complaint:
-        complain(result.complaint)
+    warn_of(result)
     if not result.converged:
         return 1
     try:
@@ -137,16 +126,7 @@ def run(options: Namespace) -> int:
         texts = {} if options.output is None else found.texts(options.output)
     except ValueError as error:
         raise UsageError(error) from None
-    writers: dict[Path, Writer] = {
-        path: text_writer(partial(_print, text)) for path, text in texts.items()
-    }
-    if write(options, writers):
-        for path in texts:
-            note(options, f"{path} written")
+    write_noted(options, texts)
     if options.json or not texts:
         show(options, found)
     return 1 if result.complaint else 0
-
-
-def _print(text: str, stream: TextIO) -> None:
-    stream.write(text)

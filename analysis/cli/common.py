@@ -8,15 +8,17 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from .outputs import PICTURE, UsageError, Writer, add_output, write
-from .telling import tell_notes, warn
+from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
+from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.maps.fitted_map import FittedMap
 
     from ..presentation.result import Result
 
@@ -49,6 +51,45 @@ def add_json(parser: ArgumentParser) -> None:
             " experiments"
         ),
     )
+
+
+def add_goal(parser: ArgumentParser, quantities: str) -> None:
+    """Add what is to be reached, with examples of quantities, and what replaces the target."""
+    parser.add_argument(
+        "--goal",
+        default="lengths",
+        help=(
+            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
+            f" tasks, or a quantity such as {quantities}"
+        ),
+    )
+    parser.add_argument(
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="share of the lengths that must be within the target; default: all",
+    )
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
+    )
+
+
+T = TypeVar("T")
+
+
+def argument_type(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """The type of an argument: what its parser says is wrong with a text is told as it is."""
+
+    @wraps(parse)
+    def parsed(text: str) -> T:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise ArgumentTypeError(str(error)) from None
+
+    return parsed
 
 
 def whole(text: str, least: int = 0) -> int:
@@ -85,14 +126,12 @@ def number(text: str, unit: str = "") -> float:
         return math.nan
 
 
+@argument_type
 def day(text: str) -> str:
     """Argument type: a day such as 2026-11-22."""
     from ballplate.simulator.inputs.days import stated_day
 
-    try:
-        return stated_day(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return stated_day(text)
 
 
 def map_path(text: str) -> Path:
@@ -176,6 +215,13 @@ def write_picture(options: Namespace, draw: Writer) -> None:
         raise UsageError(f"--plot: {error}") from None
 
 
+def write_noted(options: Namespace, contents: Contents) -> None:
+    """Write the files of a command, and note each that is written."""
+    if write(options, contents):
+        for path in filter(None, contents):
+            note(options, f"{path} written")
+
+
 def add_page(parser: Any, help: str) -> None:
     """Add an option that names a page to be written."""
     add_output(parser, "--report", metavar="FILE", type=_page, help=f"{help} (.html)")
@@ -231,6 +277,28 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
         text = f"the file has several variants; choose one with --variant: {', '.join(names)}"
         raise refused(options.files[0], text)
     return found[0]
+
+
+# What fitted_map takes.
+FITTED = "map file, as fit -o writes it, or experiment file that names its readings"
+
+
+def fitted_map(path: Path) -> FittedMap:
+    """The map of a map file, or of an experiment file that names its readings, which are fitted;
+    says what is to be said of that fit.
+
+    :raises ExperimentError: the file is wrong, or the estimate did not converge.
+    """
+    from ballplate.simulator.experiment.map_files import read_map
+
+    from ..results.fit_of_file import fit_of_file, kind_of_file
+
+    if kind_of_file(path) != "experiment":
+        return read_map(path)
+    found = fit_of_file(path)
+    for remark in found.notes:
+        complain(remark)
+    return found.to_map()
 
 
 def print_lines(lines: Sequence[str]) -> None:

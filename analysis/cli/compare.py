@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 
 from ..estimators.estimator_choice import COMPARED
-from .common import add_file, add_json, at_most, count, trial_count, whole
+from .common import add_file, add_json, argument_type, at_most, count, trial_count, whole
 
 HELP = "compare an alternative estimator with the full one on synthetic data"
 DESCRIPTION = (
@@ -73,13 +73,11 @@ def _points(text: str) -> int:
     return at_most(count(text), MOST_POINTS, "pairs of points")
 
 
+@argument_type
 def _length(text: str) -> float:
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
+    from ballplate.simulator.inputs.quantities import parse_length
 
-    try:
-        return parse_length(text)
-    except QuantityError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return parse_length(text)
 
 
 def run(options: Namespace) -> int:

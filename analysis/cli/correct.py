@@ -6,15 +6,14 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_json, coverage_factor, show
+from .common import FITTED, add_json, coverage_factor, fitted_map, show
 from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 from .telling import warn
 
 if TYPE_CHECKING:
+    from ballplate.simulator.design.objects import Tasks
     from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.simulator.readings.point_files import GivenPoints
-
-    from ..results.wanted_lengths import WantedLengths
 
 HELP = "correct points by the map of a fit, with their uncertainty"
 DESCRIPTION = (
@@ -27,7 +26,7 @@ READ, CENTRES = "scale readings", "ball centres"
 
 
 def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("map", metavar="MAP", type=Path, help="map file, as fit -o writes it")
+    parser.add_argument("map", metavar="MAP", type=Path, help=FITTED)
     parser.add_argument(
         "points",
         metavar="POINTS",
@@ -98,13 +97,12 @@ def _add_lengths(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print points and lengths, and write what was asked for; 1 if something is undetermined."""
-    from ballplate.simulator.experiment.map_files import read_map
     from ballplate.simulator.inputs.settings import hint
     from ballplate.simulator.readings.point_files import read_points
 
     from ..results.correction import MOST_CO_ORDINATES, correction
 
-    fitted = read_map(options.map)
+    fitted = fitted_map(options.map)
     names, probe = fitted.probes.names, options.probe or fitted.probe
     if probe not in names:
         raise UsageError(f'--probe: no probe "{probe}" in the map; {hint(probe, names)}')
@@ -123,19 +121,15 @@ def run(options: Namespace) -> int:
         )
     except ValueError as error:
         raise UsageError(error) from None
-    writers: dict[Path, Writer] = {}
-    if options.output:
-        writers[options.output] = text_writer(found.write_points)
-    if options.covariance:
-        writers[options.covariance] = text_writer(found.write_covariance)
-    if writers:
-        write(options, writers)
+    contents: dict[Path | None, Writer] = {options.output: text_writer(found.write_points)}
+    contents[options.covariance] = text_writer(found.write_covariance)
+    write(options, contents)
     show(options, found)
     warn(found.warnings)
     return 1 if found.is_open else 0
 
 
-def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> WantedLengths:
+def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
     from ballplate.simulator.experiment.load import load
 

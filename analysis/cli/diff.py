@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .common import add_json, add_picture, day, show, whole
 from .lengths import coverage_factor
-from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
+from .outputs import UsageError, add_force, add_output, write
 
 HELP = "compare two maps of a machine: which lengths, errors and balls have changed"
 DESCRIPTION = (
@@ -121,13 +121,7 @@ def run(options: Namespace) -> int:
         )
     except (NotComparableError, NothingSharedError, QuantityError) as error:
         raise UsageError(error) from None
-    writers: dict[Path, Writer] = {}
-    if options.csv is not None:
-        text = found.to_csv()
-        writers[options.csv] = text_writer(lambda stream: stream.write(text))
-    if options.plot is not None:
-        writers[options.plot] = found.plot
-    write(options, writers)
+    write(options, {options.csv: found.to_csv, options.plot: found.plot})
     show(options, found)
     for note in found.notes:
         complain(note)

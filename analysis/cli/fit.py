@@ -28,8 +28,8 @@ from .common import (
 )
 from .compare import add_pairs
 from .outputs import UsageError, Writer, add_force, add_output, write
-from .reading_options import add_readings, observed_readings
-from .telling import complain, warn
+from .reading_options import add_readings, observed_readings, warn_of
+from .telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
@@ -166,23 +166,17 @@ def run(options: Namespace) -> int:
     )
     if options.trials and isinstance(result, Fit) and result.converged:
         result = _with_trials(options, result, experiment)
-    writers: dict[Path, Writer] = {}
-    if options.plot and result.converged:
-        writers[options.plot] = result.plot
-    if options.report:
-        writers[options.report] = result.report
+    contents: dict[Path | None, Writer] = {options.report: result.report}
+    if result.converged:
+        contents[options.plot] = result.plot
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
-        writers[options.output] = partial(write_map, fitted)
-    if writers:
-        write(options, writers)
-    if options.output in writers and fitted.left_out:
+        contents[options.output] = partial(write_map, fitted)
+    write(options, contents)
+    if options.output and options.output in contents and fitted.left_out:
         warn([left_out_words(fitted)])
     show(options, result)
-    warn(result.cautions)
-    if result.complaint:
-        complain(result.complaint)
-    return 1 if result.complaint else 0
+    return warn_of(result)
 
 
 def _with_trials(options: Namespace, result: Fit, experiment: Experiment) -> Fit:

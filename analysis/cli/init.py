@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from .outputs import add_force, add_output, text_writer, write
+from .outputs import add_force, add_output, write
 from .telling import note
 
 HELP = "write a commented experiment or machine file to start from"
@@ -29,6 +29,6 @@ def run(options: Namespace) -> int:
         ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
     )
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
-    if write(options, {options.file: text_writer(lambda stream: stream.write(text))}):
+    if write(options, {options.file: text}):
         note(options, f"{options.file} written; next: ballplate {command} {options.file}")
     return 0

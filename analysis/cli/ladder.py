@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
 from .common import add_json, whole
-from .reading_options import add_readings, observed_readings
+from .reading_options import add_readings, observed_readings, warn_of
 
 HELP = "compare error models on readings: which one do they call for?"
 DESCRIPTION = (
@@ -43,14 +43,10 @@ def run(options: Namespace) -> int:
     from ..results.validation.rungs import MOST_COEFFICIENTS
     from .common import show
     from .progress import progress
-    from .telling import complain, warn
 
     experiment, observed = observed_readings(options)
     with progress(options) as shown:
         most = options.coefficients or MOST_COEFFICIENTS
         result = ladder(experiment, observed, options.sigma, most, shown.show)
     show(options, result)
-    warn(result.cautions)
-    if result.complaint:
-        complain(result.complaint)
-    return 1 if result.complaint else 0
+    return warn_of(result)

@@ -104,14 +104,12 @@ def run(options: Namespace) -> int:
         )
     with progress(options) as shown:
         found = length_map(experiment, settings, shown.show)
-    writers: dict[Path, Writer] = {}
-    if options.csv is not None:
-        writers[options.csv] = _of_lines(point_csv(found))
-    if options.pairs is not None:
-        writers[options.pairs] = _of_lines(pair_csv(experiment, settings))
-    if options.plot is not None:
-        writers[options.plot] = found.plot
-    write(options, writers)
+    contents: dict[Path | None, Writer] = {
+        options.csv: _of_lines(point_csv(found)),
+        options.pairs: _of_lines(pair_csv(experiment, settings)),
+        options.plot: found.plot,
+    }
+    write(options, contents)
     show(options, found)
     is_missed = options.fail and not found.is_met
     return 0 if found.as_expected and not is_missed else 1

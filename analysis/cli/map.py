@@ -12,6 +12,7 @@ from . import common
 from .common import (
     add_formats,
     add_picture,
+    argument_type,
     at_most,
     count,
     print_json,
@@ -141,22 +142,18 @@ def _draw(text: str) -> int:
     return at_most(count(text), MOST_DRAWS, "realisations")
 
 
+@argument_type
 def _line(text: str) -> Line:
     from ..error_maps.map_places import parse_places
 
-    try:
-        return parse_places(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return parse_places(text)
 
 
+@argument_type
 def _plane(text: str) -> dict[str, float]:
     from ..error_maps.map_places import parse_plane
 
-    try:
-        return parse_plane(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return parse_plane(text)
 
 
 def run(options: Namespace) -> int:

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, add_json, number, percentage, show, single
+from .common import add_file, add_goal, add_json, number, show, single
 from .outputs import UsageError
+from .reading_options import add_readings_argument
 from .table_options import add_tables
 
 if TYPE_CHECKING:
@@ -29,25 +30,17 @@ DESCRIPTION = (
 
 def add_options(parser: ArgumentParser) -> None:
     add_file(parser)
-    readings = parser.add_argument(
-        "readings",
-        metavar="READINGS",
-        nargs="+",
-        type=Path,
-        default=[],
-        help=(
-            "readings so far: one table or several in the order in which they were taken; default:"
-            " those that the experiment file names"
-        ),
+    add_readings_argument(
+        parser,
+        "readings so far: one table or several in the order in which they were taken; default:"
+        " those that the experiment file names",
     )
-    # With nargs="*" none would be looked for behind the first option.
-    readings.required = False
     parser.add_argument(
         "--watch",
         metavar="FOLDER",
         type=Path,
         help=(
-            "wait for tables of readings in a folder, and print a line whenever one has been"
+            "wait for tables of readings in a folder, and print the answer whenever one has been"
             " written; ends when the target is met, or with Ctrl-C"
         ),
     )
@@ -57,25 +50,7 @@ def add_options(parser: ArgumentParser) -> None:
         type=_seconds,
         help="with --watch: time between two looks at the folder; default 2",
     )
-    parser.add_argument(
-        "--goal",
-        default="lengths",
-        help=(
-            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
-            ' tasks, or a quantity such as "U6 average 0.3 um"'
-        ),
-    )
-    parser.add_argument(
-        "--share",
-        metavar="95%",
-        type=percentage,
-        help="share of the lengths that must be within the target; default: all",
-    )
-    parser.add_argument(
-        "--target",
-        metavar="LENGTH",
-        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
-    )
+    add_goal(parser, '"U6 average 0.3 um"')
     add_tables(parser)
     add_json(parser)
 

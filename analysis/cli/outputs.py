@@ -20,6 +20,7 @@ from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
@@ -45,6 +46,9 @@ BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
 
 Writer = Callable[[Path], object]
 """Writes a file of the kind that the path's name ends in."""
+
+Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
+"""What files are to hold, texts or by writers; None stands for one that no option names."""
 
 
 @dataclass(frozen=True)
@@ -311,12 +315,23 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     return True
 
 
-def write(options: Namespace, writers: Mapping[Path, Writer]) -> bool:
-    """Write the files of a command, which ends with the status of a file that cannot be used if
-    one of them cannot be written; whether they are.
+def write(options: Namespace, contents: Contents) -> bool:
+    """Write the files of a command.
+
+    The command ends with the status of a file that cannot be used if one of them cannot be written;
+    whether they are.
     """
+    writers = {
+        path: text_writer(partial(_print, content)) if isinstance(content, str) else content
+        for path, content in contents.items()
+        if path is not None
+    }
     options.is_written = write_outputs(writers, options.force) and options.is_written
     return bool(options.is_written)
+
+
+def _print(text: str, stream: TextIO) -> None:
+    stream.write(text)
 
 
 def text_writer(print_to: Callable[[TextIO], object]) -> Writer:

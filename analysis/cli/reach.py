@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from .common import add_file, add_json, percentage, show, single, whole
+from .common import add_file, add_goal, add_json, show, single, whole
 from .outputs import UsageError
 
 UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
@@ -30,26 +30,7 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         help="solve for this unknown only; may be repeated",
     )
-    parser.add_argument(
-        "--goal",
-        default="lengths",
-        help=(
-            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
-            ' tasks, or a quantity such as "U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average'
-            ' 0.1 um"'
-        ),
-    )
-    parser.add_argument(
-        "--share",
-        metavar="95%",
-        type=percentage,
-        help="share of the lengths that must be within the target; default: all",
-    )
-    parser.add_argument(
-        "--target",
-        metavar="LENGTH",
-        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
-    )
+    add_goal(parser, '"U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average 0.1 um"')
     parser.add_argument(
         "--artefact",
         metavar="NAME",

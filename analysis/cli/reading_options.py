@@ -18,22 +18,19 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
+    from ..presentation.result import FitResult
 
-def add_readings(parser: ArgumentParser) -> None:
+
+# Of a command that fits readings in any case.
+NAMED = "tables of readings or reports; default: readings.files of the experiment file"
+
+
+def add_readings(parser: ArgumentParser, of_readings: str = NAMED) -> None:
     """Add the experiment file, tables of readings and how they are written, values of certificates,
     and what uncertainties are.
     """
     add_file(parser)
-    readings = parser.add_argument(
-        "readings",
-        metavar="READINGS",
-        nargs="+",
-        type=Path,
-        default=[],
-        help="tables of readings or reports; default: readings.files of the experiment file",
-    )
-    # With nargs="*" none would be looked for behind the first option.
-    readings.required = False
+    add_readings_argument(parser, of_readings)
     add_tables(parser)
     parser.add_argument(
         "--certificate",
@@ -52,6 +49,15 @@ def add_readings(parser: ArgumentParser) -> None:
             " file says"
         ),
     )
+
+
+def add_readings_argument(parser: ArgumentParser, help: str) -> None:
+    """Add tables of readings, which may be left out."""
+    readings = parser.add_argument(
+        "readings", metavar="READINGS", nargs="+", type=Path, default=[], help=help
+    )
+    # With nargs="*" none would be looked for behind the first option.
+    readings.required = False
 
 
 def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]:
@@ -75,6 +81,14 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
         experiment = read_certificate(options.certificate, experiment)
     sources = options.readings or named_sources(experiment)
     return experiment, tables(options, experiment, sources, experiment.doubts[stated:])
+
+
+def warn_of(result: FitResult) -> int:
+    """Warn of what a user of an estimate has to know; 1 if there is something to complain of."""
+    warn(result.cautions)
+    if result.complaint:
+        complain(result.complaint)
+    return 1 if result.complaint else 0
 
 
 def tables(

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from functools import partial
 from pathlib import Path
-from typing import TextIO
 
-from .common import add_file, add_json, show, single
-from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
-from .telling import note
+from .common import add_file, add_json, argument_type, show, single, write_noted
+from .outputs import UsageError, add_force, add_output
 
 SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".csv",)
 
@@ -67,13 +64,11 @@ def _points(text: str) -> Path:
     return Path(text)
 
 
+@argument_type
 def _diameter(text: str) -> float:
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
+    from ballplate.simulator.inputs.quantities import parse_length
 
-    try:
-        value = parse_length(text)
-    except QuantityError as error:
-        raise ArgumentTypeError(str(error)) from None
+    value = parse_length(text)
     if not 0.0 < value < 1.0:
         raise ArgumentTypeError(f'expected a length above zero, below 1 m, not "{text}"')
     return value
@@ -99,14 +94,5 @@ def run(options: Namespace) -> int:
         texts[options.points] = sheet.points(options.ball_diameter)
     if options.json or not texts:
         show(options, sheet)
-    writers: dict[Path, Writer] = {
-        path: text_writer(partial(_print, text)) for path, text in texts.items()
-    }
-    if write(options, writers):
-        for path in texts:
-            note(options, f"{path} written")
+    write_noted(options, texts)
     return 0
-
-
-def _print(text: str, stream: TextIO) -> None:
-    stream.write(text)

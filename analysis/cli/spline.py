@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common import add_picture, count, print_json, print_lines
-from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
+from .outputs import UsageError, Writer, add_force, add_output, write
 
 if TYPE_CHECKING:
     from ballplate.simulator.splines.read import CurvePoints
@@ -188,23 +188,20 @@ def run(options: Namespace) -> int:
     except OptionError as error:
         raise UsageError(error) from None
     lines = [] if options.json else found.lines()
-    writers: dict[Path, Writer] = {}
-    if options.plot is not None:
-        writers[options.plot] = found.plot
-    if options.whiskers is not None:
-        writers[options.whiskers] = partial(
-            found.plot_whiskers, magnification=options.magnification
-        )
+    contents: dict[Path | None, Writer | str] = {
+        options.plot: found.plot,
+        options.whiskers: partial(found.plot_whiskers, magnification=options.magnification),
+    }
     if options.compensated is not None:
-        moved = found.compensated(options.nominal).csv()
-        writers[options.compensated] = text_writer(lambda stream: stream.write(moved))
+        contents[options.compensated] = found.compensated(options.nominal).csv()
     polynomials = None if options.coefficients is None else found.coefficients()
-    if polynomials is not None and str(options.coefficients) != "-":
-        writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
-    write(options, writers)
+    is_screen = str(options.coefficients) == "-"
+    if polynomials is not None and not is_screen:
+        contents[options.coefficients] = polynomials
+    write(options, contents)
     if options.json:
         print_json([found.to_dict()])
-    elif polynomials is not None and str(options.coefficients) == "-":
+    elif polynomials is not None and is_screen:
         sys.stdout.write(polynomials)
     else:
         print_lines(lines)

@@ -6,6 +6,8 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .common import argument_type
+
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
@@ -58,14 +60,12 @@ def add_tables(parser: ArgumentParser) -> None:
     )
 
 
+@argument_type
 def rule(text: str) -> str:
     """Read a rule of names from the command line."""
     from ballplate.simulator.experiment.name_rules import check_rule
 
-    try:
-        return check_rule(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error)) from None
+    return check_rule(text)
 
 
 def columns(text: str) -> dict[str, str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .common import add_json
 from .outputs import UsageError
-from .reading_options import add_readings, observed_readings, tables
+from .reading_options import add_readings, observed_readings, tables, warn_of
 
 HELP = "leave out positions, plates and directions in turn and predict them; compare two campaigns"
 DESCRIPTION = (
@@ -44,7 +44,6 @@ def run(options: Namespace) -> int:
     from ..presentation.result import FitResult
     from .common import show
     from .progress import progress
-    from .telling import complain
 
     if options.other_plate and not options.against:
         raise UsageError("--other-plate goes with --against only; leave it out")
@@ -62,6 +61,4 @@ def run(options: Namespace) -> int:
         with progress(options) as shown:
             result = validate(experiment, observed, options.sigma, shown.show)
     show(options, result)
-    if result.complaint:
-        complain(result.complaint)
-    return 1 if result.complaint else 0
+    return warn_of(result)

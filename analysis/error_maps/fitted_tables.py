@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from ..presentation.formatting import aligned, csv_lines, number, to_uncertainty
+from ..presentation.formatting import aligned, csv_lines, number, picked, to_uncertainty
 from .fitted_errors import FittedErrors, FittedLengths
 from .realisations import Realisations
 from .volumetric_tables import CONVENTION
@@ -42,10 +42,7 @@ def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[st
         "title": fitted.title,
         "convention": CONVENTION,
         "frame": fitted.frame or None,
-        "coverage_factor": fitted.coverage_factor,
-        "sigma": fitted.sigma,
-        "sigma_is_estimated": fitted.sigma_is_estimated,
-        "degrees_of_freedom": fitted.degrees_of_freedom,
+        **picked(fitted, "coverage_factor", "sigma", "sigma_is_estimated", "degrees_of_freedom"),
     }
     if probe is not None:
         found["probe"] = {

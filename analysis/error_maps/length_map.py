@@ -15,6 +15,7 @@ from ballplate.simulator.estimation.functions import MeasuredPoints, displacemen
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
 from ballplate.simulator.inputs.settings import hint
@@ -189,9 +190,7 @@ def _tiles(
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:
     """Points (n, d) of a grid over the whole volume, the last axis changing fastest."""
-    ends = zip(*design.machine.volume.corners, counts, strict=True)
-    sides = [np.linspace(*one) for one in ends]
-    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, design.dimension)
+    return even_grid(*design.machine.volume.corners, counts)
 
 
 def class_edges(longest: float) -> Array:

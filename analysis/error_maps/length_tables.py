@@ -53,10 +53,87 @@ class LengthMap(GroupedLengths, Result):
         return f"{u} within {target_words(self.settings.target)} for {percent(share)} of lengths"
 
     def lines(self) -> list[str]:
-        return _lines(self)
+        """The share of lengths that meet the target, and where, how long and in which direction
+        they are.
+        """
+        settings, whole = self.settings, self.whole
+        k = f"{settings.coverage_factor:g}"
+        rank = f"rank deficiency {self.deficiency}; " if self.deficiency else ""
+        scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
+        count, n = int(whole.count[0]), len(self.points)
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"{rank}{count} lengths between {n} points of a grid, with the probe"
+                f" {settings.probe}{scatter}"
+            ),
+            (
+                f"target {target_words(settings.target)}: met by the standard uncertainty u of"
+                f" {_share(whole, False)}, by the expanded uncertainty {k} u of"
+                f" {_share(whole, True)} lengths"
+            ),
+            f"the target is meant for the {uncertainty_words(settings.target_factor)}",
+        ]
+        if whole.undetermined[0]:
+            some = ", ".join(
+                f"{_place(self.points[i])} to {_place(self.points[j])}" for i, j in self.open_pairs
+            )
+            lines.append(
+                f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as"
+                f" {some}"
+            )
+        elif self.deficiency:
+            lines.append(
+                "undetermined directions change none of these lengths, but may change those of"
+                " another --grid"
+            )
+        if self.worst is not None:
+            i, j = self.worst
+            ratio = settings.target_factor * float(whole.maximum_ratio[0])
+            told = f"largest ratio of {_compared(self)} to the target: {number(ratio)}"
+            lines.append(f"{told}, from {_place(self.points[i])} to {_place(self.points[j])}")
+        return [
+            *lines,
+            "",
+            *_table(
+                "length",
+                _class_names(self.edges),
+                self.by_length,
+                self,
+                _class_targets(self),
+            ),
+            "",
+            *_table("direction", list(self.directions), self.by_direction, self, None),
+            "",
+            *_table("point, mm", *_extremes(self), self, None),
+            (
+                f"(points in the order of their largest ratio of {_compared(self)} to the target;"
+                " lengths are those that start or end there)"
+            ),
+        ]
 
     def to_dict(self) -> dict[str, Any]:
-        return _data(self)
+        """The same as plain data in metres; what is undetermined is None."""
+        settings, edges = self.settings, self.edges.tolist()
+        classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
+        data: dict[str, Any] = as_data(
+            {
+                "experiment": self.label,
+                "title": self.title,
+                "rank_deficiency": self.deficiency,
+                **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+                "target": picked(settings.target, "constant", "slope"),
+                "target_coverage_factor": settings.target_factor,
+                "all": _group_data([{}], self.whole)[0],
+                "worst": None if self.worst is None else [self.points[k] for k in self.worst],
+                "by_length": _group_data(classes, self.by_length),
+                "by_direction": _group_data(
+                    [{"direction": name} for name in self.directions], self.by_direction
+                ),
+                "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
+            }
+        )
+        return data
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each class of length, direction and point of the grid, lengths in metres."""
@@ -81,67 +158,6 @@ class LengthMap(GroupedLengths, Result):
         :raises ValueError: the path ends in something else.
         """
         return draw_lengths(self, path)
-
-
-def _lines(lengths: LengthMap) -> list[str]:
-    """The share of lengths that meet the target, and where, how long and in which direction they
-    are.
-    """
-    settings, whole = lengths.settings, lengths.whole
-    k = f"{settings.coverage_factor:g}"
-    rank = f"rank deficiency {lengths.deficiency}; " if lengths.deficiency else ""
-    scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
-    count, n = int(whole.count[0]), len(lengths.points)
-    lines = [
-        f"{lengths.label}: {lengths.title}",
-        (
-            f"{rank}{count} lengths between {n} points of a grid, with the probe"
-            f" {settings.probe}{scatter}"
-        ),
-        (
-            f"target {target_words(settings.target)}: met by the standard uncertainty u of"
-            f" {_share(whole, False)}, by the expanded uncertainty {k} u of {_share(whole, True)}"
-            " lengths"
-        ),
-        f"the target is meant for the {uncertainty_words(settings.target_factor)}",
-    ]
-    if whole.undetermined[0]:
-        some = ", ".join(
-            f"{_place(lengths.points[i])} to {_place(lengths.points[j])}"
-            for i, j in lengths.open_pairs
-        )
-        lines.append(
-            f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as {some}"
-        )
-    elif lengths.deficiency:
-        lines.append(
-            "undetermined directions change none of these lengths, but may change those of another"
-            " --grid"
-        )
-    if lengths.worst is not None:
-        i, j = lengths.worst
-        ratio = settings.target_factor * float(whole.maximum_ratio[0])
-        told = f"largest ratio of {_compared(lengths)} to the target: {number(ratio)}"
-        lines.append(f"{told}, from {_place(lengths.points[i])} to {_place(lengths.points[j])}")
-    return [
-        *lines,
-        "",
-        *_table(
-            "length",
-            _class_names(lengths.edges),
-            lengths.by_length,
-            lengths,
-            _class_targets(lengths),
-        ),
-        "",
-        *_table("direction", list(lengths.directions), lengths.by_direction, lengths, None),
-        "",
-        *_table("point, mm", *_extremes(lengths), lengths, None),
-        (
-            f"(points in the order of their largest ratio of {_compared(lengths)} to the target;"
-            " lengths are those that start or end there)"
-        ),
-    ]
 
 
 def _share(groups: LengthGroups, expanded: bool) -> str:
@@ -247,32 +263,6 @@ def point_csv(lengths: LengthMap) -> Iterator[str]:
         groups.share(),
         groups.share(True),
     )
-
-
-def _data(lengths: LengthMap) -> dict[str, Any]:
-    """The same as plain data in metres; what is undetermined is None."""
-    settings, edges = lengths.settings, lengths.edges.tolist()
-    classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
-    data: dict[str, Any] = as_data(
-        {
-            "experiment": lengths.label,
-            "title": lengths.title,
-            "rank_deficiency": lengths.deficiency,
-            **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
-            "target": picked(settings.target, "constant", "slope"),
-            "target_coverage_factor": settings.target_factor,
-            "all": _group_data([{}], lengths.whole)[0],
-            "worst": None if lengths.worst is None else [lengths.points[k] for k in lengths.worst],
-            "by_length": _group_data(classes, lengths.by_length),
-            "by_direction": _group_data(
-                [{"direction": name} for name in lengths.directions], lengths.by_direction
-            ),
-            "by_point": _group_data(
-                [{"point": point} for point in lengths.points], lengths.by_point
-            ),
-        }
-    )
-    return data
 
 
 def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[dict[str, Any]]:

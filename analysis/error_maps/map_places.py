@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.experiment.error_tables import parse_line, parse_point
+from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.quantities import parse_length
@@ -148,8 +149,7 @@ def map_places(
     if len(counts) != d:
         told = "three numbers of points, such as 5,5,5" if d == 3 else "two, such as 5,5"
         raise ValueError(f"the machine has {d} axes; give {told}")
-    sides = [np.linspace(*one) for one in zip(lower, upper, counts, strict=True)]
-    points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, d)
+    points = even_grid(lower, upper, counts)
     kind: PlaceKind = "grid" if asked.plane is None else "plane"
     return MapPlaces(kind, points, tuple(counts), *ends, names)
 

@@ -27,16 +27,15 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.ball_layouts import pairs
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import (
     NoReadingError,
     noisy_certificate,
     noisy_readings,
-    on_true_machine,
 )
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
 from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
 from ..presentation.result import FitResult, Result
@@ -99,10 +98,53 @@ class AlternativeFit(FitResult):
         return f"{self.solution.estimator}, {self.solution.status}, {rank}"
 
     def lines(self) -> list[str]:
-        return _fit_lines(self)
+        """The fit as lines of text: iterations and the machine's parameters."""
+        record = self.solution.iterations
+        rank = (
+            f"rank deficiency {self.solution.deficiency}"
+            if self.solution.deficiency
+            else "full rank"
+        )
+        used = _used(self.pairs, self.lengths)
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"estimator {self.solution.estimator}: {used}, {self.solution.observations} terms;"
+                f" {rank}"
+            ),
+            (
+                f"{self.solution.status} after {len(record) - 1} iterations; S^2 ="
+                f" {record[-1].sum_of_squares:.6g} (its terms are not independent, so that no sigma"
+                " is estimated and no uncertainties are given here)"
+            ),
+            "",
+        ]
+        rows = [["iteration", "step", "S^2"]]
+        rows += [
+            [str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"]
+            for k, it in enumerate(record)
+        ]
+        lines += [*aligned(rows, [True, True, True]), ""]
+        rows = [["parameter", "value", "unit"]]
+        rows += [[e.name, number(1e6 * e.value, 6), SHOWN[e.unit]] for e in self.estimates]
+        return lines + aligned(rows, [False, True, False])
 
     def to_dict(self) -> dict[str, Any]:
-        return _fit_data(self)
+        """The fit as plain data in metres and radians; what is undetermined is None."""
+        data: dict[str, Any] = as_data(
+            {
+                "experiment": self.label,
+                **picked(self, "title", "pairs", "lengths"),
+                **picked(self.solution, "estimator", "observations", "status"),
+                "rank_deficiency": self.solution.deficiency,
+                "iterations": [
+                    picked(it, "step", "sum_of_squares") for it in self.solution.iterations
+                ],
+                "estimates": {e.name: picked(e, "value", "unit") for e in self.estimates},
+                **self.said(),
+            }
+        )
+        return data
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of the machine's parameters."""
@@ -144,10 +186,90 @@ class EstimatorComparison(Result):
         )
 
     def lines(self) -> list[str]:
-        return _comparison_lines(self)
+        """A comparison as lines of text: quantiles, and where published values stand in them."""
+        published = self.published
+        across = ", across probes" if self.across_probes else ""
+        used = f" ({_used(self.pairs, self.lengths)}{across})"
+        used = "" if self.estimator == "reversal" else used
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"estimator {self.estimator}{used} against the full one: corrected"
+                f" distances of {self.points} random pairs of points in each of"
+                f" {self.trials} data sets, differences in µm"
+            ),
+        ]
+        if self.failed:
+            lines.append(
+                f"not converged: {len(self.failed)} data sets, numbers"
+                f" {', '.join(map(str, self.failed[:20]))}"
+            )
+        if not len(self.rms):
+            return lines
+        rows = [
+            [
+                "",
+                "least",
+                *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]),
+                "largest",
+                "published",
+                "below it",
+            ]
+        ]
+        for words, key, values in (
+            ("root mean square", "rms", self.rms),
+            ("largest", "maximum", self.maximum),
+        ):
+            value = published.get(key)
+            placed = (
+                ["", ""]
+                if value is None
+                else [number(1e6 * value), f"{100 * share_below(values, value):.0f} %"]
+            )
+            rows.append(
+                [words, *(number(1e6 * q) for q in np.quantile(values, QUANTILES)), *placed]
+            )
+        if all(value is None for value in published.values()):
+            rows = [row[:-2] for row in rows]
+        lines += aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+        if not self.of_truth:
+            return lines
+        rows = [
+            ["distances against the true machine's, µm", "bias", "by chance", "scatter", "rms", ""]
+        ]
+        for name, one in self.of_truth.items():
+            figures = (one.bias, one.chance, one.scatter, one.rms)
+            cells = [number(1e6 * value, 3) for value in figures]
+            rows.append([name, *cells, "<- biased" if one.is_biased else ""])
+        return [*lines, "", *aligned(rows, [False, *[True] * 4, False])]
 
     def to_dict(self) -> dict[str, Any]:
-        return _comparison_data(self)
+        """A comparison as plain data in metres."""
+        data: dict[str, Any] = {
+            "experiment": self.label,
+            **picked(self, "title", "estimator", "trials", "pairs", "lengths"),
+            **picked(self, "across_probes", "points"),
+            "not_converged": self.failed,
+        }
+        for key, values in (("rms", self.rms), ("maximum", self.maximum)):
+            quantiles = np.quantile(values, QUANTILES) if len(values) else ()
+            data[key] = {
+                "quantiles": {
+                    str(q): value for q, value in zip(QUANTILES, quantiles, strict=False)
+                },
+                "values": values,
+            }
+            value = self.published.get(key)
+            if value is not None:
+                data[key] |= {
+                    "published": value,
+                    "share_below_published": share_below(values, value),
+                }
+        if self.of_truth:
+            data["against_truth"] = {
+                name: {**vars(one), "unit": "m"} for name, one in self.of_truth.items()
+            }
+        return dict(as_data(data))
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each data set on which both estimators converged."""
@@ -347,9 +469,7 @@ def compare_estimators(
         _refuse_unknown_places(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
-    on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
-    )
+    on_truth, truth = on_stated_machine(experiment, design)
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
     same, true = _same_pairs(design, on_truth, truth, seed, points)
@@ -361,9 +481,7 @@ def compare_estimators(
                 experiment, design, on_truth, truth, chosen, estimator, across_probes, generator
             )
         except NoReadingError as error:
-            raise ExperimentError(
-                [experiment.message(("true_machine",), f"{error}; state smaller ones")]
-            ) from None
+            raise too_large(experiment, error) from None
         if both is None:
             failed.append(trial)
         else:
@@ -473,32 +591,6 @@ def share_below(values: Array, published: float) -> float:
     return float((values < published).mean()) if len(values) else float("nan")
 
 
-def _fit_lines(fit: AlternativeFit) -> list[str]:
-    """An alternative estimator's fit as lines of text: iterations and the machine's parameters."""
-    record = fit.solution.iterations
-    rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
-    used = _used(fit.pairs, fit.lengths)
-    lines = [
-        f"{fit.label}: {fit.title}",
-        f"estimator {fit.solution.estimator}: {used}, {fit.solution.observations} terms; {rank}",
-        (
-            f"{fit.solution.status} after {len(record) - 1} iterations; S^2 ="
-            f" {record[-1].sum_of_squares:.6g} (its terms are not independent, so that no sigma"
-            " is estimated and no uncertainties are given here)"
-        ),
-        "",
-    ]
-    rows = [["iteration", "step", "S^2"]]
-    rows += [
-        [str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"]
-        for k, it in enumerate(record)
-    ]
-    lines += [*aligned(rows, [True, True, True]), ""]
-    rows = [["parameter", "value", "unit"]]
-    rows += [[e.name, number(1e6 * e.value, 6), SHOWN[e.unit]] for e in fit.estimates]
-    return lines + aligned(rows, [False, True, False])
-
-
 def _used(pairs: int, lengths: int) -> str:
     """What distances an estimator uses, in words.
 
@@ -507,100 +599,3 @@ def _used(pairs: int, lengths: int) -> str:
     """
     words = [f"{pairs} pairs of balls"] if pairs or not lengths else []
     return " and ".join([*words, *([f"{lengths} lengths of standards"] if lengths else [])])
-
-
-def _fit_data(fit: AlternativeFit) -> dict[str, Any]:
-    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
-    None.
-    """
-    data: dict[str, Any] = as_data(
-        {
-            "experiment": fit.label,
-            **picked(fit, "title", "pairs", "lengths"),
-            **picked(fit.solution, "estimator", "observations", "status"),
-            "rank_deficiency": fit.solution.deficiency,
-            "iterations": [picked(it, "step", "sum_of_squares") for it in fit.solution.iterations],
-            "estimates": {e.name: picked(e, "value", "unit") for e in fit.estimates},
-            **fit.said(),
-        }
-    )
-    return data
-
-
-def _comparison_lines(comparison: EstimatorComparison) -> list[str]:
-    """A comparison as lines of text: quantiles, and where published values stand in them."""
-    published = comparison.published
-    across = ", across probes" if comparison.across_probes else ""
-    used = f" ({_used(comparison.pairs, comparison.lengths)}{across})"
-    used = "" if comparison.estimator == "reversal" else used
-    lines = [
-        f"{comparison.label}: {comparison.title}",
-        (
-            f"estimator {comparison.estimator}{used} against the full one: corrected"
-            f" distances of {comparison.points} random pairs of points in each of"
-            f" {comparison.trials} data sets, differences in µm"
-        ),
-    ]
-    if comparison.failed:
-        lines.append(
-            f"not converged: {len(comparison.failed)} data sets, numbers"
-            f" {', '.join(map(str, comparison.failed[:20]))}"
-        )
-    if not len(comparison.rms):
-        return lines
-    rows = [
-        [
-            "",
-            "least",
-            *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]),
-            "largest",
-            "published",
-            "below it",
-        ]
-    ]
-    for words, key, values in (
-        ("root mean square", "rms", comparison.rms),
-        ("largest", "maximum", comparison.maximum),
-    ):
-        value = published.get(key)
-        placed = (
-            ["", ""]
-            if value is None
-            else [number(1e6 * value), f"{100 * share_below(values, value):.0f} %"]
-        )
-        rows.append([words, *(number(1e6 * q) for q in np.quantile(values, QUANTILES)), *placed])
-    if all(value is None for value in published.values()):
-        rows = [row[:-2] for row in rows]
-    lines += aligned(rows, [False] + [True] * (len(rows[0]) - 1))
-    if not comparison.of_truth:
-        return lines
-    rows = [["distances against the true machine's, µm", "bias", "by chance", "scatter", "rms", ""]]
-    for name, one in comparison.of_truth.items():
-        figures = (one.bias, one.chance, one.scatter, one.rms)
-        cells = [number(1e6 * value, 3) for value in figures]
-        rows.append([name, *cells, "<- biased" if one.is_biased else ""])
-    return [*lines, "", *aligned(rows, [False, *[True] * 4, False])]
-
-
-def _comparison_data(comparison: EstimatorComparison) -> dict[str, Any]:
-    """A comparison as plain data in metres."""
-    data: dict[str, Any] = {
-        "experiment": comparison.label,
-        **picked(comparison, "title", "estimator", "trials", "pairs", "lengths"),
-        **picked(comparison, "across_probes", "points"),
-        "not_converged": comparison.failed,
-    }
-    for key, values in (("rms", comparison.rms), ("maximum", comparison.maximum)):
-        quantiles = np.quantile(values, QUANTILES) if len(values) else ()
-        data[key] = {
-            "quantiles": {str(q): value for q, value in zip(QUANTILES, quantiles, strict=False)},
-            "values": values,
-        }
-        value = comparison.published.get(key)
-        if value is not None:
-            data[key] |= {"published": value, "share_below_published": share_below(values, value)}
-    if comparison.of_truth:
-        data["against_truth"] = {
-            name: {**vars(one), "unit": "m"} for name, one in comparison.of_truth.items()
-        }
-    return dict(as_data(data))

@@ -84,10 +84,55 @@ class LengthFit(FitResult):
         return f"{self.solution.estimator}, {_status(self)}, {rank}"
 
     def lines(self) -> list[str]:
-        return _lines(self)
+        """Solved length equations as lines of text."""
+        found = self.solution
+        rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
+                f" {rank}; {freedom_words(found.degrees_of_freedom)}"
+            ),
+            f"{_status(self)} after {found.iterations} iterations",
+            "",
+        ]
+        rows = [
+            ["factor of the metric", *FACTORS],
+            ["1e-6", *(number(1e6 * value) for value in self.factors)],
+        ]
+        lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(self.adjustments)]
+        where = [
+            f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm"
+            for name, centre in self.pivots
+        ]
+        lines += [f"pivots: {'; '.join(where)}, in scale readings"] if where else []
+        radii = [f"{name} {_millimetres(radius, 5)} mm" for name, radius in self.spheres]
+        lines += (
+            [f"radii of the spheres through the readings: {'; '.join(radii)}, in scale readings"]
+            if radii
+            else []
+        )
+        return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in self.lengths]
 
     def to_dict(self) -> dict[str, Any]:
-        return _data(self)
+        """Solved length equations as plain data in metres and radians; what is open is None."""
+        found = self.solution
+        data: dict[str, Any] = as_data(
+            {
+                "experiment": self.label,
+                "title": self.title,
+                **picked(found, "estimator", "equations", "degrees_of_freedom"),
+                "status": _status(self),
+                "rank_deficiency": found.deficiency,
+                "factors": dict(zip(FACTORS, self.factors, strict=True)),
+                "adjustments": adjustment_data(self.adjustments),
+                "pivots": dict(self.pivots),
+                "spheres": dict(self.spheres),
+                "lengths": dict(self.lengths),
+                **self.said(),
+            }
+        )
+        return data
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each adjustment of the machine."""
@@ -225,62 +270,9 @@ def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
             yield design.positions.names[k], fit_sphere(points, design.positions.origins[k])[1]
 
 
-def _lines(fit: LengthFit) -> list[str]:
-    """Solved length equations as lines of text."""
-    found = fit.solution
-    rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
-    lines = [
-        f"{fit.label}: {fit.title}",
-        (
-            f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
-            f" {rank}; {freedom_words(found.degrees_of_freedom)}"
-        ),
-        f"{_status(fit)} after {found.iterations} iterations",
-        "",
-    ]
-    rows = [
-        ["factor of the metric", *FACTORS],
-        ["1e-6", *(number(1e6 * value) for value in fit.factors)],
-    ]
-    lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(fit.adjustments)]
-    where = [
-        f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm"
-        for name, centre in fit.pivots
-    ]
-    lines += [f"pivots: {'; '.join(where)}, in scale readings"] if where else []
-    radii = [f"{name} {_millimetres(radius, 5)} mm" for name, radius in fit.spheres]
-    lines += (
-        [f"radii of the spheres through the readings: {'; '.join(radii)}, in scale readings"]
-        if radii
-        else []
-    )
-    return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
-
-
 def _status(fit: LengthFit) -> str:
     return "converged" if fit.solution.converged else "not converged"
 
 
 def _millimetres(value: float, decimals: int) -> str:
     return "-" if np.isnan(value) else f"{1e3 * value:.{decimals}f}"
-
-
-def _data(fit: LengthFit) -> dict[str, Any]:
-    """Solved length equations as plain data in metres and radians; what is open is None."""
-    found = fit.solution
-    data: dict[str, Any] = as_data(
-        {
-            "experiment": fit.label,
-            "title": fit.title,
-            **picked(found, "estimator", "equations", "degrees_of_freedom"),
-            "status": _status(fit),
-            "rank_deficiency": found.deficiency,
-            "factors": dict(zip(FACTORS, fit.factors, strict=True)),
-            "adjustments": adjustment_data(fit.adjustments),
-            "pivots": dict(fit.pivots),
-            "spheres": dict(fit.spheres),
-            "lengths": dict(fit.lengths),
-            **fit.said(),
-        }
-    )
-    return data

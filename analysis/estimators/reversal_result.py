@@ -127,10 +127,86 @@ class ReversalFit(FitResult):
         return f"reversal, {', '.join(values)}"
 
     def lines(self) -> list[str]:
-        return _lines(self)
+        """The reversal as lines of text: parameters and co-ordinates, those of multiple redundancy
+        beside them.
+        """
+        found, full = self.found, self.full
+        turn = number(float(np.degrees(self.turn)), 8)
+        count = "five parameters" if self.offsets else "three parameters, no offsets"
+        scale = "none (fitted, but not applied)" if self.scale == "none" else self.scale
+        lines = [
+            f"{self.label}: {self.title}",
+            f"reversal, {count}, scale difference: {scale}",
+            (
+                f'{len(self.both)} balls; "{self.second}" is turned by {turn} degrees, clockwise,'
+                f' from "{self.first}"'
+            ),
+            (
+                f"sigma = {number(1e6 * found.sigma)} µm with {found.degrees_of_freedom} degrees of"
+                " freedom, of the difference of two readings; of a single one"
+                f" {number(1e6 * found.single)} µm"
+            ),
+            (
+                "what the first-order equations neglect changes no result by more than"
+                f" {number(found.bias, 2)} standard uncertainties"
+            ),
+            (
+                f"multiple redundancy: {full.solution.status}; sigma = {number(full.sigma)} times"
+                " the stated uncertainties"
+                f" ({'estimated from the residuals' if full.sigma_is_estimated else 'as given'})"
+            ),
+            "",
+        ]
+        redundant = {e.name: e for e in self.redundant}
+        rows = [["parameter", "reversal", "u", "multiple redundancy", "its u", "unit"]]
+        for one in self.estimates:
+            other, own = redundant.get(one.name), 1e6 * one.standard_uncertainty
+            u = np.nan if other is None else 1e6 * other.standard_uncertainty
+            beside = (
+                ["-", "-"]
+                if other is None
+                else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
+            )
+            value = to_uncertainty(1e6 * one.value, own)
+            rows.append([one.name, value, number(own, 3), *beside, SHOWN[one.unit]])
+        lines += aligned(rows, [False, True, True, True, True, False])
+        return [*lines, "", *_ball_lines(self)]
 
     def to_dict(self) -> dict[str, Any]:
-        return _data(self)
+        """The reversal as plain data in metres and radians; `multiple_redundancy` has the full
+        fit.
+        """
+        found = self.found
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "estimator": "reversal",
+            **picked(self, "scale", "offsets"),
+            "positions": picked(self, "first", "second"),
+            "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
+            "degrees_of_freedom": found.degrees_of_freedom,
+            "neglected_standard_uncertainties": found.bias,
+            "neglected_coordinates": self.distortion,
+            "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
+            "estimates": {
+                e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
+                for e in self.estimates
+            },
+            "axes": {
+                "origin": self.names[self.axes.origin],
+                "xy"[self.axes.axis]: self.names[self.axes.ball],
+            },
+            "balls": _by_ball(self.names, self.coordinates),
+            "residuals": _by_ball(self.names_of_both, found.residuals),
+            "multiple_redundancy": {
+                "relation": {
+                    e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
+                    for e in self.redundant
+                },
+                **self.full.to_dict(),
+            },
+            **self.said(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter, that of multiple redundancy beside it."""
@@ -197,51 +273,6 @@ class ReversalFit(FitResult):
         return tuple(told)
 
 
-def _lines(fit: ReversalFit) -> list[str]:
-    """A reversal as lines of text: parameters and co-ordinates, those of multiple redundancy beside
-    them.
-    """
-    found, full = fit.found, fit.full
-    turn = number(float(np.degrees(fit.turn)), 8)
-    count = "five parameters" if fit.offsets else "three parameters, no offsets"
-    scale = "none (fitted, but not applied)" if fit.scale == "none" else fit.scale
-    lines = [
-        f"{fit.label}: {fit.title}",
-        f"reversal, {count}, scale difference: {scale}",
-        (
-            f'{len(fit.both)} balls; "{fit.second}" is turned by {turn} degrees, clockwise, from'
-            f' "{fit.first}"'
-        ),
-        (
-            f"sigma = {number(1e6 * found.sigma)} µm with {found.degrees_of_freedom} degrees of"
-            " freedom, of the difference of two readings; of a single one"
-            f" {number(1e6 * found.single)} µm"
-        ),
-        (
-            "what the first-order equations neglect changes no result by more than"
-            f" {number(found.bias, 2)} standard uncertainties"
-        ),
-        (
-            f"multiple redundancy: {full.solution.status}; sigma = {number(full.sigma)} times the"
-            " stated uncertainties"
-            f" ({'estimated from the residuals' if full.sigma_is_estimated else 'as given'})"
-        ),
-        "",
-    ]
-    redundant = {e.name: e for e in fit.redundant}
-    rows = [["parameter", "reversal", "u", "multiple redundancy", "its u", "unit"]]
-    for one in fit.estimates:
-        other, own = redundant.get(one.name), 1e6 * one.standard_uncertainty
-        u = np.nan if other is None else 1e6 * other.standard_uncertainty
-        beside = (
-            ["-", "-"] if other is None else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
-        )
-        value = to_uncertainty(1e6 * one.value, own)
-        rows.append([one.name, value, number(own, 3), *beside, SHOWN[one.unit]])
-    lines += aligned(rows, [False, True, True, True, True, False])
-    return [*lines, "", *_ball_lines(fit)]
-
-
 def _ball_lines(fit: ReversalFit) -> list[str]:
     rows = [
         [
@@ -273,41 +304,6 @@ def _ball_lines(fit: ReversalFit) -> list[str]:
         if len(rows) - 1 > MOST_BALLS
         else []
     )
-
-
-def _data(fit: ReversalFit) -> dict[str, Any]:
-    """A reversal as plain data in metres and radians; `multiple_redundancy` has the full fit."""
-    found = fit.found
-    return {
-        "experiment": fit.label,
-        "title": fit.title,
-        "estimator": "reversal",
-        **picked(fit, "scale", "offsets"),
-        "positions": picked(fit, "first", "second"),
-        "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "neglected_standard_uncertainties": found.bias,
-        "neglected_coordinates": fit.distortion,
-        "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
-        "estimates": {
-            e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
-            for e in fit.estimates
-        },
-        "axes": {
-            "origin": fit.names[fit.axes.origin],
-            "xy"[fit.axes.axis]: fit.names[fit.axes.ball],
-        },
-        "balls": _by_ball(fit.names, fit.coordinates),
-        "residuals": _by_ball(fit.names_of_both, found.residuals),
-        "multiple_redundancy": {
-            "relation": {
-                e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
-                for e in fit.redundant
-            },
-            **fit.full.to_dict(),
-        },
-        **fit.said(),
-    }
 
 
 def _by_ball(names: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:

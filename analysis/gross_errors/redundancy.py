@@ -138,7 +138,7 @@ def reliability_of(
     tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
     across = effects.pop(ACROSS).change if mixed is not None else np.zeros(len(given))
     limit = 0.5 * FAMILY / max(tests, 1)
-    freedom = design.observation_count - design.parameter_count + at.deficiency
+    freedom = at.degrees_of_freedom
     return Reliability(
         experiment.label if experiment else "",
         experiment.title if experiment else "",

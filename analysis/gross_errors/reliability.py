@@ -18,7 +18,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..presentation.formatting import SHOWN, aligned, ascii_units, finite, number
+from ..presentation.formatting import SHOWN, aligned, ascii_units, finite, number, picked
 from ..presentation.panels import RowOfPoints, draw_rows
 from ..presentation.result import Result
 from ..rank.proposed_bars import listed
@@ -478,10 +478,7 @@ def _data(result: Reliability) -> dict[str, Any]:
         "parameters": result.design.parameter_count,
         "observations": result.design.observation_count,
         "rank_deficiency": result.deficiency,
-        "degrees_of_freedom": result.degrees_of_freedom,
-        "sigma_is_estimated": result.sigma_is_estimated,
-        "false_alarm": result.false_alarm,
-        "power": result.power,
+        **picked(result, "degrees_of_freedom", "sigma_is_estimated", "false_alarm", "power"),
         "noncentrality": finite(result.noncentrality),
         "fit_noncentrality": finite(result.fit_noncentrality),
         "redundancy": float(result.redundancy.sum()) + result.among_repeats,

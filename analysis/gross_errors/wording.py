@@ -15,7 +15,7 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 
-from ..presentation.formatting import SHOWN, number
+from ..presentation.formatting import SHOWN, number, picked
 from ..rank.proposed_bars import listed
 from .cause_search import MOST
 from .names import common_ball, length_name, name, reading_name
@@ -317,11 +317,7 @@ def _suspect_data(suspect: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
     return {
         "name": name(given, suspect.pattern),
         "kind": str(given.kind[suspect.pattern]),
-        "value": suspect.value,
-        "standard_uncertainty": suspect.standard_uncertainty,
-        "unit": suspect.unit,
-        "statistic": suspect.statistic,
-        "limit": suspect.limit,
+        **picked(suspect, "value", "standard_uncertainty", "unit", "statistic", "limit"),
         "lines": [marks[i].line for i in _touched(suspect)] if marks else [],
         "directions": [
             {

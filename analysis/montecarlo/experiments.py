@@ -23,8 +23,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.joined import JoinedModel
-from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import NoReadingError, on_true_machine
+from ballplate.simulator.readings.generate import NoReadingError
+from ballplate.simulator.readings.simulated import on_stated_machine
 
 from .accumulator import Accumulator
 from .figures import MonteCarloOutcome, outcome, power_of_difference, power_of_misfit
@@ -71,10 +71,7 @@ class Trials:
 def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
     """The design, and the artefacts as drawn on the true machine."""
     design = lay_out(experiment)
-    lower, upper = design.machine.volume.corners
-    on_truth, state = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
-    )
+    on_truth, state = on_stated_machine(experiment, design)
     return design, Truth(state, on_truth.model)
 
 

@@ -123,8 +123,7 @@ class Reference:
 
     @property
     def degrees_of_freedom(self) -> int:
-        known = self.design.parameter_count - self.spectrum.deficiency
-        return self.design.observation_count - known
+        return self.linearisation.degrees_of_freedom
 
 
 # In one piece: everything that replicates share is made at one reference, each part from those

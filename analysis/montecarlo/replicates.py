@@ -21,6 +21,7 @@ from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.substitution import solve_balls, solve_kept, solve_shared
+from ballplate.simulator.geometry.motions import cross_matrices
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .expansion import Single
@@ -283,7 +284,6 @@ def _turn_less_one(turn: Array) -> Array:
     """Rotation matrices (b, d, d) of rotation vectors (b, r), less the unit matrix, to full
     relative accuracy.
     """
-    b = len(turn)
     if turn.shape[1] == 1:
         s, half = np.sin(turn[:, 0]), np.sin(0.5 * turn[:, 0])
         less = -2.0 * half**2
@@ -294,10 +294,7 @@ def _turn_less_one(turn: Array) -> Array:
         np.sinc(angle / np.pi)[:, None, None],
         (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None],
     )
-    cross = np.zeros((b, 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2] = -turn[:, 2], turn[:, 1]
-    cross[:, 1, 0], cross[:, 1, 2] = turn[:, 2], -turn[:, 0]
-    cross[:, 2, 0], cross[:, 2, 1] = -turn[:, 1], turn[:, 0]
+    cross = cross_matrices(-turn)
     return np.asarray(first * cross + second * (cross @ cross))
 
 

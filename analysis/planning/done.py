@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.arrays import Readings
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
 from ballplate.simulator.experiment.pool import with_chosen
@@ -101,9 +101,7 @@ def done_candidates(
         own = _meant(as_read.name, planned)
         candidate = renamed(candidates[base], own)
         item = _position(candidate)
-        own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
-        first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
-        taken = tuple(reading_groups(own_readings, first, design.probes.names, experiment, item))
+        taken = groups_taken(design, number, experiment, item)
         result.append(_set_up(experiment, candidate, base, taken, as_read.name == name))
     return tuple(result)
 
@@ -158,12 +156,15 @@ def _position(candidate: Candidate) -> Position:
     return candidate.item
 
 
-def reading_groups(
-    own: Readings, first: int, probes: Sequence[str], experiment: Experiment, item: Position
-) -> Iterator[ReadingGroup]:
-    """Readings as groups, of those of equal uncertainty and repeats; balls are counted from `first`
-    on.
+def groups_taken(
+    design: Design, place: int, experiment: Experiment, item: Position
+) -> tuple[ReadingGroup, ...]:
+    """Readings in a position, by its `place` in a design, as groups of those of equal uncertainty
+    and repeats.
     """
+    own = design.readings.select(np.flatnonzero(design.readings.position == place))
+    first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
+    probes, groups = design.probes.names, []
     names = experiment.layouts[item.artefact].names
     by_probe: dict[tuple[str, tuple[float, ...] | None], dict[int, int]] = {}
     for i in range(len(own)):
@@ -180,13 +181,16 @@ def reading_groups(
         uncertainty = None if stated is None else np.array(stated)
         if stated == tuple(experiment.machine.repeatability.tolist()):
             uncertainty = None
-        yield ReadingGroup(
-            tuple(with_probes),
-            tuple(names[k] for k in read_so),
-            np.array(read_so),
-            repeats,
-            uncertainty,
+        groups.append(
+            ReadingGroup(
+                tuple(with_probes),
+                tuple(names[k] for k in read_so),
+                np.array(read_so),
+                repeats,
+                uncertainty,
+            )
         )
+    return tuple(groups)
 
 
 def _set_up(

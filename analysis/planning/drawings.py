@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.geometry.positions import AXIS_INDEX, ball_coordinates
-from ballplate.simulator.inputs.messages import in_one_line
+
+from ..presentation.paper import escaped
 
 SIZE, MARGIN = 170.0, 22.0
 # A name longer than this is told by a number instead.
@@ -97,8 +96,3 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         f' fill="#555">{seen}</text></svg>'
     )
     return "".join(parts)
-
-
-def escaped(text: str) -> str:
-    """A text within a page, in one line."""
-    return escape(in_one_line(text))

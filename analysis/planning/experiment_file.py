@@ -24,6 +24,7 @@ from ballplate.simulator.inputs.yamltree import (
     parse_tree,
     read_text,
     resolve_scalar,
+    to_list,
     to_python,
 )
 from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
@@ -101,13 +102,6 @@ def experiment_text(
             if not parts:
                 raise
     return written.rstrip("\n") + "\n"
-
-
-def to_list(value: Any) -> Any:
-    """The same with lists for tuples, as plain data has them."""
-    if isinstance(value, Mapping):
-        return {key: to_list(item) for key, item in value.items()}
-    return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def _source(experiment: Experiment) -> tuple[str, Node, Node]:

@@ -27,7 +27,7 @@ from ..results.fit import Fit
 from ..results.study import PlannedUncertainty
 from ..results.study import fit as fit_observed
 from ..uncertainty.summaries import uncertainties
-from .done import reading_groups
+from .done import groups_taken
 from .next_result import NextStep, Offered
 from .requirements.goals import Goal, check_goal, judge
 
@@ -187,9 +187,7 @@ def _names_in_order(observed: ObservedReadings, sources: Sequence[Source]) -> li
 def _read(experiment: Experiment, observed: ObservedReadings) -> Iterator[ReadPosition]:
     design = observed.design
     for k, position in enumerate(experiment.positions):
-        own = design.readings.select(np.flatnonzero(design.readings.position == k))
-        first = int(design.balls.of(design.artefacts.names.index(position.artefact))[0])
-        taken = tuple(reading_groups(own, first, design.probes.names, experiment, position))
+        taken = groups_taken(design, k, experiment, position)
         yield ReadPosition(replace(position, readings=taken), position)
 
 

@@ -154,6 +154,16 @@ class Losses:
         self._problem = problem
         self.by_pivots = by_pivots
         self._known: dict[frozenset[int], float] = {}
+        self._sieved: dict[frozenset[int], tuple[Integers, Array]] = {}
+
+    def sieved(self, members: frozenset[int], added: Integers) -> tuple[Integers, Array]:
+        """Candidates that may be the best to add to a selection, and the tangent with each."""
+        found = self._sieved.get(members)
+        if found is None:
+            information = self._problem.information.of(members)
+            found = _sieve(self._problem, information, added, self.by_pivots)
+            self._sieved[members] = found
+        return found
 
     def of(self, members: frozenset[int]) -> float:
         found = self._known.get(members)
@@ -258,7 +268,7 @@ def best_addition(
     seconds = np.maximum(problem.constraints.seconds, 1.0)
     framed = np.isin(added, list(problem.information.frames.fixed))
     if len(added) > SMALL_POOL and not framed.any():
-        added, left = _sieve(problem, problem.information.of(members), added, losses.by_pivots)
+        added, left = losses.sieved(members, added)
         if per_second:
             left = (left - left.max()) / seconds[added]
         added = added[np.argsort(comparable(left), kind="stable")[:SIEVED]]

@@ -105,10 +105,79 @@ class Campaign(Selection, Result):
         return f"{count}, {self.criterion} {value}"
 
     def lines(self) -> list[str]:
-        return _lines(self)
+        """The choice beside its bound, gains, the curve, U1 to U6 and the run sheet, as lines of
+        text.
+        """
+        lines = [
+            f"{self.prediction.label}: {self.prediction.title}",
+            (f"{len(self.pool.candidates)} candidates{_dropped(self)}; no more than {self.budget}"),
+            f"{self.criterion}: {DESCRIPTIONS[self.criterion]}",
+            "",
+            *_comparison(self),
+        ]
+        if not self.is_determined:
+            lines.append(
+                "no choice was found that determines everything; what the nearest one leaves"
+                " undetermined follows"
+            )
+        elif math.isnan(self.bound):
+            lines.append(f"there is no bound of {self.criterion}")
+        else:
+            lines.append(
+                "no choice within the limits is better by more than"
+                f" {100 * (1.0 - self.efficiency):.1f} %"
+            )
+        if self.excluded:
+            lines.append(
+                f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
+                " determines"
+            )
+        if self.gap is not None:
+            lines += [self.gap.words, self.gap.remedy]
+        lines += _interrupted(self)
+        if self.gains:
+            lines += ["", *_gain_table(self)]
+        if self.curve:
+            lines += ["", *_curve_table(self)]
+        if self.orders:
+            lines += ["", *_order_table(self)]
+        return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
     def to_dict(self) -> dict[str, Any]:
-        return _data(self)
+        """The campaign as data for JSON, in metres and seconds."""
+        return {
+            "experiment": self.prediction.label,
+            "candidates": len(self.pool.candidates),
+            "dropped": dict(self.pool.dropped),
+            "criterion": self.criterion,
+            "unit": self.unit,
+            "budget": asdict(self.budget),
+            "value": finite(self.value),
+            "bound": finite(self.bound),
+            "drawn": None if self.drawn is None else finite(self.drawn),
+            "drawn_spent": None if self.drawn_spent is None else asdict(self.drawn_spent),
+            "target": self.target,
+            "excluded": self.excluded,
+            "spent": asdict(self.spent),
+            "chosen": [candidate.name for candidate in self.chosen],
+            "names": dict(self.names),
+            "done": [candidate.name for candidate in self.done],
+            "interrupted": [
+                {"name": one.name, "readings": one.readings} for one in self.interrupted
+            ],
+            "completed": None if self.completed is None else self.completed.whole.name,
+            "left_open": self.left_open,
+            "whole_pool": None if self.gap is None else self.gap.to_dict(),
+            "ignored": [candidate.name for candidate in self.ignored],
+            "gains": [_gain_data(gain) for gain in self.gains],
+            "left_out": [_gain_data(gain) for gain in self.left_out],
+            "curve": [_point_data(point) for point in self.curve],
+            "order": asdict(self.order),
+            "drift": asdict(self.drift),
+            "orders": [_order_data(one) for one in self.orders],
+            "run_sheet": sheet_data(self.sheet),
+            "plan": self.prediction.to_dict(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each step of the run sheet, times in seconds."""
@@ -124,47 +193,6 @@ class Campaign(Selection, Result):
         :raises ValueError: the path ends in something else.
         """
         return draw_campaign(self, path)
-
-
-def _lines(campaign: Campaign) -> list[str]:
-    """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the
-    run sheet.
-    """
-    lines = [
-        f"{campaign.prediction.label}: {campaign.prediction.title}",
-        (
-            f"{len(campaign.pool.candidates)} candidates{_dropped(campaign)};"
-            f" no more than {campaign.budget}"
-        ),
-        f"{campaign.criterion}: {DESCRIPTIONS[campaign.criterion]}",
-        "",
-        *_comparison(campaign),
-    ]
-    if not campaign.is_determined:
-        lines.append(
-            "no choice was found that determines everything; what the nearest one leaves"
-            " undetermined follows"
-        )
-    elif math.isnan(campaign.bound):
-        lines.append(f"there is no bound of {campaign.criterion}")
-    else:
-        lines.append(
-            "no choice within the limits is better by more than"
-            f" {100 * (1.0 - campaign.efficiency):.1f} %"
-        )
-    if campaign.excluded:
-        lines.append(
-            f"left out of {campaign.criterion}: {campaign.excluded} that no choice from this pool"
-            " determines"
-        )
-    lines += _interrupted(campaign)
-    if campaign.gains:
-        lines += ["", *_gain_table(campaign)]
-    if campaign.curve:
-        lines += ["", *_curve_table(campaign)]
-    if campaign.orders:
-        lines += ["", *_order_table(campaign)]
-    return [*lines, "", *campaign.prediction.lines()[1:], "", *sheet_lines(campaign.sheet)]
 
 
 def _order_table(campaign: Campaign) -> list[str]:
@@ -315,42 +343,6 @@ def _curve_table(campaign: Campaign) -> list[str]:
             [str(point.budget), *_value(campaign, point.value), bound, *_spent(point.spent)]
         )
     return aligned(rows, [False, True, False, True, True, True, True])
-
-
-def _data(campaign: Campaign) -> dict[str, Any]:
-    """A campaign as data for JSON, in metres and seconds."""
-    return {
-        "experiment": campaign.prediction.label,
-        "candidates": len(campaign.pool.candidates),
-        "dropped": dict(campaign.pool.dropped),
-        "criterion": campaign.criterion,
-        "unit": campaign.unit,
-        "budget": asdict(campaign.budget),
-        "value": finite(campaign.value),
-        "bound": finite(campaign.bound),
-        "drawn": None if campaign.drawn is None else finite(campaign.drawn),
-        "drawn_spent": None if campaign.drawn_spent is None else asdict(campaign.drawn_spent),
-        "target": campaign.target,
-        "excluded": campaign.excluded,
-        "spent": asdict(campaign.spent),
-        "chosen": [candidate.name for candidate in campaign.chosen],
-        "names": dict(campaign.names),
-        "done": [candidate.name for candidate in campaign.done],
-        "interrupted": [
-            {"name": one.name, "readings": one.readings} for one in campaign.interrupted
-        ],
-        "completed": None if campaign.completed is None else campaign.completed.whole.name,
-        "left_open": campaign.left_open,
-        "ignored": [candidate.name for candidate in campaign.ignored],
-        "gains": [_gain_data(gain) for gain in campaign.gains],
-        "left_out": [_gain_data(gain) for gain in campaign.left_out],
-        "curve": [_point_data(point) for point in campaign.curve],
-        "order": asdict(campaign.order),
-        "drift": asdict(campaign.drift),
-        "orders": [_order_data(one) for one in campaign.orders],
-        "run_sheet": sheet_data(campaign.sheet),
-        "plan": campaign.prediction.to_dict(),
-    }
 
 
 def _gain_data(gain: Gain) -> dict[str, Any]:

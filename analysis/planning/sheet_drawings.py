@@ -11,9 +11,10 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.machines.protocol import Array
 
+from ..presentation.paper import escaped, on_paper, pitch
 from ..presentation.scene import Box, DrawnPosition, scene
 from ..presentation.svg import SERIES
-from .drawings import LONGEST_NAME, escaped
+from .drawings import LONGEST_NAME
 
 # Sizes in the drawings' own units, of which a page has about 700 from side to side.
 PLATE, VOLUME, MARGIN = 340.0, 660.0, 34.0
@@ -37,26 +38,21 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
     lower, size = points.min(axis=0), np.ptp(points, axis=0)
     across = float(size.max())
     # Of many balls, more room.
-    wanted = ROOM * (across / _pitch(points) + 1.0) if across else PLATE
+    wanted = ROOM * (across / pitch(points) + 1.0) if across else PLATE
     scale = (min(max(PLATE, wanted), LARGEST) - 2 * MARGIN) / (across or 1.0)
     width, height = scale * size + 2 * MARGIN
-    drawn = np.column_stack(
-        [
-            MARGIN + scale * (points[:, 0] - lower[0]),
-            height - MARGIN - scale * (points[:, 1] - lower[1]),
-        ]
-    )
-    pitch = _pitch(drawn) if across else PLATE
+    drawn = on_paper(points, lower, scale, MARGIN, height)
+    least = pitch(drawn) if across else PLATE
     is_long = max(map(len, layout.names)) > LONGEST_NAME
     names = [str(k) for k in range(1, len(points) + 1)] if is_long else layout.names
     longest = max(map(len, names))
-    letter = min(11.0, 1.5 * pitch / max(longest, 2))
+    letter = min(11.0, 1.5 * least / max(longest, 2))
     named = set(range(len(points)))
     if letter < 5.5:
         letter, named = 9.0, {*map(int, layout.corner_set or ()), int(order[0]) if order else 0}
-    radius = min(4.0, 0.2 * pitch)
+    radius = min(4.0, 0.2 * least)
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in drawn[list(order)])
-    edge = min(0.62 * MARGIN, 0.6 * pitch)
+    edge = min(0.62 * MARGIN, 0.6 * least)
     parts = [
         f'<svg class="artefact" viewBox="0 0 {width:.0f} {height + 16:.0f}"'
         f' style="width:{width:.0f}px" role="img" aria-label="{escaped(name)}: its balls and the'
@@ -82,14 +78,6 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
     return "".join([*parts, "</svg>"])
 
 
-def _pitch(points: Array) -> float:
-    """The least distance between points, of the first few hundred."""
-    some = points[:400]
-    apart = np.linalg.norm(some[:, None] - some[None], axis=2)
-    apart = apart[apart > 1e-9]
-    return float(apart.min()) if len(apart) else 1.0
-
-
 def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
     """The machine's volume with all positions in it, seen from the front and above.
 
@@ -103,8 +91,7 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
     width, height = scale * size + 2 * MARGIN
 
     def at(points: Array) -> Array:
-        moved = scale * (points - lower)
-        return np.column_stack([MARGIN + moved[:, 0], height - MARGIN - moved[:, 1]])
+        return on_paper(points, lower, scale, MARGIN, height)
 
     parts = [
         f'<svg class="volume" viewBox="0 0 {width:.0f} {height:.0f}"'

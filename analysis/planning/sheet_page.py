@@ -9,7 +9,8 @@ from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 
-from .drawings import LONGEST_NAME, escaped, place_drawing
+from ..presentation.paper import escaped
+from .drawings import LONGEST_NAME, place_drawing
 from .reading_lists import sequence
 from .schedule import RunSheet, Step
 from .sheet_drawings import artefact_drawing, volume_drawing
@@ -69,6 +70,7 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
 @media (max-width: 40em) { .words { display: block; } }
 @media print {
   body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
+  td { overflow-wrap: anywhere; }
   .fields { grid-template-columns: repeat(3, 1fr); }
   .step .fields { grid-template-columns: 1fr 1fr 1fr 2fr; }
   .wide { overflow: visible; }
@@ -153,7 +155,9 @@ def _order(sheet: RunSheet) -> str:
 
 def _table(heads: list[str], rows: list[str], numbers: set[int]) -> str:
     cells = [
-        f'<th class="number">{head}</th>' if k in numbers else f"<th>{head}</th>"
+        f'<th scope="col" class="number">{head}</th>'
+        if k in numbers
+        else f'<th scope="col">{head}</th>'
         for k, head in enumerate(heads)
     ]
     return f'<div class="wide"><table><tr>{"".join(cells)}</tr>{"".join(rows)}</table></div>'

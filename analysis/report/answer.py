@@ -4,14 +4,16 @@ what each axis changes while the others stay.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.inputs.settings import listing
 from numpy.typing import NDArray
 
 from ..presentation.formatting import number, percent
 from ..presentation.table import Block, Entry, Row, Table
+from .axis_worth import SAME, AxisWorth, axis_worths
+from .measures import column_unit
 from .results import Integers, ReportedSweep, criterion, partly_open
 
 # Settings that the answer lists.
@@ -19,36 +21,20 @@ LISTED = 8
 
 WITHIN = "U6_within_target"
 
-
-@dataclass(frozen=True)
-class AxisWorth:
-    """What an axis changes: the average uncertainty at its last value divided by that at its first,
-    of axes with texts the largest divided by the smallest, in each of `settings` of the other axes;
-    `low` to `high` over these.
-    """
-
-    axis: str
-    ends: tuple[str, str] | None
-    low: float
-    high: float
-    settings: int
-
-    def __str__(self) -> str:
-        low, high = number(self.low, 3), number(self.high, 3)
-        by = low if low == high else f"{low} to {high}"
-        of = "" if self.settings == 1 else f", in {self.settings} settings of the other axes"
-        if self.ends is None:
-            return f"{self.axis}: its values differ by a factor of {by}{of}"
-        return f"{self.axis}: from {self.ends[0]} to {self.ends[1]} it is multiplied by {by}{of}"
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class SweepAnswer:
-    """Sentences, the settings that they are about, and what each axis is worth."""
+    """Sentences, the settings that they are about, and what each axis is worth in the average of
+    the quantity `symbol`; `is_good` unless there is a target that no setting meets.
+    """
 
+    symbol: str
     sentences: tuple[str, ...]
     settings: Table | None
     worth: tuple[AxisWorth, ...]
+    is_good: bool
 
 
 def answer(results: ReportedSweep) -> SweepAnswer | None:
@@ -59,124 +45,185 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
         return None
     column, symbol = judged
     value, observations = results.figure(column)[done], results.figure("observations")[done]
-    partly = partly_open(results, symbol)[done]
-    sentences = []
-    if WITHIN in results.frame and np.isfinite(results.figure(WITHIN)[done]).any():
-        share = results.figure(WITHIN)[done]
-        meets = share == 1.0
-        sentences += _of_target(results, done, meets, share, observations, value)
+    partly = partly_open(results, symbol)[done] | ~np.isfinite(value)
+    share = results.figure(WITHIN)[done]
+    meets = share == 1.0
+    if np.isfinite(share).any():
+        sentences = _of_target(results, done, column, share, observations, value)
         order = np.lexsort((value, observations, ~meets))
         if not meets.any():
             order = np.lexsort((value, -np.nan_to_num(share, nan=-1.0)))
     else:
-        order = np.lexsort((np.nan_to_num(value, nan=math.inf), partly))
-        best = order[0]
-        if np.isfinite(value[best]):
-            told = f"{_words(symbol)} on average {number(1e6 * value[best], 3)} µm"
-            sentences.append(
-                "The sweep states no target uncertainty. The smallest is"
-                f" {_setting(results, done[best])}: {told}."
-            )
-    deficient = results.figure("rank_deficiency")[done] > 0
-    if deficient.any():
-        sentences.append(f"{deficient.sum()} of {len(done)} settings leave something undetermined.")
-    if len(done) < len(results.cells):
-        sentences.append(
-            f"{len(results.cells) - len(done)} of {len(results.cells)} settings are not computed;"
-            " the answer is that of the others."
-        )
+        sentences = _without_target(results, done, column, value, partly)
+        order = np.lexsort((value, partly))
+    sentences += _left_out(results, done)
     return SweepAnswer(
+        _symbol(column),
         tuple(sentences),
         _table(results, done[order[:LISTED]], column, symbol),
-        tuple(_worths(results, column, done[~partly & np.isfinite(value)])),
+        tuple(axis_worths(results, column, done[~partly])),
+        bool(meets.any()) or not np.isfinite(share).any(),
     )
 
 
 def _of_target(
     results: ReportedSweep,
     done: Integers,
-    meets: NDArray[np.bool_],
-    share: NDArray[np.float64],
-    observations: NDArray[np.float64],
-    value: NDArray[np.float64],
+    column: str,
+    share: Floats,
+    observations: Floats,
+    value: Floats,
 ) -> list[str]:
-    if not meets.any():
-        best = np.lexsort((value, -np.nan_to_num(share, nan=-1.0)))[0]
-        return [
-            f"None of the {len(done)} settings meets the target uncertainty with all lengths. The"
-            f" nearest is {_setting(results, done[best])}, with {percent(float(share[best]))} of"
-            " the lengths."
+    """Sentences on settings that have a target, which may be an axis of the sweep."""
+    meets, judged = share == 1.0, int(np.isfinite(share).sum())
+    apart = len(done) - judged
+    if meets.any():
+        told = [
+            f"{meets.sum()} of {_settings(judged)} {_verb(int(meets.sum()), 'meet')} the target"
+            " uncertainty with all lengths.",
+            _cheapest(results, done, column, np.flatnonzero(meets), observations, value),
         ]
-    candidates = np.flatnonzero(meets)
-    best = candidates[np.lexsort((value[candidates], observations[candidates]))[0]]
+    else:
+        best = np.lexsort((value, -np.nan_to_num(share, nan=-1.0)))[0]
+        alike = int((share == share[best]).sum()) - 1
+        tied = f"; {_settings(alike)} more {_verb(alike, 'have')} as many" if alike else ""
+        subject = "The only setting does not meet" if judged == 1 else f"None of the {judged}"
+        subject += "" if judged == 1 else " settings meets"
+        told = [
+            f"{subject} the target uncertainty with all lengths. The"
+            f" nearest is {_setting(results, done[best])}, with {percent(float(share[best]))} of"
+            f" the lengths{tied}."
+        ]
+    if apart:
+        told.append(
+            f"{_settings(apart)} more {_verb(apart, 'have')} no target to be compared with."
+        )
+    return told
+
+
+def _cheapest(
+    results: ReportedSweep,
+    done: Integers,
+    column: str,
+    candidates: Integers,
+    observations: Floats,
+    value: Floats,
+) -> str:
+    """The setting of the fewest observations; of several, that with the smallest average."""
+    known = candidates[np.isfinite(observations[candidates])]
+    if not len(known):
+        return "How many observations they take is not recorded."
+    fewest = known[observations[known] == observations[known].min()]
+    best = fewest[np.argmin(value[fewest])]
+    name, count = _setting(results, done[best]), f"{observations[best]:.0f} observations"
+    if len(fewest) == 1:
+        return f"The one with the fewest observations is {name}: {count}."
+    same = int((value[fewest] <= value[best] * (1.0 + SAME)).sum()) - 1
+    tied = f", as {_verb(same, 'have')} {same} more" if same else ""
+    return (
+        f"The fewest observations are {observations[best]:.0f}, in {len(fewest)} of these settings."
+        f" Of them {name} has the smallest average of {_quantity(results, column, value[best])}"
+        f"{tied}."
+    )
+
+
+def _without_target(
+    results: ReportedSweep, done: Integers, column: str, value: Floats, partly: NDArray[np.bool_]
+) -> list[str]:
+    """Sentences where nothing was compared with a target."""
+    if WITHIN.partition("_")[0] in results.definition["record"]:
+        told = "No setting has a target uncertainty that its lengths are compared with."
+    else:
+        told = "U6 is not recorded, so that no setting is compared with a target uncertainty."
+    if partly.all():
+        return [told, f"In every setting some of {_symbol(column)} is undetermined."]
+    known = np.flatnonzero(~partly)
+    best = known[np.argmin(value[known])]
+    alike = int((value[known] <= value[best] * (1.0 + SAME)).sum()) - 1
+    tied = f"; {_settings(alike)} more {_verb(alike, 'have')} the same" if alike else ""
     return [
-        f"{meets.sum()} of {len(done)} settings meet the target uncertainty with all lengths.",
-        f"The one with the fewest observations is {_setting(results, done[best])}:"
-        f" {observations[best]:.0f} observations.",
+        f"{told} The smallest average of {_quantity(results, column, value[best])}, is that of"
+        f" {_setting(results, done[best])}{tied}."
     ]
+
+
+def _left_out(results: ReportedSweep, done: Integers) -> list[str]:
+    """Sentences on settings that leave something open, and on those without figures."""
+    told = []
+    deficient = int((results.figure("rank_deficiency")[done] > 0).sum())
+    if deficient:
+        verb = _verb(deficient, "leave")
+        told.append(f"{deficient} of {_settings(len(done))} {verb} something undetermined.")
+    missing = (
+        (results.count("failed"), "failed"),
+        (results.left, "not computed yet"),
+        (len(results.found.unreadable), "not readable"),
+    )
+    parts = [f"{count} {words}" for count, words in missing if count]
+    if parts:
+        told.append(
+            f"Of {_settings(len(results.cells))}, {listing(parts)}; the answer is that of the"
+            " others."
+        )
+    return told
+
+
+def _settings(count: int) -> str:
+    return f"{count} setting" if count == 1 else f"{count} settings"
+
+
+def _verb(count: int, verb: str) -> str:
+    """A verb of so many settings.
+
+    >>> _verb(1, "have"), _verb(2, "have"), _verb(1, "meet")
+    ('has', 'have', 'meets')
+    """
+    return verb if count != 1 else "has" if verb == "have" else f"{verb}s"
 
 
 def _setting(results: ReportedSweep, row: int) -> str:
     return results.label(int(results.frame["cell"].to_numpy()[row]))
 
 
-def _words(symbol: str) -> str:
-    return symbol.replace("_", " ")
+def _symbol(column: str) -> str:
+    return column.partition("_average_")[0].replace("_", " ")
+
+
+def _quantity(results: ReportedSweep, column: str, value: float) -> str:
+    """A quantity with its average."""
+    return f"{_symbol(column)}, {number(1e6 * value, 3)} {column_unit(column)}"
 
 
 def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> Table:
     cells = results.frame["cell"].to_numpy()
     of_largest = column.replace("_average_", "_maximum_")
-    columns = [
-        ("observations", "observations", 1.0),
-        (f"{_words(symbol)} average, µm", column, 1e6),
-    ]
+    unit, words = column_unit(column), _symbol(column)
+    columns = [("observations", "observations", 1.0), (f"{words} average, {unit}", column, 1e6)]
     if of_largest in results.frame:
-        columns.append((f"{_words(symbol)} maximum, µm", of_largest, 1e6))
+        columns.append((f"{words} maximum, {unit}", of_largest, 1e6))
     if WITHIN in results.frame:
         columns.append(("lengths within target", WITHIN, 100.0))
+    starred = partly_open(results, symbol)
     found = []
     for row in rows.tolist():
         entries = []
         for _, name, factor in columns:
             value = results.value(name, row)
-            text = percent(value) if name == WITHIN else number(factor * value, 4)
+            text = number(factor * value, 4) + ("*" if starred[row] and factor == 1e6 else "")
+            if name == WITHIN:
+                text = "-" if np.isnan(value) else percent(value)
             if name == "observations":
-                text = f"{value:.0f}"
+                text = "-" if np.isnan(value) else f"{value:.0f}"
             entries.append(Entry(text, value, int(cells[row]), name))
         labels = [axis.labels[k] for axis, k in zip(results.axes, results.chosen[row], strict=True)]
         found.append(Row(tuple(labels), tuple(entries)))
     headings = tuple(axis.name for axis in results.axes)
     told = tuple(name for name, _, _ in columns)
-    return Table(
-        "answer", "The settings that come first", headings, told, (Block("", tuple(found)),)
-    )
-
-
-def _worths(results: ReportedSweep, column: str, rows: Integers) -> list[AxisWorth]:
-    value = results.figure(column)[rows]
-    found = []
-    for k, axis in enumerate(results.axes):
-        others = [i for i in range(len(results.axes)) if i != k]
-        _, group = np.unique(results.chosen[rows][:, others], axis=0, return_inverse=True)
-        group, place = group.ravel(), results.chosen[rows, k]
-        if axis.numbers:
-            place = np.argsort(np.argsort(np.array(axis.numbers), kind="stable"))[place]
-        order = np.lexsort((place, group))
-        starts = np.flatnonzero(np.r_[True, np.diff(group[order]) != 0])
-        ends = np.r_[starts[1:], len(order)] - 1
-        is_wide = place[order[ends]] - place[order[starts]] == len(axis.labels) - 1
-        if axis.numbers:
-            ratios = value[order[ends]] / value[order[starts]]
-            sorted_labels = [axis.labels[i] for i in np.argsort(axis.numbers, kind="stable")]
-            told = (sorted_labels[0], sorted_labels[-1])
-        else:
-            least = np.minimum.reduceat(value[order], starts)
-            ratios, told = np.maximum.reduceat(value[order], starts) / least, None
-        # Settings in which only some of the axis's values were computed say less.
-        ratios = ratios[is_wide & (starts != ends) & np.isfinite(ratios)]
-        if len(ratios):
-            found.append(
-                AxisWorth(axis.name, told, float(ratios.min()), float(ratios.max()), len(ratios))
-            )
-    return found
+    notes = [
+        "Observations are readings and certified values; what else a setting costs is not here."
+    ]
+    if starred[rows].any():
+        notes.append("Values marked * leave out what is undetermined.")
+    caption = "The settings that come first"
+    blocks = (Block("", tuple(found)),)
+    return Table("answer", caption, headings, told, blocks, notes=tuple(notes))

@@ -141,6 +141,19 @@ def _columns(results: ReportedSweep, start: str) -> list[tuple[str, str]]:
     found = []
     for column in results.frame.columns:
         if column.startswith(start):
-            unit = column.removeprefix(start).replace("_or_", ", ").replace("ratio", "1")
-            found.append((column, shown_unit(unit).replace(", ", " or ")))
+            found.append((column, _shown(column.removeprefix(start))))
     return found
+
+
+def column_unit(column: str) -> str:
+    """Unit in which a column of averages is shown.
+
+    >>> column_unit("U6_average_m"), column_unit("U3_average_m_or_rad")
+    ('µm', 'µm or µrad')
+    """
+    return _shown(column.partition("_average_")[2])
+
+
+def _shown(suffix: str) -> str:
+    unit = suffix.replace("_or_", ", ").replace("ratio", "1")
+    return shown_unit(unit).replace(", ", " or ")

@@ -19,10 +19,11 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
 
 from ..presentation.formatting import micro, number, percent, uncertainty_words
-from ..presentation.pages.document import shipped
-from ..presentation.pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
+from ..presentation.pages.document import style
+from ..presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
 from ..presentation.scene import MOST_BALLS, Scene, scene
 from ..presentation.table import Block, Entry, Row, Table
+from ..sweeps.columns import symbol_column
 from ..sweeps.store import Store
 from ..uncertainty.error_map import error_map
 from ..uncertainty.quantities import DESCRIPTIONS
@@ -95,13 +96,13 @@ def page(
     context: dict[str, Any] = {
         "title": in_one_line(results.title),
         "summary": _summary(results),
-        "style": Markup(shipped("page.css")),
+        "style": Markup(style()),
         "facts": _facts(results),
         "answer": answer(results),
         "comparison": comparison,
         "failures": failures(results),
         "tables": report_tables(results),
-        "plots": _plots(drawn, report),
+        "plots": _plots(drawn, (criterion(results) or ("", ""))[1], report),
         "has_trials": any(len(line.actual) for plot in drawn for line in plot.panels[0].lines),
         "heats": heat_maps(results),
         "ranks": ranks(results),
@@ -180,19 +181,23 @@ def _unreadable(results: ReportedSweep) -> str:
     return f"{cell_list(cells)} ({in_one_line(results.found.unreadable[cells[0]])})"
 
 
-def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawing]]]:
+def _plots(
+    drawn: list[Plot], judged: str, report: Report
+) -> list[tuple[str, list[Drawing], list[Drawing]]]:
+    """Plots of the quantity that cells are judged by against each axis, and those of others."""
     found = []
     number_of = 0
     for axis, some in groupby(
         counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name
     ):
-        figures = []
+        figures: tuple[list[Drawing], list[Drawing]] = [], []
         for plot in some:
             number_of += 1
             caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}."
             picture = plot_svg(plot, f"plot{number_of}")
-            figures.append(Drawing(picture, f"{caption} {plot.note}".strip()))
-        found.append((axis, figures))
+            of_others = symbol_column(plot.symbol) != judged
+            figures[of_others].append(Drawing(picture, f"{caption} {plot.note}".strip()))
+        found.append((axis, *figures))
     return found
 
 
@@ -239,7 +244,7 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
         " machine's "
     )
     caption += "reference point (squares)."
-    if len(drawn.places) > MOST_NAMES:
+    if not drawn.is_named:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
         caption += " Only some of the balls are drawn."

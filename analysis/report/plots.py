@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 # are evenly spaced.
 WIDE = 30.0
 
+# Ratio below which a logarithmic axis has numbers between powers of ten.
+FINE = 500.0
+
 # Values of a line that are marked.
 MOST_MARKERS = 12
 
@@ -62,7 +65,7 @@ def plot_svg(plot: Plot, name: str) -> str:
 
 
 def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
-    from matplotlib.ticker import NullLocator
+    from matplotlib.ticker import LogLocator, NullLocator
 
     axes.set_title(panel.measure.name, loc="left")
     axes.set_ylabel(plot.unit)
@@ -74,6 +77,8 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     finite = finite[np.isfinite(finite)]
     if len(finite) and finite.min() > 0 and finite.max() > WIDE * finite.min():
         axes.set_yscale("log")
+        if finite.max() < FINE * finite.min():
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_locator(NullLocator())
     else:

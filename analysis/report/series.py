@@ -77,7 +77,10 @@ def plots(results: ReportedSweep) -> list[Plot]:
         if len(axis.numbers) < 2:
             continue
         pictures = _pictures(results, k)
-        for symbol in dict.fromkeys(m.symbol for m in measures):
+        for symbol in sorted(
+            dict.fromkeys(m.symbol for m in measures),
+            key=lambda one: judged is None or judged[1] != symbol_column(one),
+        ):
             mine = {m.statistic: m for m in measures if m.symbol == symbol}
             if len(mine) < 2:
                 continue
@@ -125,6 +128,7 @@ def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
         here = rows[place.ravel() == i]
         lines = [here[results.chosen[here, second] == value] for value in values]
         note = setting_words(results, further, apart[i])
+        note = f"With {note}" if note else ""
         if i == own and len(apart) > 1:
             note += ", the setting of the best cell"
         count = len(results.axes[second].labels)
@@ -132,7 +136,9 @@ def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
             note += f"; {len(values)} of {count} values of {results.axes[second].name}"
         if i == order[-1] and len(order) < len(apart):
             note += f"; {len(apart) - len(order)} settings more are in the store"
-        found.append(_picture(results, k, [second], lines, f"{note}." if note else ""))
+        found.append(
+            _picture(results, k, [second], lines, f"{note}.".removeprefix("; ") if note else "")
+        )
     return found
 
 

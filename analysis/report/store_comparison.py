@@ -5,6 +5,7 @@ judged by.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.inputs.settings import listing
@@ -13,13 +14,15 @@ from ballplate.simulator.machines.protocol import Array
 from ..presentation.formatting import number
 from ..presentation.table import Block, Entry, Row, Table
 from .answer import WITHIN
+from .axis_worth import SAME
+from .measures import column_unit
 from .results import Integers, ReportedSweep, criterion, partly_open
 
 # Settings that are listed, those that differ most.
 LISTED = 12
 
-# Averages within this part of one another are the same but for rounding.
-SAME = 1e-9
+# Digits to which values of an axis are the same in both sweeps, in whichever unit they are written.
+DIGITS = 9
 
 
 class IncomparableError(ValueError):
@@ -56,25 +59,35 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
         f"{len(both)} settings are done in both; {len(here) - len(both)} in this store alone,"
         f" {len(there) - len(both)} in {name} alone."
     ]
+    told = symbol.replace("_", " ")
     rows = np.array([here[key] for key in both], np.int64)
     rows_there = np.array([there[key] for key in both], np.int64)
-    determined = ~partly_open(results, symbol)[rows] & ~partly_open(other, symbol)[rows_there]
     value, before = results.figure(column)[rows], other.figure(column)[rows_there]
-    ratio = np.where(determined, value / before, np.nan)
+    # Averages that leave out what is undetermined are not of the same lengths.
+    open_ = partly_open(results, symbol)[rows] | partly_open(other, symbol)[rows_there]
+    open_ |= ~(np.isfinite(value) & np.isfinite(before))
+    ratio = np.full(len(rows), np.nan)
+    np.divide(value, before, out=ratio, where=~open_ & (value > 0.0) & (before > 0.0))
+    if open_.any():
+        sentences.append(
+            f"In {open_.sum()} of them some of {told} is undetermined in one or both: these are not"
+            " compared."
+        )
     for words, changed in (("smaller", ratio < 1 - SAME), ("larger", ratio > 1 + SAME)):
         if changed.any():
             ends = ratio[changed].min(), ratio[changed].max()
-            by = sorted({number(float(one), 3) for one in ends})
-            told = " to ".join(by)
+            by = " to ".join(dict.fromkeys(number(float(one), 3) for one in ends))
             sentences.append(
-                f"The average of {symbol.replace('_', ' ')} is {words} than in {name} in"
-                f" {changed.sum()} of them, by a factor of {told}."
+                f"The average of {told} is {words} than in {name} in"
+                f" {changed.sum()} of them, by a factor of {by}."
             )
-    if len(both) and determined.all() and (np.abs(ratio - 1) <= SAME).all():
-        sentences.append("All averages are the same.")
+    same = int((np.abs(ratio - 1) <= SAME).sum())
+    if same:
+        which = "All averages are" if same == len(both) else f"{same} averages are"
+        sentences.append(f"{which} the same.")
     for words, name_of, least in (
         ("rank-deficient", "rank_deficiency", 1.0),
-        ("within the target with all lengths", WITHIN, 1.0),
+        ("within the target, each store's own, with all lengths", WITHIN, 1.0),
     ):
         now = results.figure(name_of)[rows] >= least
         then = other.figure(name_of)[rows_there] >= least
@@ -91,12 +104,20 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
 
 
 def _by_setting(results: ReportedSweep) -> dict[tuple[str, ...], int]:
-    """Rows of cells that are done, by the labels of the axes in the order of their names."""
+    """Rows of cells that are done, by the values of the axes in the order of their names."""
     order = np.argsort([axis.name for axis in results.axes], kind="stable")
+    keys = [_values(results.definition["axes"][i]) for i in order]
     return {
-        tuple(results.axes[i].labels[results.chosen[row, i]] for i in order): row
+        tuple(key[k] for key, k in zip(keys, results.chosen[row, order].tolist(), strict=True)): row
         for row in np.flatnonzero(results.done).tolist()
     }
+
+
+def _values(axis: dict[str, Any]) -> list[str]:
+    """Values of a stored axis, alike for the same size in another unit; texts as they are."""
+    if not axis["unit"]:
+        return [str(label) for label in axis["labels"]]
+    return [f"{float(value) + 0.0:.{DIGITS}g} {axis['unit']}" for value in axis["values"]]
 
 
 def _table(
@@ -123,6 +144,7 @@ def _table(
         )
         found.append(Row(tuple(labels), entries))
     headings = tuple(axis.name for axis in results.axes)
-    columns = ("average here, µm", f"in {name}, µm", "ratio")
+    unit = column_unit(column)
+    columns = (f"average here, {unit}", f"in {name}, {unit}", "ratio")
     caption = "Settings that differ most"
     return Table("comparison", caption, headings, columns, (Block("", tuple(found)),))

@@ -10,9 +10,9 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import exact_readings, on_true_machine
+from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.simulated import on_stated_machine
 
 from ..results.fit import Fit
 from ..results.prediction import Prediction
@@ -84,8 +84,7 @@ def fitted_exactly(experiment: Experiment) -> Fit:
     given.
     """
     design = lay_out(experiment)
-    machine = true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
-    _, x = exact_readings(*on_true_machine(design, machine))
+    _, x = exact_readings(*on_stated_machine(experiment, design))
     return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
 
 

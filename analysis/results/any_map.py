@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from functools import reduce
 from pathlib import Path
 
+from ballplate.simulator.design.objects import Tasks
 from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.yamltree import read_bytes
@@ -17,7 +18,7 @@ from ..error_maps.realisations import Draws
 from ..error_maps.volumetric_results import MachineErrors, machine_errors
 from .error_curves_result import ErrorCurves, error_curves
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors
-from .wanted_lengths import WantedLengths, tasks_of_experiment
+from .wanted_lengths import tasks_of_experiment
 
 # A map file says at its beginning that it is one.
 OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
@@ -70,5 +71,5 @@ def map_errors(
     if error is not None:
         return error_curves(fitted, label, (error,))
     lengths = [tasks_of_experiment(fitted, one) for one in tasks]
-    wanted = reduce(WantedLengths.beside, lengths) if lengths else None
+    wanted = reduce(Tasks.beside, lengths) if lengths else None
     return fitted_map_errors(fitted, label, asked, probe, draws, with_budget, wanted)

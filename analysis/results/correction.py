@@ -8,7 +8,7 @@ from typing import Any, TextIO
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Flags
+from ballplate.simulator.design.objects import Flags, Tasks
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import listing
@@ -23,11 +23,10 @@ from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap
 from ballplate.simulator.maps.mapped_lengths import mapped_lengths
 from ballplate.simulator.readings.point_files import GivenPoints
 
-from ..presentation.formatting import aligned, finite, number, to_uncertainty
+from ..presentation.formatting import aligned, finite, number, picked, to_uncertainty
 from ..presentation.result import Result
 from ..uncertainty.scale import stretches
 from .adjustments import few_degrees_of_freedom, freedom_words
-from .wanted_lengths import WantedLengths
 
 # Points and lengths that the text shows.
 SHOWN = 20
@@ -130,12 +129,12 @@ class Correction(Result):
     def headline(self) -> str:
         u = self.expanded_uncertainties
         open_ = int(np.isnan(u).any(axis=1).sum())
+        count = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
+        if np.isnan(u).all():
+            return f"{count}, undetermined"
         told = f", {open_} of them undetermined" if open_ else ""
-        largest = np.nanmax(u) if np.isfinite(u).any() else np.nan
-        return (
-            f"{len(self.points)} points{told}; U = {self.coverage_factor:g} u ="
-            f" {number(1e6 * float(largest))} µm at most"
-        )
+        largest = float(np.nanmax(u))
+        return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -282,10 +281,7 @@ class Correction(Result):
     def to_dict(self) -> dict[str, Any]:
         fitted, u = self.fitted, self.standard_uncertainties
         return {
-            "title": fitted.title,
-            "sigma": fitted.sigma,
-            "sigma_is_estimated": fitted.sigma_is_estimated,
-            "degrees_of_freedom": fitted.degrees_of_freedom,
+            **picked(fitted, "title", "sigma", "sigma_is_estimated", "degrees_of_freedom"),
             "coverage_factor": self.coverage_factor,
             "with_repeatability": bool(self.scatter),
             "points": [
@@ -383,7 +379,7 @@ def _uncertainty(value: float) -> str:
 def correction(
     fitted: FittedMap,
     given: GivenPoints,
-    lengths: WantedLengths | None = None,
+    lengths: Tasks | None = None,
     coverage_factor: float | None = None,
     with_repeatability: bool = False,
 ) -> Correction:

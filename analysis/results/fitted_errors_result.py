@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.design.objects import Tasks
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
@@ -42,7 +43,6 @@ from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
 from .adjustments import few_degrees_of_freedom
 from .correction import left_out_words
-from .wanted_lengths import WantedLengths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -239,7 +239,7 @@ def fitted_map_errors(
     probe: str | None = None,
     draws: Draws | None = None,
     with_budget: bool = False,
-    tasks: WantedLengths | None = None,
+    tasks: Tasks | None = None,
 ) -> FittedErrorMap:
     """Errors of a fitted machine at the places asked for, with a probe by its name, by default that
     of the map; the lengths of `tasks` come after the diagonals, or that of a line.

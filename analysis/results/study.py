@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
@@ -91,6 +90,7 @@ def _predict(
         lengths,
         scale,
         influences=influence_uncertainties(at) if with_quantities else (),
+        experiment=experiment,
     )
 
 
@@ -113,6 +113,8 @@ def fit(
     :raises ExperimentError: variance components take more memory than there is.
     """
     # Loaded only now, so that what plans and checks need not load answers sooner.
+    from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+
     from ..gross_errors.exact_values import diagnosis_of_all
     from ..gross_errors.leftover import too_many_entries
     from ..gross_errors.suspects import Diagnosis
@@ -140,7 +142,7 @@ def fit(
         anew = fit(experiment, observed, "given", monomials)
         return replace(anew, variance_components=found, is_reweighted=True)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    freedom = design.observation_count - design.parameter_count + judged.deficiency
+    freedom = at.degrees_of_freedom
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
     untested = too_many_entries(design)

@@ -3,42 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from ballplate.simulator.design.objects import Tasks
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError, refused
-from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.readings.point_files import GivenPoints, read_pairs
 
 
-@dataclass(frozen=True, eq=False)
-class WantedLengths:
-    """Lengths: names, scale readings `points` (m, 2, d) of their ends in metres, `probes` (m, 2),
-    and targets, None where there are none.
-    """
-
-    names: tuple[str, ...]
-    points: Array
-    probes: Integers
-    targets: tuple[Target | None, ...]
-
-    def beside(self, other: WantedLengths) -> WantedLengths:
-        """Both, one after the other."""
-        return WantedLengths(
-            self.names + other.names,
-            np.concatenate([self.points, other.points]),
-            np.concatenate([self.probes, other.probes]),
-            self.targets + other.targets,
-        )
-
-
-def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> WantedLengths:
+def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:
     """Lengths between pairs of points by their names, or indices.
 
     :raises ValueError: a name that no point has, or several; an index of none.
@@ -46,7 +23,7 @@ def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> W
     return _between(given, [_ends(given, pair) for pair in pairs])
 
 
-def between_listed(given: GivenPoints, source: Path | GivenText) -> WantedLengths:
+def between_listed(given: GivenPoints, source: Path | GivenText) -> Tasks:
     """Lengths between the pairs of points that a CSV file names.
 
     :raises ExperimentError: a wrong table, or a name that no point has, or several.
@@ -65,7 +42,7 @@ def between_listed(given: GivenPoints, source: Path | GivenText) -> WantedLength
     return _between(given, found)
 
 
-def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> WantedLengths:
+def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> Tasks:
     """The measuring tasks of an experiment.
 
     :raises ExperimentError: there is none, of other dimensions, or with a probe that the map does
@@ -81,7 +58,7 @@ def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> WantedLeng
     if absent:
         text = f"the map has no probe {listing(sorted(absent))}; known: {listing(known)}"
         raise refused(experiment.source, text, "evaluation.tasks")
-    return WantedLengths(
+    return Tasks(
         tuple(task.name for task in tasks),
         np.array([task.points for task in tasks]),
         np.array([[known.index(name) for name in task.probes] for task in tasks], np.int64),
@@ -89,10 +66,10 @@ def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> WantedLeng
     )
 
 
-def _between(given: GivenPoints, pairs: Sequence[tuple[int, int]]) -> WantedLengths:
+def _between(given: GivenPoints, pairs: Sequence[tuple[int, int]]) -> Tasks:
     places = np.array(pairs, np.int64).reshape(-1, 2)
     names = tuple(f"{given.name(i)} to {given.name(j)}" for i, j in pairs)
-    return WantedLengths(names, given.points[places], given.probes[places], (None,) * len(names))
+    return Tasks(names, given.points[places], given.probes[places], (None,) * len(names))
 
 
 def _ends(given: GivenPoints, pair: Sequence[str | int]) -> tuple[int, int]:

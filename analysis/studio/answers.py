@@ -13,6 +13,7 @@ from ballplate.simulator.design.arrays import locations
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.quantities import Target
@@ -133,8 +134,7 @@ def _motions(at: Linearisation, judged: Verdict, target: Target | None) -> dict[
     """
     design = at.design
     volume, read, offsets = design.machine.volume, design.readings, design.probes.offsets
-    sides = [np.linspace(*ends, NODES) for ends in zip(volume.lower, volume.upper, strict=True)]
-    nodes = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(sides))
+    nodes = even_grid(volume.lower, volume.upper, [NODES] * len(volume.lower))
     of_nodes = np.full(len(nodes), design.evaluation.probe)
     of_plates = read.select(design.plate_readings)
     places = np.concatenate([nodes + offsets[of_nodes], locations(design, at.state, of_plates)])

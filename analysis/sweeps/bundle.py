@@ -14,7 +14,7 @@ from typing import Any
 
 from ballplate.simulator.experiment.modules import python_models
 from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.yamltree import Node, read_tree, to_python
+from ballplate.simulator.inputs.yamltree import Node, read_tree, to_list, to_python
 
 from .model import Sweep
 from .named_files import is_rooted, named_files
@@ -151,8 +151,8 @@ def definition(sweep: Sweep, bundle: Bundle) -> dict[str, Any]:
         "title": sweep.title,
         "source": bundle.source,
         "base": bundle.base,
-        "sweep": _plain(to_python(read_tree(sweep.source))),
-        "experiment": _plain(to_python(read_tree(sweep.base))),
+        "sweep": to_list(to_python(read_tree(sweep.source))),
+        "experiment": to_list(to_python(read_tree(sweep.base))),
         "files": {
             name: hashlib.blake2b(content, digest_size=20).hexdigest()
             for name, content in bundle.files
@@ -173,12 +173,6 @@ def definition(sweep: Sweep, bundle: Bundle) -> dict[str, Any]:
         "seed": sweep.seed,
         "record": list(sweep.record),
     }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, tuple) else value
 
 
 # What may change without changing a figure.

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from ballplate.simulator.experiment.variants import (
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.wording import explain
+from ballplate.simulator.inputs.validation import validated
 from ballplate.simulator.inputs.yamltree import (
     Mapping,
     Mark,
@@ -31,10 +30,8 @@ from ballplate.simulator.inputs.yamltree import (
     Scalar,
     Sequence,
     read_tree,
-    to_python,
     walk,
 )
-from pydantic import TypeAdapter, ValidationError
 
 from .axes import read_axis
 from .bundle import bundle_of, code_digest, has_code
@@ -165,23 +162,8 @@ def _settings(root: Node, problems: Problems) -> SweepSettings | None:
     for steps, node in walk(root):
         if isinstance(node, Scalar) and node.value is None:
             problems.add(steps, "empty; give a value, or leave it out")
-    try:
-        settings = _adapter().validate_python(to_python(root))
-    except ValidationError as error:
-        for one in explain(error.errors(include_url=False), root, _schema()):
-            problems.add(one.steps, one.text, one.of_key)
-        return None
+    settings = validated(SweepSettings, root, problems)
     return None if problems.messages else settings
-
-
-@cache
-def _adapter() -> TypeAdapter[SweepSettings]:
-    return TypeAdapter(SweepSettings)
-
-
-@cache
-def _schema() -> dict[str, Any]:
-    return _adapter().json_schema()
 
 
 def _trees(base: Path) -> dict[str | None, Node]:

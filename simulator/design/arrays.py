@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
@@ -154,9 +154,7 @@ class Design:
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
-        if len(self.artefacts.names) == 1:
-            return self.balls.names[ball]
-        return f"{self.artefacts.names[self.balls.artefact[ball]]}/{self.balls.names[ball]}"
+        return self.balls.label(ball, self.artefacts.names)
 
 
 @dataclass(frozen=True)
@@ -210,6 +208,23 @@ def nominal_state(design: Design) -> State:
         design.unknown_lengths.drawn,
         design.influence_values,
     )
+
+
+def nominal_places(design: Design, position: int, balls: Integers) -> Array:
+    """Places (m, d) of balls where an artefact is planned to stand in a position."""
+    planned = design.positions
+    return np.asarray(
+        design.balls.places[balls] @ planned.rotations[position].T + planned.origins[position]
+    )
+
+
+def read_in_positions(design: Design, readings: Readings) -> Iterator[tuple[int, Integers, Array]]:
+    """Each position with readings: its index, the indices (m,) of its readings, and places (m, d)
+    of their balls in the artefact's frame.
+    """
+    for k in np.unique(readings.position).tolist():
+        rows = np.flatnonzero(readings.position == k)
+        yield k, rows, design.balls.places[readings.ball[rows]]
 
 
 def locations(design: Design, state: State, readings: Readings) -> Array:

@@ -112,6 +112,21 @@ class References:
             "is below zero; give it without the sign",
         )
 
+    def has_axes(self, stated: object, steps: Steps) -> bool:
+        """Whether what is stated, if it is a list, has one for each axis; otherwise a message."""
+        count = len(stated) if isinstance(stated, tuple) else self.dimension
+        return self.require(
+            self.dimension in (None, count),
+            steps,
+            f"has {count} axes, but the experiment has {self.dimension}",
+        )
+
+    def is_position(self, name: str, positions: Collection[str], steps: Steps) -> bool:
+        """Whether a name is of a position; otherwise a message."""
+        return self.require(
+            name in positions, steps, f'unknown position "{name}"; {hint(name, positions)}'
+        )
+
     def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
         """Tell whether names listed at a path are of probes, each once, after saying what is
         wrong.

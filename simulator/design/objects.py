@@ -120,6 +120,11 @@ class Balls:
         """Indices of the balls of an artefact."""
         return np.flatnonzero(self.artefact == artefact)
 
+    def label(self, ball: int, artefacts: tuple[str, ...]) -> str:
+        """Name of a ball, with that of its artefact where there are several."""
+        name = self.names[ball]
+        return name if len(artefacts) == 1 else f"{artefacts[self.artefact[ball]]}/{name}"
+
 
 @dataclass(frozen=True)
 class Positions:
@@ -212,3 +217,12 @@ class Tasks:
     points: Array
     probes: Integers
     targets: tuple[Target | None, ...]
+
+    def beside(self, other: Tasks) -> Tasks:
+        """Both, one after the other."""
+        return Tasks(
+            self.names + other.names,
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.probes, other.probes]),
+            self.targets + other.targets,
+        )

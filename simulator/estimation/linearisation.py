@@ -50,6 +50,11 @@ class Linearisation:
         return self.spectrum.deficiency
 
     @property
+    def degrees_of_freedom(self) -> int:
+        """Observations less the parameters that they determine."""
+        return self.design.observation_count - self.design.parameter_count + self.deficiency
+
+    @property
     def rank(self) -> int:
         return self.spectrum.rank
 

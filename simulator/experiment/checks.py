@@ -5,7 +5,7 @@ read.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.description import MachineDescription, random_part
 from ..machines.error_names import AXIS_ERRORS
 from ..machines.settings import (
     MachineFileSettings,
@@ -39,11 +38,11 @@ from ..machines.true_machine_settings import (
     TrueMapSettings,
 )
 from ..machines.truth import TruthError, true_machine
-from .curve_files import read_curves
-from .machine_file import load_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
-from .used_maps import read_true_map
+
+if TYPE_CHECKING:
+    from ..machines.description import MachineDescription
 
 TOLERANCE = 1e-9
 
@@ -107,6 +106,9 @@ def _check_model(
 def _machine_of_file(
     file: str, steps: Steps, references: References, doubts: list[Message] | None = None
 ) -> MachineDescription | None:
+    # What reads other files is loaded where one is named: few experiments have any.
+    from .machine_file import load_machine
+
     try:
         return load_machine(references.folder / file, doubts)
     except ExperimentError as error:
@@ -118,6 +120,8 @@ def _true_machine_of_file(
     truth: TrueMachineFileSettings, machine: Machine | None, references: References
 ) -> None:
     """Let the true machine be that of its file, or report what is wrong with it."""
+    from ..machines.description import random_part
+
     steps: Steps = ("true_machine", "file")
     found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
@@ -168,6 +172,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         _true_machine_of_file(truth, machine, references)
         return
     if isinstance(truth, TrueMapSettings):
+        from .used_maps import read_true_map
+
         read_true_map(truth, machine, references)
         return
     problems = references.problems
@@ -198,6 +204,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine have the curves of its files, or report what is wrong with them."""
+    from .curve_files import read_curves
+
     problems, curves = references.problems, dict[str, Points]()
     for i, file in enumerate(truth.files):
         steps: Steps = ("true_machine", "files", i)
@@ -445,10 +453,7 @@ def check_size(
         return
     d = machine.dimension
     poses = sum(references.artefacts[one.artefact].role == "plate" for one in positions.values())
-    gauges = {
-        name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
-    }
-    pivots = [one for one in positions.values() if one.artefact in gauges]
+    pivots = _pivots(positions.values(), references)
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     offsets = sum(probe.is_estimated for probe in probes.values())
     shared = errors + pose_size(d) * poses + d * (len(pivots) + offsets)
@@ -492,6 +497,12 @@ def check_derivatives(
         references.problems.add(("evaluation", "points"), text)
 
 
+def _pivots(positions: Iterable[Position], references: References) -> list[Position]:
+    """Positions of Bryan gauges."""
+    kinds = references.artefacts
+    return [one for one in positions if isinstance(kinds[one.artefact], BryanGaugeSettings)]
+
+
 def check_lengths(
     calibrations: Mapping[Steps, Calibration],
     positions: Collection[Position],
@@ -499,11 +510,7 @@ def check_lengths(
 ) -> None:
     """Report length standards and gauges that are read too often."""
     problems = references.problems
-    gauges = {
-        name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
-    }
-    pivots = [one for one in positions if one.artefact in gauges]
-    rows = sum(one.count for one in pivots)
+    rows = sum(one.count for one in _pivots(positions, references))
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)

@@ -6,18 +6,17 @@ import math
 import os
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from ..inputs.messages import ExperimentError, Message, Steps
 from ..inputs.problems import Problems, in_order
 from ..inputs.quantities import format_angle, format_length
 from ..inputs.settings import describe, listing
-from ..inputs.wording import explain
+from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
 from ..machines.arrangement_settings import arrangement_of
@@ -77,11 +76,8 @@ def load_machine(
 
 
 def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescription | None:
-    try:
-        settings = _adapter().validate_python(to_python(root))
-    except ValidationError as error:
-        for one in explain(error.errors(include_url=False), root, _json_schema()):
-            problems.add(one.steps, one.text, one.of_key)
+    settings = validated(DescribedMachineSettings, root, problems)
+    if settings is None:
         _volume_of(root, problems)
         # Tables are told about as well, where the keys that name them can be read.
         _read_tables(root, source, problems)
@@ -350,13 +346,3 @@ def _check_table(
 ) -> None:
     if on_table and AXES[axis] not in machine.arrangement.workpiece_side:
         problems.add(steps, f"the {AXES[axis]} axis moves no table; leave straightedge: table out")
-
-
-@cache
-def _adapter() -> TypeAdapter[DescribedMachineSettings]:
-    return TypeAdapter(DescribedMachineSettings)
-
-
-@cache
-def _json_schema() -> dict[str, Any]:
-    return _adapter().json_schema()

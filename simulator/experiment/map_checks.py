@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
 
 from ..design.objects import Probes, Volume
 from ..inputs.messages import ExperimentError
 from ..inputs.problems import Problems
 from ..inputs.quantities import format_length
 from ..inputs.settings import describe, listing, shorten
-from ..inputs.wording import explain
+from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping as MappingNode
 from ..inputs.yamltree import Node, to_python
 from ..machines.custom import CustomModelError
@@ -50,11 +48,8 @@ def map_of_tree(
         problems.add((), text)
         return None
     problems.add_empty()
-    try:
-        settings = _adapter().validate_python(to_python(root))
-    except ValidationError as error:
-        for one in explain(error.errors(include_url=False), root, _json_schema()):
-            problems.add(one.steps, one.text, one.of_key)
+    settings = validated(MapSettings, root, problems)
+    if settings is None:
         return None
     ends = settings.volume.stated.values()
     for axis, (low, high) in settings.volume.stated.items():
@@ -108,7 +103,7 @@ def map_of_tree(
             LeftOut(one.name, one.kind, one.unit, one.value, one.standard_uncertainty)
             for one in settings.left_out
         ),
-        data=None if data is None else MapData(data.readings, data.sha256),
+        data=None if data is None else MapData(**data.model_dump()),
         experiment=settings.experiment,
         program=settings.program,
         date=settings.date,
@@ -309,13 +304,3 @@ def _check_unchanged(
             " than when the map was written; it, or the values, have changed: fit again"
         )
         problems.add(("check",), text)
-
-
-@cache
-def _adapter() -> TypeAdapter[MapSettings]:
-    return TypeAdapter(MapSettings)
-
-
-@cache
-def _json_schema() -> dict[str, Any]:
-    return _adapter().json_schema()

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..design.objects import Volume
+from ..geometry.grids import even_grid
 from ..inputs.messages import refused
+from ..inputs.yamltree import to_list
 from ..machines.custom import CustomModelError
 from ..machines.protocol import Array, ErrorModel
-from ..maps.fitted_map import FittedMap
+from ..maps.fitted_map import FittedMap, MapData
 from .model_files import fingerprints, relative
 
 AXES = ("x", "y", "z")
@@ -35,7 +37,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "experiment": fitted.experiment,
         "date": fitted.date,
         "program": fitted.program,
-        "error_model": _plain(relative(fitted.settings, folder)),
+        "error_model": to_list(relative(fitted.settings, folder)),
         "files": files,
         "volume": {
             axis: [_length(low), _length(high)]
@@ -52,7 +54,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         },
         "coverage_factor": fitted.coverage_factor,
         "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),
-        "data": None if fitted.data is None else vars(fitted.data),
+        "data": None if fitted.data is None else to_list(_data(fitted.data)),
         "left_out": [
             {key: value for key, value in vars(one).items() if value is not None}
             for one in fitted.left_out
@@ -68,6 +70,10 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
     return found
 
 
+def _data(given: MapData) -> dict[str, Any]:
+    return {key: value for key, value in vars(given).items() if value not in ((), None)}
+
+
 def _probe_data(fitted: FittedMap) -> dict[str, Any]:
     """Probes as a file states them, by name."""
     found: dict[str, Any] = {}
@@ -79,13 +85,6 @@ def _probe_data(fitted: FittedMap) -> dict[str, Any]:
                 "nominal": [_length(one) for one in fitted.drawn_offsets[k].tolist()],
             }
     return found
-
-
-def _plain(value: Any) -> Any:
-    """What a file says, tuples as lists."""
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
 
 
 def _length(value: float) -> str:
@@ -107,7 +106,7 @@ def corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Arra
     volume.
     """
     d = len(volume.lower)
-    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    corners = even_grid(np.zeros(d), np.ones(d), [2] * d)
     points = volume.lower + volume.size * np.concatenate([corners, np.full((1, d), 0.5)])
     offsets = np.broadcast_to(0.1 * volume.size, points.shape)
     return np.asarray(model.error(points, values, offsets))

@@ -23,6 +23,7 @@ from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
 from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
+from ..maps.fitted_map import MapData
 from .changes import changed_tree
 from .readings_section import ReadingsSettings, no_settings
 
@@ -114,7 +115,8 @@ class Prior:
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation.
     ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
     the error model's parameters, and with ``by_offset`` of offsets (d,) of probes by their names.
-    ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
+    ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1. ``data``: the readings of the
+    map that tells it.
     """
 
     name: str
@@ -128,6 +130,7 @@ class Prior:
     path: str = ""
     unit: Unit = "m"
     by_offset: Mapping[str, Floats] | None = None
+    data: MapData | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field
 
 from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.settings import Forms, NonEmpty, Settings, Text
-from ..machines.description import MachineDescription, true_volumetric
+from ..machines.described import OfMachineFile
 from ..machines.protocol import TrueMachine
 
 Coordinate = Literal["scale readings", "ball centres", "part"]
@@ -20,22 +20,17 @@ Columns = Forms[Name, Name, Annotated[dict[Name, Name], Field(min_length=1)]]
 _COORDINATE = "its name or number, or {probe: column, …} where each probe has a column"
 
 
-class CompensationSettings(Settings):
+class CompensationSettings(OfMachineFile):
     """The machine's own correction that was on, to be taken off the readings."""
 
     file: Text = Field(description="machine file (YAML) of the correction, as for ballplate map")
 
-    # What the file says; filled in when the experiment is loaded.
-    _machine: MachineDescription | None = PrivateAttr(default=None)
-
-    def of(self, machine: MachineDescription) -> None:
-        """Take the machine that the file describes."""
-        self._machine = machine
-
     def machine(self) -> TrueMachine:
         """What the correction added to scale readings."""
-        assert self._machine is not None
-        return true_volumetric(self._machine)
+        # Loaded where a machine file is named: few experiments name any.
+        from ..machines.description import true_volumetric
+
+        return true_volumetric(self.described)
 
 
 class ColumnsSettings(Settings):
@@ -130,4 +125,4 @@ class ReadingsSettings(Settings):
 
 def no_settings() -> ReadingsSettings:
     """The settings of an experiment that says nothing of its readings."""
-    return ReadingsSettings.model_validate({})
+    return ReadingsSettings.model_construct()

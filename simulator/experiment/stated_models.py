@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
-
-from pydantic import TypeAdapter, ValidationError
 
 from ..design.objects import Volume
 from ..inputs.messages import ExperimentError, refused
 from ..inputs.problems import Problems
-from ..inputs.wording import explain
+from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping as MappingNode
 from ..inputs.yamltree import Mark, Node, parse_tree, read_tree, to_python
 from ..machines.custom import CustomModelError
@@ -59,13 +56,9 @@ def stated_model(text: str, volume: Volume, source: str) -> StatedModel:
     if not isinstance(root, MappingNode):
         root = node_of({"kind": to_python(root)}, Mark(name, 0, 0))
     problems = Problems(root)
-    try:
-        settings = _adapter().validate_python(to_python(root))
-    except ValidationError as error:
-        for one in explain(error.errors(include_url=False), root, _adapter().json_schema()):
-            problems.add(one.steps, one.text, one.of_key)
-        raise ExperimentError(problems.messages) from None
-    model = _built(settings, volume, folder, problems)
+    kinds: Any = ErrorModelSettings
+    settings = validated(kinds, root, problems)
+    model = None if settings is None else _built(settings, volume, folder, problems)
     if model is None:
         raise ExperimentError(problems.messages)
     return StatedModel(absolute(to_python(root), folder), model)
@@ -98,9 +91,3 @@ def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> E
     except ExperimentError as error:
         problems.take(error, ("file",))
     return None
-
-
-@cache
-def _adapter() -> TypeAdapter[Any]:
-    kinds: Any = ErrorModelSettings
-    return TypeAdapter(kinds)

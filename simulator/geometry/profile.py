@@ -69,21 +69,22 @@ class Profile:
         The normal of a feature of one point is square to the line to the nearer of its neighbours,
         to which it may be tangent.
         """
+        return _as_pairs(self._outward * self._turned)
+
+    @cached_property
+    def _turned(self) -> Complex:
+        """Unit tangents (m,) turned to the left."""
         tangents = np.zeros(len(self._points), complex)
         for first, last in self.features:
             tangents[first : last + 1] = self._tangents(first, last)
-        return _as_pairs(self._outward * 1j * tangents / np.abs(tangents))
+        return 1j * tangents / np.abs(tangents)
 
     @cached_property
     def _outward(self) -> float:
         """Whether a tangent that is turned to the left points out of the material, 1 or -1: that
         is on the side of the axis.
         """
-        tangents = np.zeros(len(self._points), complex)
-        for first, last in self.features:
-            tangents[first : last + 1] = self._tangents(first, last)
-        turned = 1j * tangents / np.abs(tangents)
-        return -1.0 if (turned.imag * self.places[:, 0]).sum() < 0 else 1.0
+        return -1.0 if (self._turned.imag * self.places[:, 0]).sum() < 0 else 1.0
 
     def located(self, place: Array) -> tuple[float, Array]:
         """Arc length of a place (2,) on the profile, and the unit normal (2,) out of the material.

@@ -24,7 +24,6 @@ PREFIXES = {
     "pico": -12,
 }
 METRES = ("metre", "meter")
-RADIANS = ("radian",)
 RATIOS = ("one", "percent", "ppm")
 TEMPERATURES = {"degreecelsius": 0.0, "kelvin": -273.15}
 _TOKEN = re.compile(r"\\([A-Za-z]+)(?:\{([+-]?[0-9])\})?")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import stat
+from collections import abc
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -216,6 +217,13 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
             " positions",
         )
     return builder.root
+
+
+def to_list(value: Any) -> Any:
+    """Plain data with lists for tuples."""
+    if isinstance(value, abc.Mapping):
+        return {key: to_list(item) for key, item in value.items()}
+    return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def to_python(node: Node) -> Any:

@@ -332,33 +332,3 @@ class Spline:
         t = replace(self, ends="free")._first
         matrix = np.column_stack([np.ones(self.count), t, self._inner])
         return Quoted(tuple(f"N{k + 1}({variable})" for k in range(self.count)), matrix)
-
-
-def spline_containing(parts: tuple[Basis, ...], raised: int = 0) -> Basis:
-    """The smallest family that contains the whole families of all `parts`, the last `raised` of
-    them times t.
-
-    Polynomials stay Chebyshev polynomials; as soon as there is a spline, so is the result. Its ends
-    are free whatever those of the parts are, as a product with t has other slopes.
-
-    >>> spline_containing((Polynomial(5), Monomial(4))).coefficients
-    5
-    >>> spline_containing((Spline(3, (0.5,)), Polynomial(4)))
-    Spline(order=4, knots=(0.5, 0.5), zero_at_one=False, ends='free')
-    """
-    degrees = []
-    for k, part in enumerate(parts):
-        order = part.order if isinstance(part, Spline) else max(getattr(part, "coefficients", 2), 2)
-        degrees.append(order + int(k >= len(parts) - raised))
-    order = max(degrees)
-    if not any(isinstance(part, Spline) and part.knots for part in parts):
-        return (
-            Spline(order) if any(isinstance(part, Spline) for part in parts) else Polynomial(order)
-        )
-    knots: Counter[float] = Counter()
-    for part in parts:
-        # A knot of multiplicity m leaves order - 1 - m derivatives continuous, with a factor t as
-        # well.
-        for knot, times in Counter(getattr(part, "knots", ())).items():
-            knots[knot] = max(knots[knot], order - part.order + times)  # type: ignore[attr-defined]
-    return Spline(order, tuple(sorted(knots.elements())))

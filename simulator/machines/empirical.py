@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..geometry.grids import even_grid
 from ..geometry.motions import cross_matrices
 from .protocol import Array, Line, Parameter, Reported, Unit
 from .rigid_chain import rotation_and_derivatives
@@ -89,8 +90,7 @@ class EmpiricalModel:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        grid = np.linspace(0.0, 1.0, 9)
-        places = np.stack(np.meshgrid(grid, grid, grid, indexing="ij"), axis=-1).reshape(-1, 3)
+        places = even_grid(np.zeros(3), np.ones(3), (9, 9, 9))
         peaks = [np.abs(values).max(axis=0, initial=0.0) for values in self._values(places)]
         arm = USUAL_OFFSET * float(np.subtract(self.upper, self.lower).max())
         found = []

@@ -14,7 +14,7 @@ from pydantic import Field, PrivateAttr, StringConstraints
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings, listing
 from .custom import custom_model
-from .description import MachineDescription, fitted_in_plane, fitted_volumetric
+from .described import OfMachineFile
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
@@ -78,7 +78,7 @@ class PythonSettings(Settings):
         self._folder = folder if self.folder is None else folder / self.folder
 
 
-class MachineFileSettings(Settings):
+class MachineFileSettings(OfMachineFile):
     """What a machine file states, as an error model to be estimated: its arrangement and errors,
     not their values.
     """
@@ -94,13 +94,6 @@ class MachineFileSettings(Settings):
             " spaced."
         ),
     )
-
-    # What the file says; filled in when the experiment is loaded.
-    _machine: MachineDescription | None = PrivateAttr(default=None)
-
-    def of(self, machine: MachineDescription) -> None:
-        """Take the machine that the file describes."""
-        self._machine = machine
 
 
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
@@ -128,8 +121,10 @@ def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorMode
 
 
 def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    assert settings._machine is not None
-    machine = settings._machine if len(lower) == 3 else fitted_in_plane(settings._machine)
+    # Loaded where a machine file is named: few experiments name any.
+    from .description import fitted_in_plane, fitted_volumetric
+
+    machine = settings.described if len(lower) == 3 else fitted_in_plane(settings.described)
     model = fitted_volumetric(machine, *in_space(lower, upper), settings.knots)
     return model if len(lower) == 3 else PlaneModel(model, 0.0)
 

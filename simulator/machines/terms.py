@@ -15,6 +15,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from ..geometry.grids import even_grid
 from .bases import Basis, Monomial, Quoted, Spline, whole_values
 from .protocol import Array
 
@@ -204,8 +205,7 @@ class Radial:
     @cached_property
     def centres(self) -> Array:
         """Centres (n, 3)."""
-        axes = [np.linspace(0.0, 1.0, count) for count in self.grid]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return even_grid(np.zeros(3), np.ones(3), self.grid)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from .arrangement_settings import (
     arrangement_of,
 )
 from .curves import Interpolation, Points, curves_model
-from .description import MachineDescription, true_volumetric
+from .described import OfMachineFile
 from .model_kinds import Corner
 from .plane import PlaneModel
 from .protocol import ErrorModel, TrueMachine
@@ -103,7 +103,7 @@ class CurvesSettings(Settings):
         )
 
 
-class TrueMachineFileSettings(Settings):
+class TrueMachineFileSettings(OfMachineFile):
     """The machine that a machine file describes."""
 
     kind: Literal["machine"] = Field(description="the machine that a file describes")
@@ -122,20 +122,15 @@ class TrueMachineFileSettings(Settings):
         ),
     )
 
-    # What the file says; filled in when the experiment is loaded.
-    _machine: MachineDescription | None = PrivateAttr(default=None)
-
-    def of(self, machine: MachineDescription) -> None:
-        """Take the machine that the file describes."""
-        self._machine = machine
-
     def machine(self, dimension: int = 3) -> TrueMachine:
         """The systematic errors of the machine, of two dimensions those at the level."""
-        assert self._machine is not None
-        found = true_volumetric(self._machine)
+        # Loaded where a machine file is named: few experiments name any.
+        from .description import true_volumetric
+
+        found = true_volumetric(self.described)
         if dimension == 3:
             return found
-        level = self._machine.reference[2] if self.level is None else self.level
+        level = self.described.reference[2] if self.level is None else self.level
         return TrueMachine(PlaneModel(found.model, level), found.a)
 
 

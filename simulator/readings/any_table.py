@@ -246,9 +246,16 @@ class _Reader:
         lengths = [*axes, *(column for column in others if column.constant is None)]
         for column in lengths:
             unit = column.unit or self.form.units.get(column.place) or stated or once
-            if unit is None and column not in axes and found:
-                # Of what stands beside co-ordinates in one unit.
+            if unit is None and column is roles.get("diameter") and found:
+                # Of what stands beside co-ordinates in one unit, as an uncertainty may not.
                 unit = next(iter(found.values())) if len(set(found.values())) == 1 else None
+            if unit is None and column is roles.get("u") and not without:
+                cells = self.form.headings.cells
+                named = f'"{shorten(cells[column.place])}"' if cells else str(column.place + 1)
+                raise self.error(
+                    f"the column {named} of uncertainties has no unit, which may be another than"
+                    " that of co-ordinates; write it in the heading, as in u_um"
+                )
             if unit is None:
                 without.append(column.place)
             else:

@@ -13,7 +13,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Readings, nominal_places, read_in_positions
 from ..estimation.consensus import consensus_motion
 from ..experiment.readings_section import ReadingsSettings
 from ..geometry.motions import AXIS_NAMES, fixes_pose
@@ -46,9 +46,7 @@ def poses_found(
     Only positions of plates count, of which balls were read that fix the pose.
     """
     pitch, found = ball_pitches(design), {}
-    for k in np.unique(readings.position):
-        rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls.places[readings.ball[rows]]
+    for k, rows, nominal in read_in_positions(design, readings):
         is_plate = design.artefacts.is_plate[design.positions.artefact[k]]
         if not is_plate or not fixes_pose(nominal):
             continue
@@ -131,14 +129,14 @@ def mistaken_positions(design: Design, readings: Readings, seen: Array) -> dict[
     not where their own was, each with that other one.
     """
     reach, found = AGAINST_DRAWING * ball_pitches(design), {}
-    artefacts, planned = design.positions.artefact, design.positions
+    artefacts = design.positions.artefact
     for k in np.unique(readings.position).tolist():
         rows = np.flatnonzero(readings.position == k)
         ball = readings.ball[rows]
         is_same = design.artefacts.is_plate[artefacts] & (artefacts == artefacts[k])
         apart = {}
         for j in np.flatnonzero(is_same).tolist():
-            there = design.balls.places[ball] @ planned.rotations[j].T + planned.origins[j]
+            there = nominal_places(design, j, ball)
             off = np.sqrt(((seen[rows] - there) ** 2).sum(axis=1))
             apart[j] = float(np.median(off / reach[ball]))
         nearest = min(apart, key=lambda j: apart[j], default=k)

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Readings, nominal_places, read_in_positions
 from ..estimation.consensus import consensus_motion
 from ..experiment.readings_section import CompensationSettings, ReadingsSettings
 from ..geometry.motions import fixes_pose
@@ -87,10 +87,8 @@ def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> A
     """Part co-ordinates moved to where the nominal poses have the balls."""
     pitch, placed = ball_pitches(design), np.empty_like(x)
     poor = []
-    for k in np.unique(readings.position):
-        rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls.places[readings.ball[rows]]
-        there = nominal @ design.positions.rotations[k].T + design.positions.origins[k]
+    for k, rows, nominal in read_in_positions(design, readings):
+        there = nominal_places(design, k, readings.ball[rows])
         if not fixes_pose(nominal):
             poor.append(design.positions.names[k])
             continue

@@ -1,4 +1,4 @@
-"""Digits of a table of readings, against the uncertainty of these."""
+"""Digits and uncertainties in a table of readings, against the uncertainty that is stated."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ MULTIPLE, ROUNDING = 1e-4, 1e-12
 FEWEST = 12
 # Rounding that is told has a standard uncertainty above this part of that of readings.
 NOTABLE = 0.5
+# Uncertainties so many times those that are stated, or less, are rather in another unit.
+OTHER_UNIT = 100.0
 
 
 def last_digit(x: Array) -> float:
@@ -58,4 +60,18 @@ def doubts_about_digits(design: Design, x: Array, uncertainty: Array | None) -> 
         f"the readings have no digit below {shown[0]}; such rounding has a standard uncertainty of"
         f" {shown[1]}, beside the {shown[2]} that are stated of readings: give more digits, or"
         " increase what is stated",
+    )
+
+
+def doubts_about_units(design: Design, uncertainty: Array) -> tuple[str, ...]:
+    """A sentence about standard uncertainties (m,) that a table has of its readings, if they are
+    so much larger or smaller than the repeatability that they are rather in another unit.
+    """
+    found, stated = float(np.median(uncertainty)), float(np.median(design.machine.repeatability))
+    if stated / OTHER_UNIT < found < stated * OTHER_UNIT:
+        return ()
+    shown = [format_length(float(f"{one:.3g}")) for one in (found, stated)]
+    return (
+        f"the table states a standard uncertainty of {shown[0]} of its readings, beside a"
+        f" repeatability of {shown[1]}: check the unit of its column",
     )

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design
+from ..design.arrays import Design, read_in_positions
 from ..design.observations.lengths import Lengths
 from ..design.observations.priors import Priors
 from ..design.observations.readings import seen_places
@@ -146,9 +146,7 @@ def _against_drawing(
     rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
     agreeing = np.ones(len(readings), bool)
     wrong = []
-    for k in np.unique(readings.position):
-        rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls.places[readings.ball[rows]]
+    for k, rows, nominal in read_in_positions(design, readings):
         if len(np.unique(readings.ball[rows])) < 2:
             origins[k] = (seen[rows] - nominal @ rotations[k].T).mean(axis=0)
             continue
@@ -156,11 +154,11 @@ def _against_drawing(
         rotations[k], origins[k], agreeing[rows] = consensus_motion(nominal, seen[rows], reach)
         count = int(agreeing[rows].sum())
         if 2 * count <= len(rows):
-            wrong.append(WrongPosition(int(k), "", count, len(rows)))
+            wrong.append(WrongPosition(k, "", count, len(rows)))
         elif design.artefacts.is_plate[design.positions.artefact[k]] and not _in_line(nominal):
             turned = _turned_onto_itself(design, int(k), rotations[k], pitch)
             if turned:
-                wrong.append(WrongPosition(int(k), turned, count, len(rows)))
+                wrong.append(WrongPosition(k, turned, count, len(rows)))
     return _Motions(rotations, origins, agreeing), wrong
 
 
@@ -208,12 +206,10 @@ def _against_readings(
     # A ball without any reading keeps its place in the drawing.
     start = initial_state(replace(design, readings=readings.select(right)), x[right])
     rotations, origins, shape = start.rotations.copy(), start.origins.copy(), start.balls.copy()
-    for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]):
+    for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]).tolist():
         rotations[k], origins[k] = found.rotations[k], found.origins[k]
     off_drawing = np.zeros(len(readings))
-    for k in np.unique(readings.position):
-        rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls.places[readings.ball[rows]]
+    for k, rows, nominal in read_in_positions(design, readings):
         off_drawing[rows] = distances(nominal, seen[rows], found.rotations[k], found.origins[k])
     limit = (
         AGAINST_READINGS * pitch[readings.ball]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..design.arrays import Design
+from ..design.arrays import Design, nominal_places
 from ..geometry.motions import fit_motion, fixes_pose
 from ..geometry.symmetry import turns_onto_itself
 from ..inputs.quantities import format_length
@@ -213,9 +213,7 @@ def _positions_by_place(
         apart = []
         for k, known in enumerate(design.positions.names):
             balls = design.balls.of(design.positions.artefact[k])
-            nominal = design.positions.origins[k] + (
-                design.balls.places[balls] @ design.positions.rotations[k].T
-            )
+            nominal = nominal_places(design, k, balls)
             index = [names.get(row.texts[1], -1) for row in own]
             if all(i in balls for i in index):
                 there = nominal[np.searchsorted(balls, index)]
@@ -395,9 +393,7 @@ def _by_place(
     names: dict[str, str] = {}
     for position in dict.fromkeys(row.texts[0] for row in rows):
         own, k = [row for row in rows if row.texts[0] == position], index[position]
-        nominal = design.positions.origins[k] + (
-            design.balls.places[balls] @ design.positions.rotations[k].T
-        )
+        nominal = nominal_places(design, k, balls)
         apart, nearest = _nearest(places(own), nominal)
         for row, distance, ball in zip(own, apart, nearest, strict=True):
             if distance > limit:

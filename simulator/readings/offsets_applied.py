@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Readings, locations, measured, nominal_state
+from ..design.arrays import Design, Readings, locations, measured, nominal_state, read_in_positions
 from ..estimation.consensus import consensus_motion
 from ..estimation.initial import initial_state
 from ..experiment.readings_section import CompensationSettings, ReadingsSettings
@@ -120,9 +120,7 @@ def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]
 
 def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array) -> bool:
     """Whether most places seen (m, d) are those of the artefact as drawn, position by position."""
-    for k in np.unique(readings.position):
-        rows = np.flatnonzero(readings.position == k)
-        nominal = design.balls.places[readings.ball[rows]]
+    for _, rows, nominal in read_in_positions(design, readings):
         if len(np.unique(readings.ball[rows])) < 2:
             continue
         _, _, agreeing = consensus_motion(nominal, seen[rows], AGAINST_DRAWING * pitch[rows])

@@ -22,7 +22,7 @@ from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .coordinate_kinds import as_scale_readings, doubts_about_copies
-from .digits import doubts_about_digits
+from .digits import doubts_about_digits, doubts_about_units
 from .gross_error_messages import refuse_gross_errors, with_names_swapped
 from .observed_readings import ObservedReadings, combine_standards, reading_keys
 from .offsets_applied import doubt_about_offsets, said_of
@@ -148,6 +148,8 @@ def read_readings(
         )
     doubt = found.doubts + doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     doubt += doubts_about_digits(design, given, uncertainty)
+    if has_uncertainty:
+        doubt += doubts_about_units(design, stated)
     if settings.coordinates == "part":
         doubt += doubts_about_copies(design, readings, given)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)

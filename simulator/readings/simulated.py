@@ -39,6 +39,17 @@ class Simulated:
     generator: np.random.Generator | None
 
 
+def on_stated_machine(experiment: Experiment, design: Design) -> tuple[Design, State]:
+    """A design of an experiment as drawn on the true machine that its file states."""
+    machine = true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
+    return on_true_machine(design, machine)
+
+
+def too_large(experiment: Experiment, error: Exception) -> ExperimentError:
+    """That there are no readings, or no fit of them, with such a true machine."""
+    return ExperimentError([experiment.message(("true_machine",), f"{error}; state smaller ones")])
+
+
 def simulated_readings(
     experiment: Experiment, seed: int | None = None, exact: bool = False
 ) -> Simulated:
@@ -51,9 +62,7 @@ def simulated_readings(
     :raises ExperimentError: the true machine's errors are so large that there is no reading.
     """
     design = lay_out(experiment)
-    on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
-    )
+    on_truth, truth = on_stated_machine(experiment, design)
     chosen = experiment.seed if seed is None else seed
     generator = None if exact else np.random.default_rng(np.random.SeedSequence(chosen))
     try:
@@ -64,7 +73,5 @@ def simulated_readings(
             truth = replace(truth, balls=balls, influences=true_influences(design, generator))
             readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
-        raise ExperimentError(
-            [experiment.message(("true_machine",), f"{error}; state smaller ones")]
-        ) from None
+        raise too_large(experiment, error) from None
     return Simulated(design, truth, on_truth.model, readings, x, chosen, generator)

@@ -670,8 +670,10 @@ class FaultyCall:
 
 
 @pytest.fixture
-def small_disk() -> Iterator[Callable[[int], None]]:
+def small_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], None]]:
     """Lets files grow no larger than so many bytes, by the system's own limit."""
+    # A module that is loaded meanwhile would be kept as far as the disk takes it.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     # The interpreter ignores the signal, so that writing fails.
     yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))

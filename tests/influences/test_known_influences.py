@@ -75,3 +75,38 @@ def test_thousands_are_counted(tmp_path: Path) -> None:
     found = predict(file_with(tmp_path, [each | {"standard_uncertainty": "0.1 um"}]))
     assert len(found.influences) == len(found.to_dict()["influences"]) == 54 * 3
     assert any(f"({54 * 3 - 30} more are in --json)" in one for one in found.lines())
+
+
+def test_plates_whose_balls_have_the_same_names_have_displacements_of_their_own(
+    tmp_path: Path,
+) -> None:
+    """As if the balls of the second plate had other names."""
+    each = {"kind": "reproducibility", "each": ["ball"], "standard_uncertainty": "0.2 um"}
+    grid = {"kind": "grid", "balls": [2, 2], "size": ["400 mm", "400 mm"]}
+    places = {"a": [0, 0], "b": [400, 0], "c": [0, 400], "d": [400, 400]}
+    renamed = {name: [f"{x} mm", f"{y} mm", "0 mm"] for name, (x, y) in places.items()}
+    corner = {"x": "100 mm", "y": "100 mm"}
+    place = {"plane": "z", "corner": corner, "probes": ["down"]}
+    positions = [
+        place
+        | {"name": f"{plate} {turn}", "level": level, "artefact": plate, "quarter_turns": turn}
+        for plate, level in (("one", "200 mm"), ("two", "600 mm"))
+        for turn in (0, 1)
+    ]
+    for one in positions[2:]:
+        one["corner"] = {"x": "300 mm", "y": "200 mm"}
+    positions[0]["repeats"] = 2
+    known = [
+        {"kind": "distances", "artefact": "one", "pairs": "all", "standard_uncertainty": "0.2 um"}
+    ]
+    beside: dict[str, Any] = {"positions": positions, "calibration": known}
+    beside["error_model"] = {"kind": "metric"}
+    of_names = [
+        predict(file_with(tmp_path, [each], **beside, artefacts={"one": grid, "two": second}))
+        for second in (grid, {"kind": "balls", "coordinates": renamed})
+    ]
+    same, other = (found.to_dict()["quantities"] for found in of_names)
+    assert same["U5"]["average"] == pytest.approx(other["U5"]["average"], rel=1e-9)
+    names = [one.name for one in of_names[0].influences]
+    assert len(set(names)) == 2 * 4 * 3
+    assert "displacement of ball two/r1c1: x" in names

@@ -10,7 +10,6 @@ from ballplate.simulator.machines.bases import (
     Monomial,
     Polynomial,
     Spline,
-    spline_containing,
     whole_values,
 )
 from hypothesis import given
@@ -158,25 +157,3 @@ def test_constrained_ends_hold_for_every_function_and_for_no_fewer(basis: Spline
     assert basis.size == 0 or np.linalg.cond(ours) < 1e3
     np.testing.assert_allclose(ours - wanted @ (wanted.T @ ours), 0.0, atol=1e-12)
     np.testing.assert_allclose(basis.values(T), all_(T) @ ours, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("parts", "raised"),
-    [
-        ((Polynomial(5), Monomial(7)), 0),
-        ((Polynomial(5), Polynomial(5)), 1),
-        ((Spline(4, (0.5,)), Polynomial(3)), 0),
-        ((Spline(4, (0.5,)), Spline(3, (0.25, 0.5))), 1),
-        ((Spline(3), Polynomial(5)), 0),
-        ((Spline(4, (0.5, 0.5), ends="zero slopes"), Spline(3, (0.25,), ends="periodic")), 1),
-        ((Spline(4, (0.5, 0.5), ends="zero slope at start"),), 0),
-    ],
-)
-def test_a_containing_family_contains(parts: tuple[Basis, ...], raised: int) -> None:
-    whole = whole_values(spline_containing(parts, raised), T)
-    for k, part in enumerate(parts):
-        values = np.column_stack([whole_values(part, T), part.values(T)])
-        if k >= len(parts) - raised:
-            values = values * T[:, None]
-        left = values - whole @ np.linalg.lstsq(whole, values, rcond=None)[0]
-        np.testing.assert_allclose(left, 0.0, atol=1e-12)

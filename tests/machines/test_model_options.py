@@ -11,13 +11,21 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial, Spline
-from ballplate.simulator.machines.conversion import containing, linear_map
+from ballplate.simulator.machines.conversion import linear_map
 from ballplate.simulator.machines.curves import Points, curves_model
+from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.error_names import AXIS_ERRORS, ERRORS, SQUARENESS_ERRORS
 from ballplate.simulator.machines.kinematic import KinematicModel, in_plane, kinematic_model_of
 from ballplate.simulator.machines.plane import PlaneModel, in_space
 from ballplate.simulator.machines.settings import build_error_model
-from ballplate.simulator.machines.terms import RADIAL, WITH_CONSTANT, Radial, RadialName, univariate
+from ballplate.simulator.machines.terms import (
+    RADIAL,
+    WITH_CONSTANT,
+    Radial,
+    RadialName,
+    sums,
+    univariate,
+)
 from ballplate.sweeps.fingerprint import fingerprint
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
@@ -134,7 +142,7 @@ def test_an_empirical_model_contains_the_twenty_one_parameter_form(arrangement: 
         ARRANGEMENTS[arrangement], Polynomial(4), Polynomial(3), LOWER, UPPER, squareness=True,
         own=(("EXX", Spline(4, (0.3,))),),
     )  # fmt: skip
-    outer = containing(model)
+    outer = empirical_model(sums(Spline(4, (0.3,))), LOWER, UPPER, frame=())
     matrix = linear_map(model, outer)
     generator = np.random.default_rng(2)
     x, p = generator.uniform(LOWER, UPPER, (30, 3)), generator.normal(0.0, 0.1, (30, 3))

@@ -24,7 +24,7 @@ from ballplate.simulator.design.objects import (
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.priors import no_priors
+from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from numpy.typing import NDArray
@@ -191,7 +191,7 @@ def plate_design(
                 certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
             ),
             no_lengths(),
-            no_priors(),
+            Priors((), *np.zeros((3, 0), np.int64), np.zeros((0, 0)), *np.zeros((2, 0))),
         ),
         unknown_lengths=UnknownLengths((), np.zeros(0, np.int64), np.zeros(0)),
         evaluation=EvaluationPoints(np.zeros((0, 3)), 0),

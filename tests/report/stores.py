@@ -35,6 +35,7 @@ def made_up(
     axes: list[dict[str, Any]],
     rows: Iterable[CellResult],
     trials: int | None = None,
+    record: Sequence[str] = ("U2", "U4", "U6"),
 ) -> Store:
     """A store of a sweep over all combinations of the axes' values, without files."""
     store = open_store(path, create=True)
@@ -49,7 +50,7 @@ def made_up(
         "cells": [list(cell) for cell in product(*(range(len(one["labels"])) for one in axes))],
         "trials": trials,
         "seed": 1,
-        "record": ["U2", "U4", "U6"],
+        "record": list(record),
     }
     add_rows(store, add_sweep(store, definition, []), rows)
     return store

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
+import re
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.cli import main
 from ballplate.report.answer import answer
 from ballplate.report.heatmaps import BLANK, DEFICIENT, heat_maps
 from ballplate.report.results import ReportedSweep, read_results
 from ballplate.report.series import plots
 from ballplate.report.store_comparison import IncomparableError, compared
+from ballplate.sweeps.store import open_store
 
-from tests.report.stores import axis, done, made_up
+from tests.report.stores import axis, done, failed, made_up
 
 SIZES, BALLS, MODELS = (300.0, 400.0, 500.0), (4.0, 6.0), ("metric", "kinematic")
 
@@ -75,7 +80,7 @@ def test_what_is_undetermined_never_meets_the_target(tmp_path: Path) -> None:
     """The setting of the smallest average leaves lengths undetermined."""
     best = 2 * 2 * 2 + 2
     found = answer(sweep(tmp_path, open_=(best,)))
-    assert "1 of 12 settings leave something undetermined." in found.sentences
+    assert "1 of 12 settings leaves something undetermined." in found.sentences
     rows = [one.headings for one in found.settings.blocks[0].rows]
     assert ("500 mm", "6", "metric") not in rows[: int(found.sentences[0].split()[0])]
 
@@ -120,7 +125,8 @@ def test_the_same_settings_of_two_stores_are_compared(tmp_path: Path) -> None:
     here, there = sweep(tmp_path / "a"), sweep(tmp_path / "b", worse=1.25, open_=(5,))
     found = compared(here, there, "b.sqlite")
     assert found.sentences[0].startswith("12 settings are done in both; 0 in this store alone")
-    assert "smaller than in b.sqlite in 11 of them, by a factor of 0.800." in found.sentences[1]
+    assert found.sentences[1].startswith("In 1 of them some of U6 is undetermined in one or both")
+    assert "smaller than in b.sqlite in 11 of them, by a factor of 0.800." in found.sentences[2]
     assert (
         "0 settings are rank-deficient only in this store, 1 only in b.sqlite." in found.sentences
     )
@@ -138,3 +144,191 @@ def test_sweeps_over_other_axes_are_not_compared(tmp_path: Path) -> None:
     ]
     with pytest.raises(IncomparableError, match="swept over balls, edge, model and"):
         compared(sweep(tmp_path / "a"), sweep(tmp_path / "b", axes=other), "b.sqlite")
+
+
+def test_settings_are_the_same_in_whichever_unit_they_are_written(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    metres = [
+        axis("balls", ["6", "4"], [6.0, 4.0], "1"),
+        axis("size", [f"{one / 1e3} m" for one in SIZES], [one / 1e3 for one in SIZES], "m"),
+        axis("model", list(MODELS), [], ""),
+    ]
+    here = sweep(tmp_path / "a")
+    there = made_up(
+        tmp_path / "b" / "b.sqlite",
+        "metres",
+        metres,
+        (
+            done(k, {"U6_average_m": average(size, balls, model), "observations": 1.0})
+            for k, (balls, size, model) in enumerate(itertools.product((6.0, 4.0), SIZES, MODELS))
+        ),
+    )
+    found = compared(here, read_results(there, 1), "b.sqlite")
+    assert found.sentences[0].startswith("12 settings are done in both; 0 in this store alone, 0")
+    assert found.sentences[1] == "All averages are the same."
+
+
+def random_sweep(path: Path, seed: int) -> None:
+    """A store whose settings have few different figures, some of them failed, left, without a
+    target, undetermined, or undetermined in part.
+    """
+    draw = np.random.default_rng(seed)
+    numbers = draw.permutation(5)[: draw.integers(1, 5)] + 1.0
+    axes = [
+        axis("size", [f"{one:.0f} mm" for one in numbers], [one / 1e3 for one in numbers], "m"),
+        axis("model", list("abc")[: draw.integers(1, 4)]),
+        axis("balls", ["3", "4"], [3.0, 4.0], "1"),
+    ][: draw.integers(1, 4)]
+    count = int(np.prod([len(one["labels"]) for one in axes]))
+    has_target, recorded = draw.random() < 0.8, draw.random() < 0.85
+
+    def rows():
+        for cell in range(count):
+            kind = draw.random()
+            if kind < 0.1:
+                yield failed(cell, "outside the volume")
+            if kind < 0.2:
+                continue
+            open_ = 0.0 if kind < 0.7 else 9.0 if kind > 0.9 else 4.0
+            figures = {"rank_deficiency": float(open_ > 0), "as_expected": 1.0}
+            figures["observations"] = float(draw.choice([10, 20]))
+            if recorded:
+                size = np.nan if open_ == 9.0 else 1e-6 * draw.choice([1.0, 2.0, 3.0, 4.0])
+                figures |= {"U6_average_m": size, "U6_maximum_m": size, "U6_undetermined": open_}
+                if has_target and draw.random() < 0.9:
+                    figures["U6_within_target"] = float(
+                        draw.choice([0.25, 1.0]) if open_ == 0.0 else 0.25
+                    )
+            else:
+                size = 1e-6 * draw.choice([1.0, 2.0])
+                figures |= {"U4_average_m": size, "U4_maximum_m": size, "U4_undetermined": 0.0}
+            yield done(cell, figures)
+
+    record = ("U4", "U6") if recorded else ("U4",)
+    made_up(path, "random", axes, rows(), record=record).close()
+
+
+def test_every_sentence_is_what_the_exported_table_says(tmp_path: Path) -> None:
+    """Counts, the cheapest, ties and worths, enumerated from the CSV of many sweeps."""
+    said = set()
+    for seed in range(25):
+        path = tmp_path / f"{seed}.sqlite"
+        random_sweep(path, seed)
+        assert main(["export", str(path), "-o", str(path.with_suffix(".csv"))]) == 0
+        with path.with_suffix(".csv").open(encoding="utf-8") as file:
+            table = list(csv.DictReader(file))
+        with closing(open_store(path)) as store:
+            results = read_results(store, 1)
+        told = answer(results)
+        names = [one["column"] for one in results.definition["axes"]]
+        every = len(results.cells)
+        finished = [row for row in table if row["status"] == "done"]
+        if not finished:
+            assert told is None
+            continue
+        text = " ".join(told.sentences)
+        said |= set(re.findall(r"[a-z]+(?= the| at| not| something|;|\.)", text))
+        _assert_counts(text, table, finished, every)
+        symbol = "U6" if "U6_average_m" in finished[0] else "U4"
+        known = [row for row in finished if row[f"{symbol}_undetermined"] in ("0", "0.0")]
+        _assert_first(text, told.settings.blocks[0].rows[0].headings, symbol, finished, known)
+        for one in told.worth:
+            _assert_worth(one, names, known, f"{symbol}_average_m")
+    # All kinds of sentences have come up.
+    assert {"meet", "meets", "failed", "lengths", "undetermined"} <= said
+
+
+def _assert_counts(
+    text: str, table: list[dict[str, str]], finished: list[dict[str, str]], every: int
+) -> None:
+    deficient = sum(float(row["rank_deficiency"]) > 0 for row in finished)
+    found = re.search(r"(\d+) of (\d+) settings? leaves? something undetermined", text)
+    assert (deficient > 0) == (found is not None)
+    if found:
+        assert [int(one) for one in found.groups()] == [deficient, len(finished)]
+    for count, words in (
+        (len(table) - len(finished), "failed"),
+        (every - len(table), "not computed yet"),
+    ):
+        assert (f"{count} {words}" in text) == (count > 0)
+
+
+def _assert_first(
+    text: str,
+    first: tuple[str, ...],
+    symbol: str,
+    finished: list[dict[str, str]],
+    known: list[dict[str, str]],
+) -> None:
+    """The first sentences, and the first setting of the table."""
+    shares = [row for row in finished if row.get("U6_within_target")]
+    meeting = [row for row in shares if float(row["U6_within_target"]) == 1.0]
+    average = f"{symbol}_average_m"
+    if symbol == "U4":
+        assert text.startswith("U6 is not recorded")
+    elif not shares:
+        assert text.startswith("No setting has a target")
+    elif not meeting:
+        assert text.startswith(("None of the", "The only setting does not meet"))
+        assert "25 % of the lengths" in text
+    else:
+        assert re.match(rf"{len(meeting)} of {len(shares)} settings? meets? the target", text)
+        fewest = min(float(row["observations"]) for row in meeting)
+        cheapest = [row for row in meeting if float(row["observations"]) == fewest]
+        best = min(float(row[average]) for row in cheapest)
+        if len(cheapest) == 1:
+            assert f": {fewest:.0f} observations" in text and "The one with the fewest" in text
+        else:
+            assert f"observations are {fewest:.0f}, in {len(cheapest)} of these settings" in text
+            tied = sum(float(row[average]) == best for row in cheapest) - 1
+            assert f"{1e6 * best:.2f} µm" in text and (f"{tied} more." in text) == (tied > 0)
+        chosen = [row for row in cheapest if float(row[average]) == best]
+        assert first in [_labels(row) for row in chosen]
+    if shares:
+        apart = len(finished) - len(shares)
+        assert ("no target to be compared with" in text) == (apart > 0)
+    elif known:
+        best = min(float(row[average]) for row in known)
+        tied = sum(float(row[average]) == best for row in known) - 1
+        assert f"{symbol}, {1e6 * best:.2f} µm" in text and ("the same." in text) == (tied > 0)
+        assert first in [_labels(row) for row in known if float(row[average]) == best]
+    else:
+        assert f"In every setting some of {symbol} is undetermined" in text
+
+
+def _labels(row: dict[str, str]) -> tuple[str, ...]:
+    """A setting of the exported table as the page writes it."""
+    told = [f"{1e3 * float(row['size_m']):.0f} mm"]
+    told += [row["model"]] if "model" in row else []
+    return (*told, *([f"{float(row['balls']):.0f}"] if "balls" in row else []))
+
+
+def _assert_worth(one, names: list[str], known: list[dict[str, str]], average: str) -> None:
+    column = {"size": "size_m"}.get(one.axis, one.axis)
+    groups: dict[tuple[str, ...], dict[str, float]] = {}
+    for row in known:
+        others = tuple(row[name] for name in names if name != column)
+        groups.setdefault(others, {})[row[column]] = float(row[average])
+    values = sorted({row[column] for row in known}, key=lambda text: (len(text), text))
+    if column == "model":
+        several = [group for group in groups.values() if len(group) > 1]
+        ratios = [max(group.values()) / min(group.values()) for group in several]
+        best = [
+            label
+            for label in "abc"
+            if several
+            and all(label in group and group[label] == min(group.values()) for group in several)
+        ]
+        assert one.best == (best[0] if len(best) == 1 else "")
+    else:
+        ends = (min(values, key=float), max(values, key=float)) if values else ("", "")
+        several = [
+            group for group in groups.values() if ends[0] != ends[1] and set(ends) <= set(group)
+        ]
+        ratios = [group[ends[1]] / group[ends[0]] for group in several]
+        inside = [min(group.values()) < min(group[ends[0]], group[ends[1]]) for group in several]
+        assert one.between == sum(inside)
+    assert one.settings == len(ratios)
+    if ratios:
+        assert (one.low, one.high) == (pytest.approx(min(ratios)), pytest.approx(max(ratios)))

@@ -20,9 +20,9 @@ from ballplate.simulator.geometry.positions import (
 from ballplate.simulator.inputs.messages import Step, format_path
 from ballplate.simulator.inputs.quantities import LengthFunction, parse_length, typed_length
 from ballplate.simulator.inputs.yamltext import flow
+from ballplate.simulator.inputs.yamltree import to_list
 from ballplate.simulator.machines.protocol import Array
 
-from ..experiment_file import to_list
 from .changes import ball_set, pair_set
 
 AXES = "xyz"

@@ -64,10 +64,58 @@ class Reach(Result):
         return self.present.words
 
     def lines(self) -> list[str]:
-        return _lines(self)
+        """The goal, whether the design meets it, and a row for each unknown."""
+        now = "met" if self.present.is_met else "not met"
+        lines = [
+            f"{self.label}: {self.title}",
+            f"goal: {self.goal}",
+            f"as drawn: {now}; {self.present.words}",
+        ]
+        if self.present.undetermined:
+            lines.append(
+                f"rank deficiency {self.deficiency}: repair the design first; ballplate check shows"
+                " what is undetermined"
+            )
+        rows = [["changed alone", "as drawn", "needed", "result"]]
+        for one in self.answers:
+            rows.append([one.title, one.present, _needed(one), _outcome(one)])
+        lines += ["", *aligned(rows, [False] * 4)]
+        notes = []
+        for one in self.answers:
+            notes += [f"{one.name}: {one.beside}"] if one.beside else []
+            notes += [f"{one.name}: {remark}" for remark in one.remarks]
+        return lines + ["", *notes] if notes else lines
 
     def to_dict(self) -> dict[str, Any]:
-        return _data(self)
+        """The same as plain data, values in metres or as numbers."""
+        goal = self.goal
+        told: dict[str, Any] = {"kind": goal.kind}
+        if goal.kind == "lengths":
+            told["share"] = goal.share
+        if goal.kind == "quantity":
+            told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "goal": told,
+            "is_met": self.present.is_met,
+            "as_drawn": self.present.words,
+            "rank_deficiency": self.deficiency,
+            "undetermined": self.present.undetermined,
+            "answers": {
+                one.name: {
+                    "status": {"varied": "cannot be varied"}.get(one.status, one.status),
+                    "as_drawn": one.present or None,
+                    "needed": one.words if one.is_met else None,
+                    "needed_value": one.value if one.is_met else None,
+                    "limit": one.words if one.status == "none" else None,
+                    "outcome": one.outcome or None,
+                    "next": one.beside or None,
+                    "remarks": list(one.remarks),
+                }
+                for one in self.answers
+            },
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each unknown."""
@@ -104,30 +152,6 @@ def _panel(answer: Answer) -> TriedValues:
     return TriedValues(answer.title, unit, factor * values, distances, is_met)
 
 
-def _lines(reach: Reach) -> list[str]:
-    """The goal, whether the design meets it, and a row for each unknown."""
-    now = "met" if reach.present.is_met else "not met"
-    lines = [
-        f"{reach.label}: {reach.title}",
-        f"goal: {reach.goal}",
-        f"as drawn: {now}; {reach.present.words}",
-    ]
-    if reach.present.undetermined:
-        lines.append(
-            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check shows"
-            " what is undetermined"
-        )
-    rows = [["changed alone", "as drawn", "needed", "result"]]
-    for one in reach.answers:
-        rows.append([one.title, one.present, _needed(one), _outcome(one)])
-    lines += ["", *aligned(rows, [False] * 4)]
-    notes = []
-    for one in reach.answers:
-        notes += [f"{one.name}: {one.beside}"] if one.beside else []
-        notes += [f"{one.name}: {remark}" for remark in one.remarks]
-    return lines + ["", *notes] if notes else lines
-
-
 def _needed(answer: Answer) -> str:
     if answer.status == "found":
         return f"at {'least' if answer.grows else 'most'} {answer.words}"
@@ -144,35 +168,3 @@ def _outcome(answer: Answer) -> str:
             else f"best of those tried, {answer.words}: {answer.outcome}"
         )
     return answer.outcome
-
-
-def _data(reach: Reach) -> dict[str, Any]:
-    """The same as plain data, values in metres or as numbers."""
-    goal = reach.goal
-    told: dict[str, Any] = {"kind": goal.kind}
-    if goal.kind == "lengths":
-        told["share"] = goal.share
-    if goal.kind == "quantity":
-        told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
-    return {
-        "experiment": reach.label,
-        "title": reach.title,
-        "goal": told,
-        "is_met": reach.present.is_met,
-        "as_drawn": reach.present.words,
-        "rank_deficiency": reach.deficiency,
-        "undetermined": reach.present.undetermined,
-        "answers": {
-            one.name: {
-                "status": {"varied": "cannot be varied"}.get(one.status, one.status),
-                "as_drawn": one.present or None,
-                "needed": one.words if one.is_met else None,
-                "needed_value": one.value if one.is_met else None,
-                "limit": one.words if one.status == "none" else None,
-                "outcome": one.outcome or None,
-                "next": one.beside or None,
-                "remarks": list(one.remarks),
-            }
-            for one in reach.answers
-        },
-    }

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ballplate.simulator.estimation.linearisation import Linearisation
 
 from ...rank.motions import Motion
-from ..formatting import SHOWN
 from .design_views import ball_views, motion_view, point_view, volume_view
 from .document import Page, PageSection, facts_list, origin, written
 from .elements import Html, element, folded, joined, note, sentence, table
 from .length_sections import lengths_section
 from .quoted import QuotedData
 from .residual_sections import reliability_section
+from .spatial import figure_of
 from .uncertainty_sections import (
     expansion,
     lengths_words,
@@ -77,7 +77,7 @@ def design_page(contents: DesignContents) -> str:
             "Lengths throughout the volume",
             lengths_section(quoted["lengths"], contents.target),
         ),
-        PageSection("ellipsoids", "Points and balls", figures_wide(ellipsoids)),
+        PageSection("ellipsoids", "Points and balls", figures_wide(map(figure_of, ellipsoids))),
         PageSection("scale", "Where scale comes from", scale_section(run)),
         PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
@@ -89,10 +89,10 @@ def design_page(contents: DesignContents) -> str:
 
 def _experiment(contents: DesignContents) -> Html:
     """The volume with what is in it, and what was assumed."""
-    return figures_wide([volume_view(contents.at.design), facts_list(contents.facts)])
+    return figures_wide([figure_of(volume_view(contents.at.design)), facts_list(contents.facts)])
 
 
-def figures_wide(content: Sequence[Html]) -> Html:
+def figures_wide(content: Iterable[Html]) -> Html:
     """Pictures beside one another where there is much room."""
     return element("div", *content, class_="figures views")
 
@@ -162,7 +162,7 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
             if drawn is None:
                 rest.append(element("li", told, value=k))
             else:
-                pictures.append(drawn)
+                pictures.append(figure_of(drawn))
         parts += [element("h3", title), note(words), figures_wide(pictures)]
         if rest:
             summary = "Directions without a picture" if pictures else "Directions"
@@ -192,7 +192,8 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         for number, one in enumerate(repairs.at(key).each(), start=1):
             changes = joined((change.text("text") for change in one.at("changes").each()), "; ")
             of = ", ".join(map(str, one.data["removes"]))
-            name = f"repair {number}" if key == "complete" else f"of direction {of} alone"
+            many = "s" if len(one.data["removes"]) > 1 else ""
+            name = f"repair {number}" if key == "complete" else f"of direction{many} {of} alone"
             edits = joined(
                 element(
                     "li",
@@ -224,14 +225,13 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         "in the file",
     ]
     made_table = table("repairs", "Changes, cheapest first, each verified", heads, rows, (0, 1, 5))
-    return joined(
-        [
-            sentence("Each of these determines what is open.", now)
-            if repairs.data["complete"]
-            else "",
-            made_table,
-        ]
-    )
+    whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
+    told = "Each of these determines what is open."
+    if not whole:
+        told = "None of these determines all that is open."
+    elif parts:
+        told = "Each repair determines what is open; the other changes determine a part of it."
+    return joined([sentence(told, now), made_table])
 
 
 def _influences(run: QuotedData) -> Html:
@@ -239,12 +239,11 @@ def _influences(run: QuotedData) -> Html:
         return Html()
     rows = []
     for name, one in zip(run.data["influences"], run.at("influences").each(), strict=True):
-        stated = (
-            one.micro("stated_standard_uncertainty")
-            if one.data["stated_standard_uncertainty"] is not None
-            else "free"
-        )
-        rows.append([name, stated, one.micro("standard_uncertainty"), SHOWN[one.data["unit"]]])
+        u, unit = one.amount("standard_uncertainty", "unit")
+        stated = "unknown"
+        if one.data["stated_standard_uncertainty"] is not None:
+            stated, _ = one.amount("stated_standard_uncertainty", "unit")
+        rows.append([name, stated, u, unit])
     heads = ["influence quantity", "u stated", "u after the readings", "unit"]
     return table("influences", "Influence quantities", heads, rows, (0, 3))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from html import escape
 
@@ -45,7 +46,7 @@ def element(tag: str, *content: str, **attributes: str | float | bool | None) ->
         elif value is not None and value is not False:
             written.append(f'{name}="{escape(in_one_line(str(value)))}"')
     start = f"<{' '.join(written)}>"
-    if tag in ("br", "link", "meta", "input"):
+    if tag in ("br", "img", "input", "link", "meta"):
         return Html(start)
     return Html(f"{start}{joined(content)}</{tag}>")
 
@@ -81,9 +82,11 @@ def table(
         element(
             "tr",
             *(
-                element("th", one, scope="row")
+                element("th", one, scope="row", class_=_width(one) or None)
                 if k == 0
-                else element("td", one, class_=_cell_class(one) if k in texts else None)
+                else element(
+                    "td", one, class_=f"words {_width(one)}".strip() if k in texts else None
+                )
                 for k, one in enumerate(row)
             ),
         )
@@ -102,9 +105,10 @@ def table(
     )
 
 
-def _cell_class(text: str) -> str:
-    """Class of a cell with words, which may go over several lines where they are many."""
-    return "words long" if len(text) > 40 else "words"
+def _width(content: str) -> str:
+    """Class of a cell with words, which go over several lines where they are many."""
+    shown = len(re.sub("<[^>]*>", "", content) if isinstance(content, Html) else content)
+    return "long" if shown > 40 else "some" if shown > 16 else ""
 
 
 def folded(summary: str, *content: str, is_open: bool = False) -> Html:

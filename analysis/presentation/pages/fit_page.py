@@ -21,6 +21,7 @@ from .residual_sections import (
     residual_view,
     suspects_section,
 )
+from .spatial import figure_of
 from .uncertainty_sections import (
     estimates_table,
     expansion,
@@ -97,7 +98,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
                 residual_charts(
                     found.standardised, found.position, found.probe, found.positions, found.probes
                 ),
-                residual_view(found.places, np.nan_to_num(found.values), contents.edges),
+                figure_of(residual_view(found.places, np.nan_to_num(found.values), contents.edges)),
                 residual_tables(fit),
             ]
         )
@@ -128,6 +129,7 @@ def _is_good(data: Mapping[str, Any]) -> bool:
     wrong = (
         data["degrees_of_freedom"] <= 0
         or data["complaint"]
+        or data["weakly_determined"]
         or data["too_large"]
         or data.get("suspected")
         or data["warnings"]
@@ -152,6 +154,10 @@ def _verdict(fit: QuotedData, contents: FitContents) -> Html:
         scatter = "there is no redundancy, so that residuals show nothing"
     elif data["too_large"]:
         scatter = "the residuals are larger than the stated uncertainties explain"
+    weak = len(data["weakly_determined"])
+    if weak:
+        many = "s are" if weak > 1 else " is"
+        rank = joined([rank, f", {weak} direction{many} weakly determined"])
     count = len(data.get("suspected", ()))
     suspects = f", and {count} cause{'s are' if count > 1 else ' is'} suspected" if count else ""
     estimated = "estimated from the residuals" if data["sigma_is_estimated"] else "as given"

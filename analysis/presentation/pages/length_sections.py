@@ -11,7 +11,7 @@ from .quoted import QuotedData
 
 SHADES = 8
 # Of a map: width of a cell, its height, and the room around.
-CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 6.0
+CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 18.0
 
 
 def lengths_section(lengths: QuotedData, target: str) -> Html:
@@ -35,6 +35,7 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
         words = f"{what} of the lengths from each point{at}"
         maps.append(figure(f"{words}.", _map(lengths, chosen.tolist(), k, bool(target), words)))
     whole = lengths.at("all")
+    is_open = whole.data["undetermined"] == whole.data["lengths"]
     head = [
         whole.number("lengths"),
         " lengths between the points of a grid, with the probe ",
@@ -42,7 +43,7 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
     ]
     if whole.data["undetermined"]:
         head += [", ", whole.number("undetermined"), " of them undetermined"]
-    if target:
+    if target and not is_open:
         head += [
             ": the standard uncertainty u is within the target ",
             target,
@@ -54,6 +55,8 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
             whole.share("share_expanded_within"),
             f" (k = {data['coverage_factor']:g})",
         ]
+    if is_open:
+        return element("p", *head, ".")
     above = "Above 1 (orange) the target is missed; darker" if target else "Darker"
     legends = note(f"{above} is larger. Some lengths from points with – are undetermined.")
     return joined(
@@ -112,7 +115,7 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
     for j, value in enumerate(y.tolist()):
         parts.append(_label(LEFT - 5, bottom - ROW * (j + 0.5) + 3.5, f"{1e3 * value:.5g}", "end"))
     parts.append(_label(LEFT + CELL * len(x) / 2, bottom + 26, "x, mm", "middle"))
-    parts.append(_label(4, ABOVE + 8, "y", "start"))
+    parts.append(_label(LEFT - 5, ABOVE - 6, "y, mm", "end"))
     return element(
         "svg",
         joined(parts),

@@ -7,10 +7,10 @@ from html import escape
 
 import numpy as np
 from ballplate.simulator.geometry.motions import fit_motion
-from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.machines.protocol import Array
 
 from ...presentation.formatting import number
+from ...presentation.paper import escaped, on_paper, pitch
 from .certificate_csv import coordinate_names
 from .certified_balls import NO_ACCREDITATION, CertifiedBalls
 
@@ -68,15 +68,15 @@ def certificate_page(certificate: CertifiedBalls) -> str:
     distances, covariance.
     """
     title = f"Ball co-ordinates of {certificate.artefact}"
-    remarks = "".join(f"<p>{_escaped(text)}</p>" for text in certificate.remarks)
+    remarks = "".join(f"<p>{escaped(text)}</p>" for text in certificate.remarks)
     facts = "".join(
-        f"<dt>{_escaped(key)}</dt><dd>{_escaped(text)}</dd>"
+        f"<dt>{escaped(key)}</dt><dd>{escaped(text)}</dd>"
         for key, text in certificate.facts.items()
     )
     k = f"{certificate.coverage_factor:g}"
     parts = [
-        f"<h1>{_escaped(title)}</h1>",
-        f'<p class="statement">{_escaped(NO_ACCREDITATION)}</p>',
+        f"<h1>{escaped(title)}</h1>",
+        f'<p class="statement">{escaped(NO_ACCREDITATION)}</p>',
         f"<dl>{facts}</dl>",
         f'<div class="remarks"><h2>Remarks</h2>{remarks}</div>' if remarks else "",
         _drawing(certificate),
@@ -89,22 +89,19 @@ def certificate_page(certificate: CertifiedBalls) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{_escaped(title)}</title><style>{STYLE}</style></head>\n"
+        f"<title>{escaped(title)}</title><style>{STYLE}</style></head>\n"
         "<body>\n" + "\n".join(part for part in parts if part) + "\n</body></html>\n"
     )
-
-
-def _escaped(text: str) -> str:
-    return escape(in_one_line(text))
 
 
 def _table(rows: Sequence[Sequence[str]], names: int) -> str:
     """Rows below a line of headings, of which the first cells are names."""
 
     def cells(row: Sequence[str], kind: str) -> str:
-        kinds = [f'{kind} class="name"' if k < names else kind for k in range(len(row))]
+        start = f'{kind} scope="col"' if kind == "th" else kind
+        kinds = [f'{start} class="name"' if k < names else start for k in range(len(row))]
         return "".join(
-            f"<{one}>{_escaped(cell)}</{kind}>" for one, cell in zip(kinds, row, strict=True)
+            f"<{one}>{escaped(cell)}</{kind}>" for one, cell in zip(kinds, row, strict=True)
         )
 
     head, *body = rows
@@ -149,14 +146,9 @@ def _drawing(certificate: CertifiedBalls) -> str:
     lower, size = drawn.min(axis=0), np.ptp(drawn, axis=0)
     scale = (SIZE - 2 * MARGIN) / (float(size.max()) or 1.0)
     largest = float((np.linalg.norm(apart, axis=1) + u.max(axis=1)).max())
-    times = _rounded_down(LONGEST * _pitch(drawn) / largest) if largest > 0.0 else 1.0
+    times = _rounded_down(LONGEST * pitch(drawn) / largest) if largest > 0.0 else 1.0
     height = scale * float(size[1]) + 2 * MARGIN
-    places = np.column_stack(
-        [
-            MARGIN + scale * (drawn[:, 0] - lower[0]),
-            height - MARGIN - scale * (drawn[:, 1] - lower[1]),
-        ]
-    )
+    places = on_paper(drawn, lower, scale, MARGIN, height)
     shifts = scale * times * apart * [1.0, -1.0]
     radii = scale * times * u
     parts = [
@@ -176,7 +168,7 @@ def _drawing(certificate: CertifiedBalls) -> str:
         if len(places) <= MOST_NAMED:
             parts.append(
                 f'<text x="{x:.1f}" y="{y + 16:.1f}" font-size="9" text-anchor="middle"'
-                f' fill="#555">{_escaped(name)}</text>'
+                f' fill="#555">{escaped(name)}</text>'
             )
     longest = number(1e6 * float(np.linalg.norm(apart, axis=1).max()), 3)
     return (
@@ -201,11 +193,3 @@ def _rounded_down(value: float) -> float:
     """
     power = 10.0 ** np.floor(np.log10(value))
     return float(f"{np.floor(value / power) * power:.1g}")
-
-
-def _pitch(points: Array) -> float:
-    """The least distance between points, of the first few hundred."""
-    some = points[:400]
-    apart = np.linalg.norm(some[:, None] - some[None], axis=2)
-    apart = apart[apart > 1e-9]
-    return float(apart.min()) if len(apart) else 1.0

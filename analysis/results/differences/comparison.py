@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines, Integers
 
@@ -113,7 +114,7 @@ def compared(
         one, other = (each.displacements(points, offset) for each in (first, second))
         return ValueDifference(one, other, freedom)
 
-    reference = _grid(volume, settings.grid)
+    reference = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
     points = settings.points if isinstance(settings.points, np.ndarray) else reference
     _refuse_outside(points, volume)
     found, offset = at(points, offsets[probe]), offsets[probe]
@@ -131,7 +132,7 @@ def compared(
     names = tuple(
         f"{axis} at {place}" for place in map(_place, points) for axis in AXIS_NAMES[: len(middle)]
     )
-    corners = _grid(volume, 2)
+    corners = even_grid(volume.lower, volume.upper, [2] * len(volume.lower))
     of_corners = at(corners, offset)
     lengths = [
         _lengths(of_corners, corners, kind, pairs, (first, second), k)
@@ -201,11 +202,6 @@ def _offsets(
         known = ", ".join(offsets) or "none"
         raise NotComparableError(f'no probe "{probe}" in both maps; in both: {known}')
     return probe, offsets
-
-
-def _grid(volume: Volume, count: int) -> Array:
-    sides = [np.linspace(*ends, count) for ends in zip(volume.lower, volume.upper, strict=True)]
-    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(sides))
 
 
 def _refuse_outside(points: Array, volume: Volume) -> None:

@@ -233,7 +233,7 @@ def replicated(
     if solution.status != "converged":
         return Replicate(solution.status, np.zeros(0), float("nan"))
     at = linearised_fit(given, solution)
-    freedom = design.observation_count - design.parameter_count + at.deficiency
+    freedom = at.degrees_of_freedom
     left = solution.factor.sum_of_squares / max(freedom, 1)
     return Replicate("converged", estimated_functions(at, monomials).values, float(np.sqrt(left)))
 

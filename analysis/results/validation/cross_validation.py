@@ -22,8 +22,13 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.same_readings import (
+    is_one_campaign,
+    read_once_words,
+    same_positions,
+)
 
-from ...presentation.formatting import aligned, as_data, number
+from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
 from .lack_of_fit import chance_of, chance_words
 from .left_out import MOST_POINTS
@@ -40,7 +45,8 @@ class CrossValidation(FitResult):
 
     `sum_of_squares` of the differences, weighted with their covariance, has `dimensions`, and
     `chance` is that of one so large. `lengths` are the largest difference of a length between two
-    places, and its standard uncertainty. `common` tells whether both had the same certificates.
+    places, and its standard uncertainty. `common` tells whether both had the same certificates,
+    and `read_once` names positions whose readings are the same in both.
     """
 
     label: str
@@ -56,6 +62,11 @@ class CrossValidation(FitResult):
     sigmas: tuple[float, float]
     coverage_factor: float
     common: bool = True
+    read_once: tuple[str, ...] = ()
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        return (read_once_words(self.read_once),) if self.read_once else ()
 
     @property
     def complaint(self) -> str:
@@ -125,10 +136,7 @@ class CrossValidation(FitResult):
     def to_dict(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
-            "title": self.title,
-            "sum_of_squares": self.sum_of_squares,
-            "dimensions": self.dimensions,
-            "chance": self.chance,
+            **picked(self, "title", "sum_of_squares", "dimensions", "chance"),
             "sigmas": list(self.sigmas),
             "largest_length_difference": {
                 "value": self.lengths[0],
@@ -163,8 +171,12 @@ def cross_validate(
 
     Errors of its certificates are in `common`, unless the plates were others.
 
-    :raises ExperimentError: one of them does not converge, or nothing can be compared.
+    :raises ExperimentError: one of them does not converge, both are the same readings, or nothing
+        can be compared.
     """
+    if is_one_campaign(first, second):
+        text = "both campaigns have the same readings, which agree with themselves; name others"
+        raise refused(experiment.source, text)
     given = (sigma or experiment.sigma) == "given"
     fits = [_fitted(experiment, one, given) for one in (first, second)]
     (one, scale_1), (two, scale_2) = fits
@@ -193,7 +205,7 @@ def cross_validate(
     if not dimensions:
         raise refused(experiment.source, "the readings leave nothing to compare")
     square = float((((u.T @ change)[used] / values[used]) ** 2).sum())
-    freedom = min(_freedom(at) for at, _ in fits)
+    freedom = min(at.degrees_of_freedom for at, _ in fits)
     shape = places.shape
     return CrossValidation(
         experiment.label,
@@ -209,11 +221,8 @@ def cross_validate(
         (scale_1, scale_2),
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         common,
+        same_positions(first, second),
     )
-
-
-def _freedom(at: Linearisation) -> int:
-    return at.design.observation_count - at.design.parameter_count + at.deficiency
 
 
 def _fitted(
@@ -224,7 +233,7 @@ def _fitted(
         text = f"the estimate from one campaign's readings has {solution.status}; see ballplate fit"
         raise refused(experiment.source, text)
     at = linearised_fit(observed.design, solution)
-    freedom = _freedom(at)
+    freedom = at.degrees_of_freedom
     is_estimated = not given and freedom > 0
     left = solution.factor.sum_of_squares / max(freedom, 1)
     return at, float(np.sqrt(left)) if is_estimated else 1.0

@@ -167,7 +167,7 @@ def rest_of(design: Design, x: Array, group: LeftGroup) -> RestFit | None:
         rest, rest.readings.select(rest.plate_readings)
     ).ravel()
     absorbed = int(round(float(np.trace(hat))))
-    freedom = rest.observation_count - rest.parameter_count + at.deficiency
+    freedom = at.degrees_of_freedom
     return RestFit(
         at,
         solution.factor.sum_of_squares - float(errors @ errors),
@@ -197,7 +197,7 @@ def validate(
         text = f"the estimate from all readings has {solution.status}; see ballplate fit"
         raise refused(experiment.source, text)
     at = linearised_fit(design, solution)
-    freedom = design.observation_count - design.parameter_count + at.deficiency
+    freedom = at.degrees_of_freedom
     groups = groups_to_leave(design)
     found = []
     for group in groups:

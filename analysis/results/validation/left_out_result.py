@@ -7,7 +7,7 @@ from typing import Any
 
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ...presentation.formatting import aligned, as_data, number
+from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
 from .lack_of_fit import chance_words
 
@@ -190,10 +190,7 @@ def _cells(one: PredictedGroup, k: float) -> list[str]:
 def _data(one: PredictedGroup) -> dict[str, Any]:
     found: dict[str, Any] = as_data(
         {
-            "kind": one.kind,
-            "name": one.name,
-            "converged": one.converged,
-            "predicted": one.predicted,
+            **picked(one, "kind", "name", "converged", "predicted"),
             "mean_square_error": one.mean_square,
             "sigma": one.sigma,
             "chance": one.chance,

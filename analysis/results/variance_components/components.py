@@ -13,7 +13,7 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...gross_errors.leftover import leftover, too_many_entries
-from ...presentation.formatting import aligned, finite, number
+from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
 from .groupings import Grouping
 from .groups import ObservationGroup, groups_of
@@ -129,13 +129,16 @@ class VarianceComponents(Result):
         return [
             {
                 "group": one.name,
-                "observations": one.observations,
-                "redundancy": one.redundancy,
-                "ratio": one.ratio,
-                "standard_uncertainty": one.standard_uncertainty,
-                "lower": one.lower,
-                "upper": one.upper,
-                "verdict": one.verdict,
+                **picked(
+                    one,
+                    "observations",
+                    "redundancy",
+                    "ratio",
+                    "standard_uncertainty",
+                    "lower",
+                    "upper",
+                    "verdict",
+                ),
             }
             for one in self.groups
         ]

@@ -60,7 +60,9 @@ def displacements(
     names = {
         "position": design.positions.names,
         "probe": design.probes.names,
-        "ball": design.balls.names,
+        "ball": tuple(
+            design.balls.label(k, design.artefacts.names) for k in range(len(design.balls.names))
+        ),
     }
     sizes = tuple(len(names[level]) for level in levels)
     index = tuple(getattr(readings, level) for level in levels)

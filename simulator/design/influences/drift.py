@@ -20,11 +20,18 @@ from ...geometry.ball_layouts import Name
 from ...geometry.motions import AXIS_NAMES
 from ...inputs.messages import Steps
 from ...inputs.quantities import DURATION_UNITS, Duration, LengthDrift, RatioDrift
-from ...inputs.settings import Forms, NonEmpty, Settings, hint
+from ...inputs.settings import Forms, NonEmpty, Settings
 from ...machines.protocol import Array
 from ..lookup import References
 from ..objects import Readings
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+from .protocol import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    InfluenceSettings,
+    or_unknown,
+)
 
 HOUR = 3600.0
 TIME = "time"
@@ -97,18 +104,9 @@ class DriftSettings(InfluenceSettings):
             "nothing drifts; add axes or scale",
         )
         for name in self.positions or {}:
-            references.require(
-                name in positions,
-                (*steps, "positions", name),
-                f'unknown position "{name}"; {hint(name, positions)}',
-            )
+            references.is_position(name, positions, (*steps, "positions", name))
         for key, stated in (("axes", self.axes), ("scale", self.scale)):
-            if isinstance(stated, tuple) and references.dimension is not None:
-                references.require(
-                    len(stated) == references.dimension,
-                    (*steps, key),
-                    f"has {len(stated)} axes, but the experiment has {references.dimension}",
-                )
+            references.has_axes(stated, (*steps, key))
             for one in stated if isinstance(stated, tuple) else [stated]:
                 u = getattr(one, "standard_uncertainty", None)
                 references.is_not_negative(u, (*steps, key, "standard_uncertainty"))
@@ -131,8 +129,7 @@ class DriftSettings(InfluenceSettings):
         if self.axes is not None:
             listed = self.axes if isinstance(self.axes, tuple) else (self.axes,) * d
             for axis, one in enumerate(listed):
-                words, u = f"drift along {AXIS_NAMES[axis]}", one.standard_uncertainty
-                u = np.inf if u is None else u
+                words, u = f"drift along {AXIS_NAMES[axis]}", or_unknown(one.standard_uncertainty)
                 parts.append((axis, False))
                 parameters.append(InfluenceParameter(words, "m/h", one.value, u, hours))
         if self.scale is not None:
@@ -141,7 +138,7 @@ class DriftSettings(InfluenceSettings):
                 self.scale if isinstance(self.scale, tuple) else [self.scale]
             ):
                 words = f"scale {AXIS_NAMES[axis]}" if by_axis else "the scales"
-                u = np.inf if scale.standard_uncertainty is None else scale.standard_uncertainty
+                u = or_unknown(scale.standard_uncertainty)
                 parts.append((axis if by_axis else -1, True))
                 words = f"drift of {words}"
                 parameters.append(InfluenceParameter(words, "1/h", scale.value, u, hours * reach))

@@ -18,10 +18,17 @@ from ...geometry.ball_layouts import Name
 from ...geometry.motions import AXIS_NAMES
 from ...inputs.messages import Steps
 from ...inputs.quantities import Ratio
-from ...inputs.settings import NonEmpty, hint
+from ...inputs.settings import NonEmpty
 from ...machines.protocol import Array, Integers
 from ..lookup import References
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+from .protocol import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    InfluenceSettings,
+    or_unknown,
+)
 
 # Balls of a position that extend along an axis by less than this, in metres, tell nothing of the
 # scale there.
@@ -46,16 +53,12 @@ class PositionScaleSettings(InfluenceSettings):
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
         """Report unknown positions and an uncertainty below zero."""
         for i, name in enumerate(self.positions or ()):
-            references.require(
-                name in positions,
-                (*steps, "positions", i),
-                f'unknown position "{name}"; {hint(name, positions)}',
-            )
+            references.is_position(name, positions, (*steps, "positions", i))
         references.is_not_negative(self.standard_uncertainty, (*steps, "standard_uncertainty"))
 
     def influence(self, design: DesignParts) -> PositionScale:
         """The scales in a design."""
-        u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
+        u = or_unknown(self.standard_uncertainty)
         names, d = design.positions.names, design.machine.dimension
         place = np.full((len(names), d), -1)
         parameters: list[InfluenceParameter] = []

@@ -19,7 +19,14 @@ from ...inputs.quantities import Length
 from ...inputs.settings import NonEmpty, hint
 from ...machines.protocol import Array, Integers
 from ..lookup import References
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+from .protocol import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    InfluenceSettings,
+    or_unknown,
+)
 
 # Offsets shorter than this, in metres, point nowhere.
 SHORTEST = 1e-6
@@ -84,7 +91,7 @@ class ProbingSettings(InfluenceSettings):
             if names[k] in (self.probes or names)
         ]
         directions, place = np.zeros((len(names), d)), np.full(len(names), -1)
-        u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
+        u = or_unknown(self.standard_uncertainty)
         parameters = [InfluenceParameter("probing error", "m", self.value, u, 1.0)]
         for k in chosen:
             along = np.array(stated.get(names[k], design.probes.offsets[k]), float)

@@ -117,6 +117,11 @@ class Influence(ABC):
         """
 
 
+def or_unknown(uncertainty: float | None) -> float:
+    """A standard uncertainty, infinite where none is stated: nothing is known then."""
+    return np.inf if uncertainty is None else uncertainty
+
+
 class InfluenceSettings(Settings):
     """Settings of one kind of influence quantity, with a `kind` of its own.
 

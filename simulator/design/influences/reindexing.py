@@ -19,7 +19,7 @@ from ...inputs.quantities import Length
 from ...inputs.settings import NonEmpty
 from ..lookup import References
 from .displacements import SharedDisplacements, displacements
-from .protocol import DesignParts, InfluenceSettings
+from .protocol import DesignParts, InfluenceSettings, or_unknown
 
 
 class ReindexingSettings(InfluenceSettings):
@@ -52,7 +52,7 @@ class ReindexingSettings(InfluenceSettings):
             design,
             ("position", "probe"),
             turned,
-            np.inf if self.standard_uncertainty is None else self.standard_uncertainty,
+            or_unknown(self.standard_uncertainty),
             lambda at: f"re-indexing of {at['probe']} in {at['position']}",
             "re-indexing",
             of_tips=True,

@@ -24,7 +24,14 @@ from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
 from ...inputs.tables import read_table
 from ...machines.protocol import Array
 from ..lookup import References
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+from .protocol import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    InfluenceSettings,
+    or_unknown,
+)
 
 QUADRATIC = {"x": ("x",), "y": ("y",), "both": ("x", "y")}
 Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -58,8 +65,9 @@ class SagSettings(InfluenceSettings):
     shape: Forms[Literal["x", "y", "both"], NonEmpty[TermSettings], TermSettings] | None = Field(
         None,
         description=(
-            "quadratic along x, y or both (default) of the plate, or terms of a polynomial in the"
-            " places of balls, 1 at the outermost"
+            "quadratic along x, y or both (default) of the plate, most at its middle and nothing at"
+            " the outermost balls, or terms of a polynomial in the places of balls, which are 0 at"
+            " the middle and 1 at the outermost"
         ),
     )
     values: Text | None = Field(
@@ -112,7 +120,7 @@ class SagSettings(InfluenceSettings):
         value = self.value
         if value is None:
             value = largest if self.values is not None else 0.0
-        u = np.inf if self.standard_uncertainty is None else self.standard_uncertainty
+        u = or_unknown(self.standard_uncertainty)
         gravity = self.gravity or ("-z" if d == 3 else "-y")
         down = np.eye(d)[AXIS_NAMES.index(gravity[-1])] * (-1.0 if gravity[0] == "-" else 1.0)
         parameter = InfluenceParameter(f"sag of {names[artefact]}", "m", value, u, 1.0)

@@ -20,11 +20,18 @@ from pydantic import Field
 from ...geometry.ball_layouts import Name
 from ...inputs.messages import Steps
 from ...inputs.quantities import Expansion, Temperature, TemperatureDifference
-from ...inputs.settings import Forms, NonEmpty, Settings, hint
+from ...inputs.settings import Forms, NonEmpty, Settings
 from ...machines.protocol import Array, Unit
 from ..lookup import References
 from ..objects import Flags
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
+from .protocol import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    InfluenceSettings,
+    or_unknown,
+)
 
 REFERENCE = 20.0
 
@@ -114,11 +121,7 @@ class TemperaturesSettings(InfluenceSettings):
                 steps, "nothing expands; add artefact_expansion or scale_expansion"
             )
         for name in self.positions or {}:
-            references.require(
-                name in positions,
-                (*steps, "positions", name),
-                f'unknown position "{name}"; {hint(name, positions)}',
-            )
+            references.is_position(name, positions, (*steps, "positions", name))
         for what in ("artefact", "scale"):
             expansion = getattr(self, f"{what}_expansion")
             temperature = getattr(self, f"{what}_temperature")
@@ -151,12 +154,7 @@ class TemperaturesSettings(InfluenceSettings):
                 )
         self._doubt(steps, references)
         for path, value in listed:
-            if isinstance(value, tuple) and references.dimension is not None:
-                references.require(
-                    len(value) == references.dimension,
-                    (*steps, *path),
-                    f"has {len(value)} axes, but the experiment has {references.dimension}",
-                )
+            references.has_axes(value, (*steps, *path))
 
     def _doubt(self, steps: Steps, references: References) -> None:
         """Doubt temperatures, expansions and uncertainties that no laboratory has."""
@@ -354,7 +352,7 @@ def _part(
 
     if not shared:
         words = f"expansion of {'the scales' if axis == 'all' else name}"
-        add(words, "1/K", expansion.value, np.inf if u is None else u, most * reach)
+        add(words, "1/K", expansion.value, or_unknown(u), most * reach)
     add(f"sensor error of {name}", "K", 0.0, measured.sensor_uncertainty, size)
     wrong = np.full(len(here), -1)
     for k in np.flatnonzero(here) if measured.standard_uncertainty else ():

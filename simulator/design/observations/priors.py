@@ -142,9 +142,3 @@ def _pose_values(design: Design, state: State) -> Array:
     """Origins and rotations against the nominal pose (k, pose size)."""
     turned = vector_from_rotation(state.rotations @ design.positions.rotations.transpose(0, 2, 1))
     return np.concatenate([state.origins, turned], axis=1)
-
-
-def no_priors() -> Priors:
-    """No prior knowledge."""
-    none, empty = np.zeros(0, np.int64), np.zeros(0)
-    return Priors((), none, none, none, np.zeros((0, 0)), empty, empty)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.motions import pose_size
+from ...geometry.motions import cross_matrices, pose_size
 from ...machines.protocol import Array, ErrorModel
 from ..arrays import (
     Design,
@@ -83,14 +83,9 @@ def rotation_sensitivity(arm: Array) -> Array:
     >>> rotation_sensitivity(np.array([[2.0, 1.0]])).tolist()
     [[[-1.0], [2.0]]]
     """
-    m, d = arm.shape
-    if d == 2:
+    if arm.shape[1] == 2:
         return np.stack([-arm[:, 1], arm[:, 0]], axis=1)[:, :, None]
-    result = np.zeros((m, 3, 3), arm.dtype)
-    result[:, 0, 1], result[:, 0, 2] = arm[:, 2], -arm[:, 1]
-    result[:, 1, 0], result[:, 1, 2] = -arm[:, 2], arm[:, 0]
-    result[:, 2, 0], result[:, 2, 1] = arm[:, 1], -arm[:, 0]
-    return result
+    return cross_matrices(arm)
 
 
 def reading_weights(design: Design, readings: Readings) -> Array:

@@ -24,7 +24,7 @@ from ...inputs.tables import read_number
 from ...inputs.yamltree import Mark, read_text
 from ...machines.arrangement import AXES
 from .axis_tables import AxisTable, AxisTables
-from .table_formats import Sense, StatedTable, Table, TableFormat
+from .table_formats import Sense, StatedTable, Table, TableFormat, in_columns
 
 LETTERS = ("X", "Y", "Z")
 POSITION, BACKLASH, ACTIVE = "AXISPOS", "BACKLASH", "ACTIVE"
@@ -59,12 +59,7 @@ def _write(table: Table, sense: Sense, stem: str) -> dict[str, str]:
 
 
 def _file(name: str, rows: Sequence[Sequence[str]]) -> str:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-    return "\n".join([f"BEGIN {name.upper()} MM", *lines, "[END]", ""])
+    return "\n".join([f"BEGIN {name.upper()} MM", *in_columns(rows), "[END]", ""])
 
 
 def _read(paths: Sequence[Path]) -> StatedTable:

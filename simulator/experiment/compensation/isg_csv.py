@@ -33,6 +33,7 @@ from .table_formats import (
     StatedTable,
     Table,
     TableFormat,
+    in_columns,
     stated_sense,
 )
 from .volume_tables import VolumeTable
@@ -103,11 +104,7 @@ def _aligned(heads: Sequence[str], positions: Array, values: Array) -> list[str]
             told = f"{value:.{ANGLE_DIGITS}f}" if is_angle else f"{1e3 * value:.{LENGTH_DIGITS}f}"
             cells.append("0" if float(told) == 0.0 else told)
         rows.append(cells)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+    return in_columns(rows)
 
 
 def _read(paths: Sequence[Path]) -> StatedTable:

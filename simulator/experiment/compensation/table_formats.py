@@ -47,6 +47,15 @@ Table = AxisTables | VolumeTable
 Written = Callable[[Table, Sense, str], dict[str, str]]
 
 
+def in_columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells as lines of text, each column as wide as its widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
 @dataclass(frozen=True)
 class TableFormat:
     """A format by its `name`: `words` say whose it is.

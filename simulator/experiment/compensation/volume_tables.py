@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 
+from ...geometry.grids import grid_points
 from ...machines.protocol import Array, ErrorModel
 
 # Of numerical derivatives by the probe offset, in metres: errors are nearly linear in it.
@@ -63,9 +64,7 @@ def volume_table(model: ErrorModel, a: Array, nodes: tuple[Array, ...], zero: Ar
 
     What a probe offset changes is taken as a turn of the probe; what it stretches is left out.
     """
-    d = len(nodes)
-    x = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, d)
-    values = _at(model, a, x) - _at(model, a, zero[None])
+    values = _at(model, a, grid_points(nodes)) - _at(model, a, zero[None])
     return VolumeTable(nodes, values.reshape(*(len(one) for one in nodes), 6))
 
 
