@@ -27,7 +27,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_type,
     ensure_whole,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.quantities import QuantityError
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
@@ -227,7 +227,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
         found = to_write(repairs(with_pool(one)), judged)
         if found is None:
             words = "no changes were found that determine everything"
-            raise ExperimentError([one.message((), words)])
+            raise one.refused((), words)
         text = mended(text, Path(path), one.name, found)
     return text
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import picked
 from ..presentation.result import Result
@@ -80,7 +81,7 @@ class Prediction(Result):
 
     def headline(self) -> str:
         count = 0 if self.advice is None else len(self.advice.missed)
-        missed = [f"{count} goal{'s' if count > 1 else ''} missed"] if count else []
+        missed = [f"{number_of(count, 'goal')} missed"] if count else []
         return ", ".join([rank_words(self.verdict), *length_headline(self.quantities), *missed])
 
     def lines(self) -> list[str]:

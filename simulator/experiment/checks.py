@@ -20,7 +20,7 @@ from ..geometry.positions import ball_coordinates
 from ..inputs.messages import ExperimentError, Message, Steps
 from ..inputs.problems import Problems, written_text
 from ..inputs.quantities import format_length
-from ..inputs.settings import listing
+from ..inputs.settings import listing, number_of
 from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
@@ -294,11 +294,7 @@ def check_inside(
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
     offset, place = float(probes[probe].offset[axis]), float(places[balls[worst], axis])
-    others = (
-        f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}"
-        if len(outside) > 1
-        else ""
-    )
+    others = f", and {number_of(len(outside) - 1, 'more reading')}" if len(outside) > 1 else ""
     less = (
         f" (the ball at {format_length(place)} less the offset of {format_length(offset)})"
         if offset

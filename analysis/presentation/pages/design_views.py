@@ -61,8 +61,8 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
     layers = volume_layers(design)
     labels, names, styli = [], [], []
     read = [k for k in range(len(design.positions.names)) if (design.readings.position == k).any()]
-    told = [design.positions.names[k] for k in read]
-    is_named = names_fit(told)
+    position_names = [design.positions.names[k] for k in read]
+    is_named = names_fit(position_names)
     for number, k in enumerate(read):
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
@@ -81,7 +81,7 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         centre = outline.mean(axis=0)
         is_flat = design.dimension == 2
         labels.append(centre if is_flat else outline[0] + 0.12 * (outline[0] - centre))
-        names.append(told[number] if is_named else str(number + 1))
+        names.append(position_names[number] if is_named else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
         layers.append(Layer("dots", "ink", np.stack([one[1] for one in styli])))
