@@ -25,7 +25,7 @@ async function ask(path, body) {
     response = await fetch(path, options);
   } catch {
     await_studio();
-    throw new Error("The studio does not answer. Start it again with the same command: changes that are not saved are kept, and are there again.");
+    throw new Error(`The studio does not answer. ${!state || state.recoverable ? "Start it again with the same command: changes that are not saved are there again." : "Changes are not saved, and could not be kept in the folder of the file: copy the text of the file before you leave this page."}`);
   }
   const text = await response.text();
   let data;
