@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_type,
     ensure_whole,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.quantities import QuantityError
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
     from .planning.sheet import Sheet
+    from .presentation.pages.embedded import View
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
@@ -79,6 +81,7 @@ if TYPE_CHECKING:
     from .simulator.machines.protocol import Array
     from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings.observed_readings import ObservedReadings
+    from .sweeps.running import SweepResult
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -224,7 +227,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
         found = to_write(repairs(with_pool(one)), judged)
         if found is None:
             words = "no changes were found that determine everything"
-            raise ExperimentError([one.message((), words)])
+            raise one.refused((), words)
         text = mended(text, Path(path), one.name, found)
     return text
 
@@ -268,6 +271,84 @@ def run(
         chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report
     )
     return replace(predicted, monte_carlo=found)
+
+
+def view(given: Experiment | PathLike | Prediction | Fit) -> View:
+    """A design in space: positions of plates, balls and probes of an experiment; of a prediction or
+    a fit also ellipsoids of uncertainty, residuals, and what undetermined directions move.
+
+    A notebook shows it, to be turned by mouse, buttons or keyboard, and shows it below experiments,
+    predictions and fits by itself. `save(path)` of the result writes a page, or the picture alone.
+
+    >>> view(quickstart())
+    <View of quickstart: positions>
+    >>> view(run(quickstart()))
+    <View of quickstart: positions, points, balls of plate>
+    """
+    from .results.fit import Fit
+    from .results.prediction import Prediction
+
+    if isinstance(given, Fit | Prediction):
+        return given.view()
+    from .presentation.pages.embedded import View
+    from .results.views import position_picture
+    from .simulator.experiment.layout import lay_out
+
+    chosen = _experiment(given)
+    return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
+
+
+def page(
+    given: Experiment | PathLike | Prediction | Fit | SweepResult,
+    path: PathLike | None = None,
+    run_modules: bool = False,
+    compare: PathLike | None = None,
+    report: Report = unreported,
+) -> str:
+    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and `report`
+    write: HTML that needs no other file and no network. With a path it is written as well.
+
+    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
+    drawings of designs whose error models are in Python need `run_modules`, and the store of
+    another one to `compare` with is set beside it.
+
+    :raises ValueError: a fit or a prediction that does not know its experiment; sweeps that cannot
+        be compared.
+    :raises ImportError: what pages of sweeps need is not installed.
+    :raises OSError: the file cannot be written.
+
+    >>> page(fit(quickstart(), simulate(quickstart()))).splitlines()[0]
+    '<!DOCTYPE html>'
+    """
+    from .presentation.files import write_file
+    from .results.fit import Fit
+    from .results.prediction import Prediction
+    from .sweeps.running import SweepResult
+
+    ensure_type(bool, "True or False", run_modules=run_modules)
+    ensure_report(report)
+    if path is not None:
+        ensure_path("path", path)
+    if (run_modules or compare is not None) and not isinstance(given, SweepResult):
+        raise ValueError("run_modules and compare go with sweeps only; leave them out")
+    if isinstance(given, Fit):
+        text = given.page()
+    elif isinstance(given, SweepResult):
+        from .stores import sweep_report
+
+        chosen_sweep = given.store, given.number
+        text = sweep_report(*chosen_sweep, "html", run_modules, report, compare)
+    else:
+        from .report.design_contents import page_of_design
+
+        predicted = given if isinstance(given, Prediction) and given.quantities else None
+        chosen = given.experiment if isinstance(given, Prediction) else _experiment(given)
+        if chosen is None:
+            raise ValueError("the prediction does not know its experiment; predict it anew")
+        text = page_of_design(chosen, predicted or run(chosen), report)
+    if path is not None:
+        write_file(Path(path), text.encode("utf-8", "replace"))
+    return text
 
 
 def simulate(
@@ -458,7 +539,7 @@ def fit(
     from .results.fit import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
-    ensure_one_of(ESTIMATORS, estimator=estimator)
+    ensure_one_of(ESTIMATORS, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
@@ -569,9 +650,9 @@ def cross_validate(
     return compared(chosen, first, _observed(chosen, against, None)[1], sigma, common)
 
 
-def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:
-    """A map in another error model: a kind such as "empirical", settings such as "{kind: kinematic,
-    position_coefficients: 3}", or the path of an experiment file whose model is taken.
+def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
+    """The map of a fit in another error model: a kind such as "empirical", settings such as "{kind:
+    kinematic, position_coefficients: 3}", or the path of an experiment file whose model is taken.
 
     Its `map` is the new one, with its covariance.
 
@@ -579,13 +660,12 @@ def convert(fitted: FittedMap | PathLike, to: str) -> ConvertedMap:
     >>> convert(fitted, "{kind: empirical, coefficients: 5}")
     <ConvertedMap of map: empirical, 195 parameters, the same corrections>
     """
+    from .results.any_map import map_of_source
     from .results.converted_map import convert as converted
-    from .simulator.maps.fitted_map import FittedMap
 
     ensure_type(str, 'an error model such as "empirical"', to=to)
-    if isinstance(fitted, FittedMap):
-        return converted(fitted, to, "map")
-    return converted(load_map(fitted), to, Path(fitted).stem)
+    found, label = map_of_source(_machine("fitted", fitted))
+    return converted(found, to, label)
 
 
 def _observed(
@@ -646,10 +726,14 @@ def diff(
     ensure_one_of(("certificate",), shared=shared)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
+    if isinstance(dates, str) or len(dates) != 2:
+        raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
     days = tuple(None if one is None else stated_day(one) for one in dates)
     known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
     is_file = isinstance(points, str | os.PathLike)
     places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
+    if isinstance(places, np.ndarray) and places.ndim != 2:
+        raise ValueError("points: give a list of points, each with its co-ordinates in metres")
     sides = [_side(name, one) for name, one in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
@@ -675,7 +759,7 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     from .results.budget import budget as budget_of
     from .results.fit import Fit
 
-    ensure_one_of(GROUPINGS, by=by)
+    ensure_one_of(GROUPINGS, by=str(by))
     if isinstance(given, Fit):
         if given.experiment is None:
             raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
@@ -708,7 +792,7 @@ def compare(
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
-    ensure_one_of(COMPARED, estimator=estimator)
+    ensure_one_of(COMPARED, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)
@@ -775,7 +859,7 @@ def plan(
     from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
-    ensure_one_of(NAMES, criterion=criterion)
+    ensure_one_of(NAMES, criterion=str(criterion))
     ensure_positive("hours above 0", 1e5, hours=hours)
     ensure_whole(1, positions=positions, readings=readings, workers=workers)
     ensure_whole(0, seed=seed)
@@ -916,7 +1000,7 @@ def lengths(
 
 
 def map(
-    machine: PathLike | FittedMap,
+    machine: PathLike | Fit | FittedMap,
     grid: Sequence[int] | None = None,
     line: str | Line | None = None,
     error: str | None = None,
@@ -953,10 +1037,8 @@ def map(
     from .error_maps.realisations import MOST_DRAWS, Draws
     from .error_maps.volumetric_errors import MOST_POINTS
     from .results.any_map import map_errors
-    from .simulator.maps.fitted_map import FittedMap
 
-    if not isinstance(machine, FittedMap):
-        ensure_path("machine", machine)
+    source = _machine("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(bool, "True or False", budget=budget)
@@ -988,35 +1070,30 @@ def map(
         number,
         at,
     )
-    source = machine if isinstance(machine, FittedMap) else Path(machine)
     draws = None if draw is None else Draws(draw, seed)
     chosen = () if tasks is None else (_experiment(tasks),)
     return map_errors(source, asked, error, probe, draws, budget, chosen)
 
 
 def curves(
-    fitted: FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
+    fitted: Fit | FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
 ) -> ErrorCurves:
     """The error functions of a map at so many positions along each line, or some of them, with
     their expanded uncertainties; squareness errors as angles, and other numbers of its model.
 
-    `fitted` is what `to_map()` of a fit gives, or the path of a map file.
+    `fitted` is a fit, what its `to_map()` gives, or the path of a map file.
 
     >>> curves(fit(quickstart(), simulate(quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
     from .results.any_map import map_of_source
     from .results.error_curves_result import error_curves
-    from .simulator.maps.fitted_map import FittedMap
 
-    if not isinstance(fitted, FittedMap):
-        ensure_path("fitted", fitted)
-        fitted = Path(fitted)
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)
     for name in names:
         ensure_type(str, "the name of a parametric error, such as EXX", errors=name)
-    return error_curves(*map_of_source(fitted), names, points)
+    return error_curves(*map_of_source(_machine("fitted", fitted)), names, points)
 
 
 def load_map(path: PathLike) -> FittedMap:
@@ -1055,14 +1132,14 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
 
 def adjust(
-    fitted: FittedMap | PathLike,
+    fitted: Fit | FittedMap | PathLike,
     scale: str | Iterable[str] = (),
     turn: str | Iterable[str] = (),
-    after: FittedMap | PathLike | None = None,
+    after: Fit | FittedMap | PathLike | None = None,
     share: float = 0.0,
 ) -> AdjustedMachine:
     """What adjustments leave of a fitted machine's errors, and what a campaign `after` them says;
-    both are maps, or files of maps.
+    both are fits, maps, or files of maps.
 
     Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
     as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". The standard uncertainty of each is
@@ -1076,14 +1153,9 @@ def adjust(
     """
     from .results.adjusted_machine import adjusted_machine
     from .results.machine_changes import guideway_turn, scale_change
-    from .simulator.maps.fitted_map import FittedMap
 
-    first, second = (
-        one if one is None or isinstance(one, FittedMap) else load_map(one)
-        for one in (fitted, after)
-    )
-    if first is None:
-        raise TypeError("fitted=None; give what to_map() of a fit gives, or its file")
+    first = _fitted("fitted", fitted)
+    second = None if after is None else _fitted("after", after)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"share={share!r}; give a part of each change, from 0 to 1")
     changes = [scale_change(text) for text in _texts("scale", scale)]
@@ -1092,7 +1164,7 @@ def adjust(
 
 
 def compensation(
-    machine: PathLike | FittedMap,
+    machine: PathLike | Fit | FittedMap,
     format: TableFormatName,
     pitch: str | Sequence[float] | None = None,
     origin: str | Sequence[float] | None = None,
@@ -1110,17 +1182,14 @@ def compensation(
     <MadeCompensation of npl-like: isg, 19, 24, 9 positions>
     """
     from .error_maps.compensation_tables import made_compensation, of_map, tabled_machine
-    from .simulator.maps.fitted_map import FittedMap
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
-    if isinstance(machine, FittedMap):
-        source, remarks = of_map(machine, machine.title)
-        label = machine.title
+    given = _machine("machine", machine)
+    if isinstance(given, Path):
+        label, (source, remarks) = given.stem, tabled_machine(given)
     else:
-        ensure_path("machine", machine)
-        source, remarks = tabled_machine(Path(machine))
-        label = Path(machine).stem
+        label, (source, remarks) = given.title, of_map(given, given.title)
     lengths = _metres("pitch", pitch), _metres("origin", origin)
     flags = volumetric, without_rotations
     return made_compensation(source, label, format, *lengths, sense, *flags, remarks)
@@ -1150,7 +1219,7 @@ def read_compensation(
     """
     from .error_maps.compensation_tables import read_compensation_files
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
     ensure_type(str, "an arrangement, such as MB2", arrangement=arrangement)
     several = [files] if isinstance(files, str | os.PathLike) else files
@@ -1178,7 +1247,7 @@ def _metres(name: str, given: str | Sequence[float] | None) -> tuple[float, ...]
 
 
 def correct(
-    fitted: FittedMap | PathLike,
+    fitted: Fit | FittedMap | PathLike,
     points: Any,
     probe: str | Sequence[str] | None = None,
     lengths: Sequence[Sequence[str | int]] = (),
@@ -1186,7 +1255,7 @@ def correct(
     coverage_factor: float | None = None,
     with_repeatability: bool = False,
 ) -> Correction:
-    """Points corrected by a map, or the file of one, with their uncertainty.
+    """Points corrected by a fit, its map, or the file of that, with their uncertainty.
 
     `points` are an array (n, d) in metres, or a table as `ballplate correct` reads it, with a
     `probe` for those that name none; without any it is that of the map. They are `coordinates`
@@ -1194,7 +1263,7 @@ def correct(
     `lengths` are pairs of names or of indices. The coverage factor is that of the map, or the one
     given; `with_repeatability` the scatter of the readings that are corrected counts, too.
 
-    >>> fitted = fit(quickstart(), simulate(quickstart())).to_map()
+    >>> fitted = fit(quickstart(), simulate(quickstart()))
     >>> ends = [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]
     >>> correct(fitted, ends)
     <Correction of quickstart: 2 points; U = 2 u = 0.4325 µm at most>
@@ -1208,13 +1277,12 @@ def correct(
 
     from .results.correction import correction
     from .results.wanted_lengths import between_named
-    from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings import point_files
 
     ensure_one_of(("scale readings", "ball centres"), coordinates=coordinates)
     ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
     ensure_type(bool, "True or False", with_repeatability=with_repeatability)
-    chosen = fitted if isinstance(fitted, FittedMap) else load_map(fitted)
+    chosen = _fitted("fitted", fitted)
     names = chosen.probes.names
     offsets = chosen.drawn_offsets if coordinates == "ball centres" else None
     if isinstance(points, str | os.PathLike | pandas.DataFrame):
@@ -1307,6 +1375,20 @@ def reproduce(
     return score_certified(chosen, answers, folder, report)
 
 
+def _fitted(name: str, given: Fit | FittedMap | PathLike) -> FittedMap:
+    """The map of a fit, of what its to_map() gives, or of a file."""
+    found = _machine(name, given)
+    return load_map(found) if isinstance(found, Path) else found
+
+
+def _machine(name: str, given: Fit | FittedMap | PathLike) -> FittedMap | Path:
+    """The map of a fit, or of what its to_map() gives; the path of a file as such."""
+    from .results.fit import Fit
+
+    side = _side(name, given)
+    return side.to_map() if isinstance(side, Fit) else side
+
+
 def _side(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
     """A map to be compared: the path of a file as such."""
     from .results.fit import Fit
@@ -1371,3 +1453,19 @@ def _experiment(given: Any) -> Experiment:
     what = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
     kind = type(given).__name__
     raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")
+
+
+def _shown_in_notebook(experiment: Experiment) -> str:
+    """An experiment in a notebook: its table, and its picture, of which it knows nothing."""
+    return experiment._repr_html_() + view(experiment)._repr_html_()
+
+
+def _teach_notebook() -> None:
+    """Let the session of IPython, if this is one, show experiments so."""
+    session = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    if session is not None:
+        formatter = session.display_formatter.formatters["text/html"]
+        formatter.for_type(Experiment, _shown_in_notebook)
+
+
+_teach_notebook()

@@ -30,8 +30,8 @@ COMMANDS = (
 )
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line's grammar."""
+def parser(names: Sequence[str] = COMMANDS) -> _Parser:
+    """The command line's grammar, with all commands or some of them."""
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
@@ -53,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    for name in COMMANDS:
+    for name in names:
         # Loaded only now, so that hardly anything is when an interruption begins to be answered.
         module = import_module(f".{name}", __package__)
         command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
@@ -97,7 +97,10 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
         write_readably(sys.stdout, sys.stderr)
         try:
             try:
-                options = parser().parse_args(arguments)
+                given = sys.argv[1:] if arguments is None else arguments
+                # The grammar of all commands is needed only where none is named.
+                named = [one for one in given[:1] if one in COMMANDS]
+                options = parser(named or COMMANDS).parse_args(given)
             except SystemExit:
                 # Help is data, too.
                 sys.stdout.flush()
@@ -184,6 +187,9 @@ class _Parser(argparse.ArgumentParser):
     The parsers of commands are of this class as well.
     """
 
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(formatter_class=_Formatter, **settings)
+
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, unknown = self.parse_known_args(args, namespace)
         if unknown:
@@ -227,6 +233,15 @@ class _Parser(argparse.ArgumentParser):
         from ballplate.simulator.inputs.messages import in_one_line
 
         super().error(in_one_line(message))
+
+
+class _Formatter(argparse.HelpFormatter):
+    """Shows arguments that may be left out in brackets, positional ones too."""
+
+    def _format_args(self, action: argparse.Action, default_metavar: str) -> str:
+        if action.nargs == "+" and not action.option_strings and not action.required:
+            return f"[{action.metavar} ...]"
+        return super()._format_args(action, default_metavar)
 
 
 class _Version(argparse.Action):

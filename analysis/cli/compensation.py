@@ -110,13 +110,17 @@ def _lengths(text: str) -> tuple[float, ...]:
 
 def run(options: Namespace) -> int:
     """Make or read a table, write it, and tell what it is."""
-    _refuse_misused(options)
+    misused = _misused(options)
+    if misused and options.read:
+        raise UsageError("; ".join(misused))
     if options.sense == "indication":
         options.sense = "errors of indication"
     try:
         found, texts = _read(options) if options.read else _made(options)
     except ValueError as error:
-        raise UsageError(error) from None
+        misused.append(str(error))
+    if misused:
+        raise UsageError("; ".join(misused))
     for remark in found.notes:
         complain(remark)
     paths = {options.output.parent / name: text for name, text in texts.items()} if texts else {}
@@ -161,19 +165,18 @@ def _read(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:
     return read, {} if options.output is None else read.machine_files(options.output.stem)
 
 
-def _refuse_misused(options: Namespace) -> None:
-    """Refuse options that do not go together.
-
-    :raises UsageError: there are such.
-    """
+def _misused(options: Namespace) -> list[str]:
+    """What is wrong with options that do not go together."""
+    found = []
     others = ("pitch", "volumetric", "without_rotations") if options.read else ("arrangement",)
     for name in others:
         if getattr(options, name):
             whose = "tables that are written" if options.read else "tables that are read"
-            raise UsageError(f"--{name.replace('_', '-')} is for {whose}; leave it out")
+            found.append(f"--{name.replace('_', '-')} is for {whose}; leave it out")
     if options.without_rotations and options.format != "heidenhain":
-        raise UsageError(f"{options.format} tables have rotations; leave --without-rotations out")
+        found.append(f"{options.format} tables have rotations; leave --without-rotations out")
     if options.output is not None:
         ending = ".yaml" if options.read else ".cma" if options.format == "heidenhain" else ".csv"
         if options.output.suffix.lower() != ending:
-            raise UsageError(f"-o {options.output} should end in {ending}")
+            found.append(f"-o {options.output} should end in {ending}")
+    return found

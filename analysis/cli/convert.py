@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from .common import add_json, map_path
+from .common import FITTED, add_json, map_path
 from .outputs import add_force, add_output, write
 
 HELP = "convert the map of a fit to another error model, with its covariance"
@@ -17,7 +17,7 @@ DESCRIPTION = (
 
 
 def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("map", metavar="MAP", type=Path, help="map file, as fit -o writes it")
+    parser.add_argument("map", metavar="MAP", type=Path, help=FITTED)
     parser.add_argument(
         "--to",
         metavar="MODEL",
@@ -41,13 +41,13 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Convert a map; 1 if the new model cannot follow the old one."""
-    from ballplate.simulator.experiment.map_files import read_map, write_map
+    from ballplate.simulator.experiment.map_files import write_map
 
     from ..results.converted_map import convert
-    from .common import show
+    from .common import fitted_map, show
     from .telling import complain
 
-    found = convert(read_map(options.map), options.to, options.map.stem)
+    found = convert(fitted_map(options.map), options.to, options.map.stem)
     if options.output:
         write(options, {options.output: lambda path: write_map(found.map, path)})
     show(options, found)

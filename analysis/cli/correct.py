@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_json, coverage_factor, show
+from .common import FITTED, add_json, coverage_factor, fitted_map, show
 from .outputs import UsageError, Writer, add_force, add_output, text_writer, write
 from .telling import warn
 
@@ -26,7 +26,7 @@ READ, CENTRES = "scale readings", "ball centres"
 
 
 def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("map", metavar="MAP", type=Path, help="map file, as fit -o writes it")
+    parser.add_argument("map", metavar="MAP", type=Path, help=FITTED)
     parser.add_argument(
         "points",
         metavar="POINTS",
@@ -97,13 +97,12 @@ def _add_lengths(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print points and lengths, and write what was asked for; 1 if something is undetermined."""
-    from ballplate.simulator.experiment.map_files import read_map
     from ballplate.simulator.inputs.settings import hint
     from ballplate.simulator.readings.point_files import read_points
 
     from ..results.correction import MOST_CO_ORDINATES, correction
 
-    fitted = read_map(options.map)
+    fitted = fitted_map(options.map)
     names, probe = fitted.probes.names, options.probe or fitted.probe
     if probe not in names:
         raise UsageError(f'--probe: no probe "{probe}" in the map; {hint(probe, names)}')

@@ -6,9 +6,11 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
 from .common import (
+    FITTED,
     add_formats,
     add_picture,
     count,
+    fitted_map,
     print_json,
     print_lines,
     write_picture,
@@ -28,7 +30,7 @@ MOST_POSITIONS = 10_000
 
 
 def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="MAP", type=Path, help="map file")
+    parser.add_argument("file", metavar="MAP", type=Path, help=FITTED)
     parser.add_argument(
         "--error",
         metavar="NAME",
@@ -56,12 +58,10 @@ def _points(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Print, and draw, the curves."""
-    from ballplate.simulator.experiment.map_files import read_map
-
     from ..error_maps.error_functions import POSITIONS
     from ..results.error_curves_result import error_curves
 
-    fitted = read_map(options.file)
+    fitted = fitted_map(options.file)
     try:
         found = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
     except ValueError as error:

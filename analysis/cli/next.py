@@ -40,7 +40,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="FOLDER",
         type=Path,
         help=(
-            "wait for tables of readings in a folder, and print a line whenever one has been"
+            "wait for tables of readings in a folder, and print the answer whenever one has been"
             " written; ends when the target is met, or with Ctrl-C"
         ),
     )

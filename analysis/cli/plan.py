@@ -34,7 +34,8 @@ DESCRIPTION = (
     "Choose the positions and certificates from the pool of an experiment file that"
     " minimise a criterion within a budget, and bound what any choice could achieve."
     " Without a budget, the choice may cost as much as the positions in the file. The"
-    " exit status is 0 if the choice determines everything, otherwise 1."
+    " exit status is 0 if the choice determines everything but what the file expects to stay open,"
+    " otherwise 1."
 )
 
 
@@ -212,8 +213,7 @@ def run(options: Namespace) -> int:
         print_errors(error.messages, options)
         options.is_written = False
     show(options, found)
-    is_full = found.prediction.verdict.deficiency == found.left_open
-    return 0 if found.is_determined and is_full else 1
+    return 0 if found.is_determined and found.prediction.verdict.as_expected else 1
 
 
 def _write(campaign: Campaign, options: Namespace) -> None:

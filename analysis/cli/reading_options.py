@@ -21,14 +21,16 @@ if TYPE_CHECKING:
     from ..presentation.result import FitResult
 
 
-def add_readings(parser: ArgumentParser) -> None:
+# Of a command that fits readings in any case.
+NAMED = "tables of readings or reports; default: readings.files of the experiment file"
+
+
+def add_readings(parser: ArgumentParser, of_readings: str = NAMED) -> None:
     """Add the experiment file, tables of readings and how they are written, values of certificates,
     and what uncertainties are.
     """
     add_file(parser)
-    add_readings_argument(
-        parser, "tables of readings or reports; default: readings.files of the experiment file"
-    )
+    add_readings_argument(parser, of_readings)
     add_tables(parser)
     parser.add_argument(
         "--certificate",

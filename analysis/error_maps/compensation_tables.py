@@ -18,6 +18,7 @@ from ballplate.simulator.experiment.compensation.axis_tables import (
 )
 from ballplate.simulator.experiment.compensation.formats import FORMATS
 from ballplate.simulator.experiment.compensation.making import (
+    CannotMakeError,
     MadeTable,
     TabledMachine,
     correction,
@@ -361,23 +362,30 @@ def made_compensation(
 
     :raises ValueError: the format cannot hold it, or the sense is not said.
     """
-    made = FORMATS[name]
+    made, d, reasons = FORMATS[name], machine.dimension, list[str]()
     meant = sense or made.sense
     if meant is None:
-        raise ValueError(
-            f"{name} tables do not say which sign they have; choose corrections or errors of"
-            " indication, as your controller takes them"
+        reasons.append(
+            f"{name} tables do not say which sign they have; choose the sense, corrections or"
+            " errors of indication, as your controller takes them"
         )
-    d = machine.dimension
+    steps = zero = None
     if pitch is not None and len(pitch) not in (1, d):
-        raise ValueError(f"the pitch has {len(pitch)} lengths; give one, or {d}")
-    if pitch is not None and not min(pitch) > 0.0:
-        raise ValueError("the pitch should be above zero, such as 50 mm")
-    steps = None if pitch is None else np.broadcast_to(np.asarray(pitch, float), (d,))
-    zero = None if origin is None else np.asarray(origin, float)
-    if zero is not None and len(zero) != d:
-        raise ValueError(f"the origin has {len(zero)} co-ordinates; give {d}")
-    table = made_table(machine, made, steps, zero, volumetric, without_rotations)
+        reasons.append(f"the pitch has {len(pitch)} lengths; give one, or {d}")
+    elif pitch is not None and not min(pitch) > 0.0:
+        reasons.append("the pitch should be above zero, such as 50 mm")
+    elif pitch is not None:
+        steps = np.broadcast_to(np.asarray(pitch, float), (d,))
+    if origin is not None and len(origin) != d:
+        reasons.append(f"the origin has {len(origin)} co-ordinates; give {d}")
+    elif origin is not None:
+        zero = np.asarray(origin, float)
+    try:
+        table = made_table(machine, made, steps, zero, volumetric, without_rotations)
+    except CannotMakeError as error:
+        reasons += error.reasons
+    if reasons or meant is None:
+        raise CannotMakeError(*reasons)
     return MadeCompensation(label, machine.title, made, meant, table.table, remarks, table)
 
 

@@ -37,6 +37,7 @@ from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
 from .selection import Campaign
 from .short_names import short_names
+from .whole_pool import pool_gap
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -150,7 +151,11 @@ def _campaign(
     information = pool_information(
         without_drift(experiment), whole, is_about_balls(request.criterion), completed_by, report
     )
-    wanted = criterion(information, experiment, request.criterion)
+    gap = pool_gap(experiment, pool.candidates) if information.deficiency else None
+    try:
+        wanted = criterion(information, experiment, request.criterion)
+    except ExperimentError as error:
+        raise error if gap is None else gap.refusing(error) from None
     own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
     drawn = sorted(earlier or own)
     begun = offered.begun(experiment)
@@ -179,6 +184,8 @@ def _campaign(
         completed = Completion(candidates[standing.rest], standing.whole)
     chosen = offered.together(best.chosen)
     left_open = open_directions(offered, information, best.chosen)
+    # What no candidate determines may be expected; what the choice alone leaves open is not.
+    expected = left_open + (experiment.expected_rank_deficiency or 0 if gap else 0)
     _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
     done = tuple(candidates[k] for k in offered.done)
@@ -213,7 +220,7 @@ def _campaign(
         wanted.target,
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
-        predict(replace(timed, expected_rank_deficiency=left_open or None)),
+        predict(replace(timed, expected_rank_deficiency=expected or None), with_scale=True),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
@@ -232,6 +239,7 @@ def _campaign(
             if len(offers) > 1
         ),
         names=names,
+        gap=gap,
     )
 
 

@@ -15,6 +15,7 @@ from .done import REST
 from .drift_in_orders import DriftEffect, DriftSize
 from .orders import LEAST_CHANGE_OVER, ReadingOrder
 from .schedule import Completion
+from .whole_pool import PoolGap
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class Selection:
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
     `drawn_words`; None without any. `prediction` judges what is chosen in full, in this `order`.
     `orders` are what a `drift` does in each order, where that was asked. `names` are the short
-    names of positions whose names the pool composed.
+    names of positions whose names the pool composed. `gap` is what the whole pool leaves
+    undetermined, None where nothing.
     """
 
     experiment: Experiment
@@ -88,6 +90,7 @@ class Selection:
     drift: DriftSize = DriftSize()
     orders: tuple[DriftEffect, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
+    gap: PoolGap | None = None
 
     def title_of(self, candidate: Candidate) -> str:
         """The name of a candidate, after its short name if it has one."""

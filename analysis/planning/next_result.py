@@ -1,4 +1,4 @@
-"""How far a campaign has come, and what to read next, in one line."""
+"""How far a campaign has come, and what to read next, in a few lines."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import finite, number
@@ -85,13 +86,24 @@ class NextStep(Result):
         return self._verdict()
 
     def lines(self) -> list[str]:
-        count = len(self.read)
-        last = self.read[-1]
-        missing = self.missing.get(last, 0)
-        part = f" ({missing} of its readings missing)" if missing else ""
-        begin = f"{count} position{'s' * (count != 1)} read, last {last}{part}"
-        told = [begin, *self.observed.redone, *self._known(), self._verdict()]
-        return ["; ".join(told)]
+        """The answer first, then what it rests on."""
+        count, planned = len(self.read), self.next
+        told = [
+            f"{number_of(count, 'position')} read, last {self.read[-1]}; {self._answer()}",
+            *self._missing(),
+            *self.observed.redone,
+            *self._known(),
+        ]
+        if planned is not None:
+            told.append(f"with {planned.name}: {planned.then.words}")
+        return told
+
+    def _missing(self) -> list[str]:
+        """How many planned readings each position lacks."""
+        if not self.missing:
+            return []
+        named = listing(f"{name} {count}" for name, count in self.missing.items())
+        return [f"readings missing in positions read ({sum(self.missing.values())}): {named}"]
 
     def _known(self) -> list[str]:
         if self.fit is None or self.now is None:
@@ -104,7 +116,8 @@ class NextStep(Result):
             known = f"sigma {number(found, 3)} of {freedom_words(freedom)}"
         shown = [f"suspected: {words}" for words in self.suspected] or ["nothing suspected"]
         lengths = self.fit.quantities.get("U6")
-        return [known, *shown, self.now.words, *([] if lengths is None else self._maximum())]
+        reached = [self.now.words, *([] if lengths is None else self._maximum())]
+        return [known, *shown, "; ".join(reached)]
 
     def _maximum(self) -> list[str]:
         """The largest U6, where the goal does not tell it."""
@@ -118,6 +131,10 @@ class NextStep(Result):
         return [f"largest U6 {number(1e6 * largest)} µm{some}"]
 
     def _verdict(self) -> str:
+        then = "" if self.next is None else f", then {self.next.then.words}"
+        return self._answer() + then
+
+    def _answer(self) -> str:
         if self.is_met:
             assert self.fit is not None
             by_itself = not can_stretch(self.fit.design, self.fit.solution.state)
@@ -130,7 +147,7 @@ class NextStep(Result):
             return f"{reason}; no position is left to read"
         one = self.next
         more = "rest of " if one.name in self.read else ""
-        return f"{reason}; next: {more}{one.name} ({one.readings} readings), then {one.then.words}"
+        return f"{reason}; next: {more}{one.name} ({one.readings} readings)"
 
     def _reason(self) -> str:
         if self.now is None or not self.now.is_met:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
@@ -132,6 +133,8 @@ class Campaign(Selection, Result):
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
                 " determines"
             )
+        if self.gap is not None:
+            lines += [self.gap.words, self.gap.remedy]
         lines += _interrupted(self)
         if self.gains:
             lines += ["", *_gain_table(self)]
@@ -165,6 +168,7 @@ class Campaign(Selection, Result):
             ],
             "completed": None if self.completed is None else self.completed.whole.name,
             "left_open": self.left_open,
+            "whole_pool": None if self.gap is None else self.gap.to_dict(),
             "ignored": [candidate.name for candidate in self.ignored],
             "gains": [_gain_data(gain) for gain in self.gains],
             "left_out": [_gain_data(gain) for gain in self.left_out],
@@ -251,8 +255,7 @@ def _interrupted(campaign: Campaign) -> list[str]:
     lines = []
     for one in campaign.interrupted:
         text = (
-            f"{campaign.title_of(one)} was interrupted after {one.readings}"
-            f" reading{'' if one.readings == 1 else 's'}"
+            f"{campaign.title_of(one)} was interrupted after {number_of(one.readings, 'reading')}"
         )
         if campaign.completed is not None and campaign.completed.whole.name == one.name:
             text += f"; {campaign.completed.rest.readings} more complete it"

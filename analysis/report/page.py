@@ -19,7 +19,7 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
 
 from ..presentation.formatting import micro, number, percent, uncertainty_words
-from ..presentation.pages.document import shipped
+from ..presentation.pages.document import style
 from ..presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
 from ..presentation.scene import MOST_BALLS, Scene, scene
 from ..presentation.table import Block, Entry, Row, Table
@@ -96,7 +96,7 @@ def page(
     context: dict[str, Any] = {
         "title": in_one_line(results.title),
         "summary": _summary(results),
-        "style": Markup(shipped("page.css")),
+        "style": Markup(style()),
         "facts": _facts(results),
         "answer": answer(results),
         "comparison": comparison,

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.geometry.motions import AXIS_NAMES, rigid_motions
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array, Unit
 from ballplate.simulator.maps.corrected_points import corrected, drawn_rows
 from ballplate.simulator.maps.fitted_map import FittedMap
@@ -31,6 +32,8 @@ LEFT_OUT = 1e-3
 # Directions of a covariance below this part of the largest, as correlations, are those of figures
 # that say the same.
 SAME = 1e-6
+# Chance with which any of the figures compared counts as not as predicted although it is.
+ANY_FIGURE = 0.01
 # Figures below this, in metres and radians, are rounding.
 ROUNDING = 1e-13
 
@@ -204,9 +207,19 @@ class AdjustedMachine(Result):
 
     @property
     def is_within(self) -> bool:
-        """Whether nothing that was compared differs by more than its uncertainty."""
+        """Whether what was compared differs by no more than its uncertainties explain: scales and
+        angles together, and no single figure by as much as one of as many does once in a hundred.
+        """
         one_by_one = np.abs(self.normalised_errors[~np.isnan(self.normalised_errors)])
-        return bool((one_by_one <= 1.0).all()) and not self.overall > 1.0
+        return bool((one_by_one <= self.largest_by_chance).all()) and not self.overall > 1.0
+
+    @property
+    def largest_by_chance(self) -> float:
+        """|E_n| that one of the figures compared exceeds once in a hundred by chance."""
+        from scipy.special import ndtri
+
+        limit = -ndtri(0.5 * ANY_FIGURE / max(self.compared, 1)) / self.coverage_factor
+        return max(1.0, float(limit))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -215,13 +228,14 @@ class AdjustedMachine(Result):
     def headline(self) -> str:
         if self.found is None:
             count = len(self.changes)
-            return f"{count} change{'s' * (count != 1)}, predicted"
+            return f"{number_of(count, 'change')}, predicted"
         if not self.compared:
             return "nothing is determined by both campaigns"
         return (
             f"{'as predicted' if self.is_within else 'not as predicted'}: |E_n| at most"
-            f" {number(float(np.nanmax(np.abs(self.normalised_errors))), 3)}, overall"
-            f" {number(self.overall, 3)}"
+            f" {number(float(np.nanmax(np.abs(self.normalised_errors))), 3)} (of"
+            f" {self.compared}, above {number(self.largest_by_chance, 3)} once in a hundred),"
+            f" overall {number(self.overall, 3)} (above 1 once in twenty)"
         )
 
     def lines(self) -> list[str]:
@@ -240,7 +254,7 @@ class AdjustedMachine(Result):
                     _shown(self.coverage_factor * pair.standard_uncertainty / shown),
                 )
             ]
-            cells += [] if self.found is None else [_shown(float(self.normalised_errors[i]))]
+            cells += [] if self.found is None else [self._shown_error(i)]
             unit = {"rad": "arcsec", "1": "µm/m", "m": "µm"}[one.unit]
             rows.append([one.name, *cells, unit])
         table = aligned(rows, [False, *[True] * (len(heads) - 1), False])
@@ -250,6 +264,13 @@ class AdjustedMachine(Result):
             " reading)"
         ]
         return [*(one.words for one in self.changes), "", *table, *said, "", self.headline()]
+
+    def _shown_error(self, i: int) -> str:
+        """E_n of a figure; there is none where both campaigns know it exactly, and the same."""
+        both = (self.predicted[i], self.found[i]) if self.found is not None else ()
+        error = float(self.normalised_errors[i])
+        is_exact = all(one.standard_uncertainty <= ROUNDING for one in both)
+        return "-" if is_exact and np.isnan(error) else _shown(error)
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -320,8 +341,14 @@ def adjusted_machine(
 
     `share` is the standard uncertainty of each change as a part of it.
 
-    :raises ValueError: the error model cannot follow a change; the second map is of another volume.
+    :raises ValueError: the error model cannot follow a change; the second map is of another volume,
+        or of the same readings.
     """
+    if second is not None and second.has_readings_of(fitted):
+        raise ValueError(
+            "the second campaign has the readings of the first, from before the changes; name what"
+            " was read after them"
+        )
     corners, other = (np.array(one.volume.corners) for one in (fitted, second or fitted))
     if corners.shape != other.shape or not np.allclose(corners, other):
         raise ValueError("the second campaign is about another volume; compare maps of the same")

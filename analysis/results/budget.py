@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.functions import (
     Coordinates,
@@ -53,7 +54,8 @@ class BudgetFigure:
 
 @dataclass(frozen=True, repr=False)
 class UncertaintyBudget(Result):
-    """What the `sources` of uncertainty contribute to `figures`, standard uncertainties in metres.
+    """What the `sources` of uncertainty contribute to `figures`, standard uncertainties in metres,
+    in the order of what they contribute to U6, the largest first.
 
     `sigma` has multiplied all stated uncertainties; `coverage_factor` is that of expanded ones.
     `of_fit` tells whether it is that of a fit, or what a design will achieve.
@@ -69,16 +71,16 @@ class UncertaintyBudget(Result):
     caution: str = ""
 
     def headline(self) -> str:
-        known = [one for one in self.figures if one.standard_uncertainty > 0.0]
-        if not known:
+        chosen = _ranking(self.figures)
+        if chosen is None:
             return f"{len(self.sources)} sources, nothing is determined"
-        chosen = next((one for one in known if one.name == "U6"), known[0])
-        most = int(np.argmax(chosen.contributions))
-        return f"{self.sources[most]} {_share(chosen, most)} of the variance of {chosen.name}"
+        return f"{self.sources[0]} {_share(chosen, 0)} of the variance of {chosen.name}"
 
     def lines(self) -> list[str]:
         of = "the fit" if self.of_fit else "the design, at zero machine error"
-        lines = [f"{self.label}: {self.title}", f"uncertainty budget of {of}", ""]
+        chosen = _ranking(self.figures)
+        order = f"; sources by their part of {chosen.name}, the largest first" if chosen else ""
+        lines = [f"{self.label}: {self.title}", f"uncertainty budget of {of}{order}", ""]
         for start in range(0, len(self.figures), SIDE_BY_SIDE):
             lines += [*self._table(self.figures[start : start + SIDE_BY_SIDE]), ""]
         lines += [f"{one.name}: {_words(one)}" for one in self.figures]
@@ -194,16 +196,41 @@ def budget(
     if fit is not None and fit.sigma_is_estimated:
         remedy = "--sigma given takes the uncertainties as stated"
         caution = few_degrees_of_freedom(fit.degrees_of_freedom, "sigma", remedy)
+    names, figures = _largest_first(sums.names, tuple(_figures(at, sums, sigma)))
     return UncertaintyBudget(
         experiment.label,
         experiment.title,
-        sums.names,
-        tuple(_figures(at, sums, sigma)),
+        names,
+        figures,
         expansion(experiment.coverage_factor),
         sigma,
         fit is not None,
         caution,
     )
+
+
+def _ranking(figures: Sequence[BudgetFigure]) -> BudgetFigure | None:
+    """The figure that sources are ranked by: U6 or, where it is undetermined, the first that is
+    not.
+    """
+    known = [one for one in figures if one.standard_uncertainty > 0.0]
+    return next((one for one in known if one.name == "U6"), known[0] if known else None)
+
+
+def _largest_first(
+    sources: tuple[str, ...], figures: tuple[BudgetFigure, ...]
+) -> tuple[tuple[str, ...], tuple[BudgetFigure, ...]]:
+    """Sources and their contributions in the order of what they contribute to the ranking figure,
+    those that are equal but for rounding as they were.
+    """
+    chosen = _ranking(figures)
+    if chosen is None:
+        return sources, figures
+    order = np.argsort(-comparable(chosen.contributions), kind="stable").tolist()
+    ordered = (
+        replace(one, contributions=tuple(one.contributions[k] for k in order)) for one in figures
+    )
+    return tuple(sources[k] for k in order), tuple(ordered)
 
 
 def _figures(at: Linearisation, sums: SourceSums, sigma: float) -> Iterator[BudgetFigure]:

@@ -11,7 +11,7 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Flags, Tasks
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.corrected_points import (
@@ -129,12 +129,12 @@ class Correction(Result):
     def headline(self) -> str:
         u = self.expanded_uncertainties
         open_ = int(np.isnan(u).any(axis=1).sum())
+        count = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
+        if np.isnan(u).all():
+            return f"{count}, undetermined"
         told = f", {open_} of them undetermined" if open_ else ""
-        largest = np.nanmax(u) if np.isfinite(u).any() else np.nan
-        return (
-            f"{len(self.points)} points{told}; U = {self.coverage_factor:g} u ="
-            f" {number(1e6 * float(largest))} µm at most"
-        )
+        largest = float(np.nanmax(u))
+        return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -355,7 +355,7 @@ def left_out_words(fitted: FittedMap) -> str:
 def _of_campaign(estimated: Sequence[str]) -> str:
     names, count = listing(estimated, 4), len(estimated)
     return (
-        f"{count} parameter{'s' * (count > 1)} of influence quantities that the fit estimated"
+        f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"
         f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"
         " correct for these beforehand where they matter"
     )

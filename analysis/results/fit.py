@@ -12,6 +12,7 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
+from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -21,6 +22,7 @@ from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
+from ..presentation.formats import as_html
 from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
 from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
@@ -40,7 +42,7 @@ from .estimates import (
     labels,
 )
 from .fit_contents import fit_contents
-from .map_of_fit import map_of
+from .map_of_fit import counted_twice, map_of
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
+    from ..presentation.pages.embedded import View
     from .certificates.plate_certificate import PlateCertificate
     from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
@@ -76,6 +79,9 @@ REWEIGHTED = (
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
+
+# Of the table of estimates in a notebook, so that what is below it is seen, too.
+ROWS_BESIDE_VIEW = 12
 
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3
@@ -301,6 +307,25 @@ class Fit(FitResult):
             )
         )
 
+    def view(self) -> View:
+        """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
+        or weak directions, which move; of a fit that has failed the positions alone.
+        """
+        from ..presentation.pages.embedded import View
+        from .views import judged_pictures, position_picture, residual_pictures
+
+        if self.estimated is None or not self.converged:
+            return View(self.label, self.title, (position_picture(self.design),))
+        target = None if self.experiment is None else self.experiment.target_uncertainty
+        # Without scatter residuals are mere rounding.
+        residuals = () if self.without_scatter else residual_pictures(self.observed, self.solution)
+        at = self.estimated.at
+        pictures = judged_pictures(at, self.verdict, target, self.sigma, residuals)
+        return View(self.label, self.title, pictures)
+
+    def _repr_html_(self) -> str:
+        return self._written(as_html, ROWS_BESIDE_VIEW) + self.view()._repr_html_()
+
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
         undetermined.
@@ -481,6 +506,13 @@ class Fit(FitResult):
         degrees of freedom, and of what was not tested.
         """
         found = []
+        twice = counted_twice(self.experiment, self.observed)
+        if twice:
+            found.append(
+                "the map that is prior knowledge comes from readings that are fitted here too"
+                f" ({listing(twice)}): they count twice, and uncertainties are too small; leave the"
+                " prior out, or these readings"
+            )
         if self.too_large:
             times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
             cure = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Protocol
@@ -21,6 +20,7 @@ from ballplate.simulator.inputs.days import parse_day
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.same_readings import fingerprint, position_fingerprints
 
 from .estimates import ParameterEstimate
 
@@ -106,7 +106,7 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         frame=FRAMES[experiment.error_model.kind],
         temperatures=_temperatures(fit.observed, experiment),
         left_out=tuple(_left_out(one) for one in fit.estimates if one.kind == "influence"),
-        data=data_of(fit.observed),
+        data=data_of(fit.observed, experiment),
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,
@@ -119,16 +119,32 @@ def _left_out(one: ParameterEstimate) -> LeftOut:
     return LeftOut(one.name, one.kind, one.unit, value, uncertainty)
 
 
-def data_of(observed: ObservedReadings) -> MapData:
-    """What the readings say, however they were written."""
-    design, readings = observed.design, observed.design.readings
-    found = hashlib.sha256()
-    for names in (design.positions.names, design.balls.names, design.probes.names):
-        found.update("\n".join(names).encode())
-    for one in (readings.position, readings.ball, readings.probe):
-        found.update(np.ascontiguousarray(one, "<i8").tobytes())
-    found.update(np.ascontiguousarray(observed.x, "<f8").tobytes())
-    return MapData(len(readings), found.hexdigest())
+def data_of(observed: ObservedReadings, experiment: Experiment | None = None) -> MapData:
+    """What the readings say, however they were written, with those of maps that the experiment has
+    as prior knowledge.
+    """
+    own = position_fingerprints(observed).values()
+    earlier = (one for known in maps_known(experiment) for one in known.positions)
+    positions = tuple(sorted({*own, *earlier}))
+    return MapData(len(observed.design.readings), fingerprint(observed), positions)
+
+
+def maps_known(experiment: Experiment | None) -> set[MapData]:
+    """The readings of maps that are prior knowledge in an experiment."""
+    priors = () if experiment is None else experiment.priors
+    return {one.data for one in priors if one.data is not None}
+
+
+def counted_twice(experiment: Experiment | None, observed: ObservedReadings) -> tuple[str, ...]:
+    """Positions whose readings are fitted, and known by a map that is prior knowledge as well."""
+    known = maps_known(experiment)
+    if not known:
+        return ()
+    prints = position_fingerprints(observed)
+    if any(one.sha256 == fingerprint(observed) for one in known):
+        return tuple(prints)
+    every = {digest for one in known for digest in one.positions}
+    return tuple(name for name, digest in prints.items() if digest in every)
 
 
 def _temperatures(observed: ObservedReadings, experiment: Experiment) -> dict[str, float] | None:

@@ -103,7 +103,7 @@ def map_of_tree(
             LeftOut(one.name, one.kind, one.unit, one.value, one.standard_uncertainty)
             for one in settings.left_out
         ),
-        data=None if data is None else MapData(data.readings, data.sha256),
+        data=None if data is None else MapData(**data.model_dump()),
         experiment=settings.experiment,
         program=settings.program,
         date=settings.date,

@@ -16,7 +16,7 @@ from ..inputs.messages import refused
 from ..inputs.yamltree import to_list
 from ..machines.custom import CustomModelError
 from ..machines.protocol import Array, ErrorModel
-from ..maps.fitted_map import FittedMap
+from ..maps.fitted_map import FittedMap, MapData
 from .model_files import fingerprints, relative
 
 AXES = ("x", "y", "z")
@@ -54,7 +54,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         },
         "coverage_factor": fitted.coverage_factor,
         "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),
-        "data": None if fitted.data is None else vars(fitted.data),
+        "data": None if fitted.data is None else to_list(_data(fitted.data)),
         "left_out": [
             {key: value for key, value in vars(one).items() if value is not None}
             for one in fitted.left_out
@@ -68,6 +68,10 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
     found = {key: value for key, value in found.items() if value not in (None, {}, [], "")}
     found["checksum"] = checksum_of(found, fitted.covariance, fitted.undetermined)
     return found
+
+
+def _data(given: MapData) -> dict[str, Any]:
+    return {key: value for key, value in vars(given).items() if value not in ((), None)}
 
 
 def _probe_data(fitted: FittedMap) -> dict[str, Any]:

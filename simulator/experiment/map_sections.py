@@ -16,6 +16,7 @@ from .schema import DRAFT, tidied
 from .sections import Line, VolumeSettings
 
 Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+Fingerprint = Annotated[str, StringConstraints(pattern="^[0-9a-f]{16}$")]
 PerAxis = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 ROW = "a text of numbers separated by blanks"
 
@@ -67,6 +68,9 @@ class MapDataSettings(Settings):
 
     readings: Annotated[int, Field(ge=0)] = Field(description="how many")
     sha256: Sha256 = Field(description="SHA-256 of what they say")
+    positions: tuple[Fingerprint, ...] = Field(
+        (), description="what each position's readings say, in short, those of a prior map included"
+    )
 
 
 class MapSettings(Settings):

@@ -20,9 +20,10 @@ from ..design.observations.calibration import Calibration
 from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
-from ..inputs.messages import Message, Steps, format_path
+from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
+from ..maps.fitted_map import MapData
 from .changes import changed_tree
 from .readings_section import ReadingsSettings, no_settings
 
@@ -114,7 +115,8 @@ class Prior:
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation.
     ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
     the error model's parameters, and with ``by_offset`` of offsets (d,) of probes by their names.
-    ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
+    ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1. ``data``: the readings of the
+    map that tells it.
     """
 
     name: str
@@ -128,6 +130,7 @@ class Prior:
     path: str = ""
     unit: Unit = "m"
     by_offset: Mapping[str, Floats] | None = None
+    data: MapData | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,6 +322,10 @@ class Experiment:
     def message(self, steps: Steps, text: str) -> Message:
         """A message about the value at a path."""
         return self.place(steps).message(format_path(steps), text)
+
+    def refused(self, steps: Steps, text: str) -> ExperimentError:
+        """The one error of the experiment, about the value at a path."""
+        return ExperimentError([self.message(steps, text)])
 
     def with_(
         self, changes: Mapping[str, object] | None = None, /, **sections: object

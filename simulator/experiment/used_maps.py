@@ -127,6 +127,7 @@ def resolve_map_prior(
                 format_path(of_file),
                 "m",
                 by_offset or None,
+                fitted.data,
             )
         )
     return priors

@@ -16,6 +16,8 @@ from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python, written
 
 Schema = AnyMapping[str, Any]
 
+# Keys that may state an expanded uncertainty in place of a standard one.
+NOT_STANDARD = ("expanded_uncertainty", "uncertainty", "expanded", "u", "u95", "accuracy")
 # Kinds by other names that they have, in lower case without what is no letter.
 OTHER_NAMES = {
     **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),
@@ -153,6 +155,11 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         # A misspelt key may stand beside the right one.
         meant = hint(str(steps[-1]), known)
         meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
+        if "standard_uncertainty" in free and str(steps[-1]).casefold() in NOT_STANDARD:
+            meant = (
+                "uncertainties are standard ones, U / k of an expanded uncertainty U; give U / k as"
+                " standard_uncertainty"
+            )
         return Explanation(steps, f"unknown key; {meant}", of_key=True)
     if isinstance(node, Scalar) and node.value is None:
         return Explanation(steps, "empty; give a value, or leave it out")

@@ -42,10 +42,25 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class MapData:
-    """The readings that a map comes from: how many, and the SHA-256 of what they say."""
+    """The readings that a map comes from: how many, and the SHA-256 of what they say.
+
+    `positions` are fingerprints of what was read in each position, those that a map rests on which
+    was prior knowledge among them.
+    """
 
     readings: int
     sha256: str
+    positions: tuple[str, ...] = ()
+
+    def common(self, other: MapData) -> frozenset[str]:
+        """Fingerprints of positions whose readings both have."""
+        return frozenset(self.positions) & frozenset(other.positions)
+
+    def is_one_campaign(self, other: MapData) -> bool:
+        """Whether all that one of both has read is among the readings of the other."""
+        counts = [len(set(one.positions)) for one in (self, other)]
+        found = len(self.common(other))
+        return self.sha256 == other.sha256 or 0 < found == min(counts)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,6 +123,11 @@ class FittedMap:
         """
         found = [one.value for one in self.left_out if one.kind == CONVERSION]
         return found[0] if found else None
+
+    def has_readings_of(self, other: FittedMap) -> bool:
+        """Whether both maps come from the same readings, or one from part of the other's."""
+        both = self.data, other.data
+        return both[0] is not None and both[1] is not None and both[0].is_one_campaign(both[1])
 
     @cached_property
     def offset_columns(self) -> Integers:

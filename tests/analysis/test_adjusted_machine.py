@@ -264,6 +264,11 @@ def test_second_campaigns_agree_as_often_as_they_should() -> None:
     for count in by_figure:
         check_share(count, trials, float(chi2.cdf(4.0, 1)))
     check_share(overall, trials, 0.95)
+    # The verdict errs as seldom as its two parts together, and not whenever one of ten is above 1.
+    verdicts = [compared(seed).is_within for seed in range(trials)]
+    check_share(sum(verdicts), trials, 0.95 * 0.99)
+    errors = np.array([compared(seed).normalised_errors for seed in range(trials)])
+    assert ((np.abs(errors) > 1.0).any(axis=1) & np.array(verdicts)).any()
 
 
 @pytest.mark.long
@@ -273,6 +278,10 @@ def test_a_thousand_second_campaigns_agree_as_often_as_they_should() -> None:
     for count in by_figure:
         check_share(count, trials, float(chi2.cdf(4.0, 1)))
     check_share(overall, trials, 0.95)
+    verdicts = sum(compared(seed).is_within for seed in range(trials))
+    # Both parts are correlated: between the rarer error and the sum of both.
+    low, high = binom.ppf([1e-5, 1 - 1e-5], trials, [0.94, 0.95])
+    assert low <= verdicts <= high
 
 
 def test_a_screw_that_slipped_is_found() -> None:
@@ -367,10 +376,11 @@ def test_wrong_turns_are_told(text: str, told: str) -> None:
 
 def test_a_machine_that_is_exactly_known_differs_or_not(tmp_path: Path) -> None:
     fitted = campaign(TRUE, 1).to_map()
-    known: FittedMap = replace(fitted, covariance=0.0 * fitted.covariance)
+    known: FittedMap = replace(fitted, covariance=0.0 * fitted.covariance, data=None)
     same = adjusted_machine(
         "", known, [scale_change("x=5 ppm")], adjusted_map(known, [scale_change("x=5 ppm")])
     )
     assert np.isnan(same.normalised_errors).all() and same.compared == 0
+    assert "undetermined" not in "".join(same.lines()[1:-1])
     other = adjusted_machine("", known, [scale_change("x=5 ppm")], known)
     assert np.isinf(other.normalised_errors[0]) and not other.is_within

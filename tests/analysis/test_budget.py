@@ -4,6 +4,7 @@ fits with one stated value changed at a time.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -247,3 +248,60 @@ def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> N
 def test_options_without_readings_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["budget", str(TOP / "designs/quickstart.yaml"), "--sigma", "given"]) == 2
     assert "--sigma goes with readings" in capsys.readouterr().err
+
+
+def test_a_certificate_counts_whatever_is_said_of_the_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A certificate whose lengths are a millimetre off leaves residuals hundreds of times as large,
+    and a table without a unit in its headings is the same table.
+    """
+    design = str(TOP / "designs" / "quickstart.yaml")
+    table, plain, values = tmp_path / "r.csv", tmp_path / "plain.csv", tmp_path / "c.csv"
+    assert main(["simulate", design, "-o", str(table), "--certificate", str(values)]) == 0
+    plain.write_text(table.read_text().replace("_mm", "", 3))
+    lines = values.read_text().splitlines()
+    item, first, second, _ = lines[2].split(",")
+    values.write_text("\n".join([*lines[:2], f"{item},{first},{second},751 mm", *lines[3:], ""]))
+    told = {}
+    capsys.readouterr()
+    for name, options in (
+        ("without", [str(table)]),
+        ("with", [str(table), "--certificate", str(values)]),
+        ("plain", [str(plain), "--unit", "mm", "--certificate", str(values)]),
+    ):
+        assert main(["budget", design, *options, "--json"]) == 0
+        told[name] = json.loads(capsys.readouterr().out)
+    assert told["with"] == told["plain"]
+    assert told["with"]["sigma"] > 100.0 * told["without"]["sigma"]
+
+
+def test_sources_stand_in_the_order_of_what_they_contribute() -> None:
+    for name, by in (
+        ("quickstart", "position"),
+        ("certified/three-planes", "probe"),
+        ("quickstart", "axis"),
+    ):
+        path = TOP / "designs" / f"{name}.yaml"
+        found = bp.budget(bp.load(path), by=by)
+        figure = next(one for one in found.figures if one.name == "U6")
+        parts = np.array(figure.contributions)
+        assert (np.diff(parts) <= 1e-6 * parts.max()).all() and len(parts) > 2
+        assert found.lines()[1].endswith("sources by their part of U6, the largest first")
+        shown = [line.split("  ")[0].strip() for line in found.lines()[4 : 4 + len(parts)]]
+        assert shown == list(found.sources)
+
+
+def test_usage_shows_readings_in_brackets_where_they_may_be_left_out(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for command, ending in (
+        ("budget", "FILE [READINGS ...]"),
+        ("next", "FILE [READINGS ...]"),
+        ("fit", "FILE [READINGS ...]"),
+        ("import", "REPORT [REPORT ...]"),
+    ):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        usage = capsys.readouterr().out.partition("\n\n")[0]
+        assert usage.endswith(ending), command

@@ -255,3 +255,60 @@ def test_the_richer_of_two_models_is_told() -> None:
     assert rich.parameter_count - poor.parameter_count == 9
     one = FittedSum(true_model(2), 100.0, rich.observation_count - poor.parameter_count)
     assert Comparison(True, 1).beaten(one, []).chance == 1.0
+
+
+def flat(**changed: object) -> Experiment:
+    """A plate in one position, in which most errors cannot be told from its pose."""
+    position = {
+        "name": "z",
+        "plane": "z",
+        "level": "500 mm",
+        "corner": {"x": "100 mm", "y": "90 mm"},
+    }
+    return bp.experiment(
+        {
+            "title": "one position",
+            "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": "0.5 um"},
+            "error_model": {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2},
+            "probes": {"down": ["0 mm", "0 mm", "-100 mm"]},
+            "artefacts": {"plate": {"kind": "grid", "balls": [5, 5], "size": ["750 mm", "750 mm"]}},
+            "positions": [position],
+            "calibration": [
+                {"kind": "coordinates", "artefact": "plate", "balls": "all",
+                 "standard_uncertainty": {"x": "0.3 um", "y": "0.3 um", "z": "0.3 um"}}
+            ],
+            "evaluation": {"points": {"random": 10, "seed": 1}},
+        }
+        | changed
+    )  # fmt: skip
+
+
+def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> None:
+    """Nothing richer could be tried, and the file's model is no candidate."""
+    experiment = flat()
+    found = ladder(experiment, simulated(experiment))
+    chosen = next(one for one in found.rungs if one.is_recommended)
+    assert not found.is_none and chosen.beaten.count == 0 and found.lengths.undetermined
+    assert any("nothing shows that it is rich enough" in text for text in found.cautions)
+    assert found.verdict()[-1].endswith("is not determined by this design")
+    assert "undetermined µm" not in "\n".join(found.lines())
+    # A model that asks for less than the others leaves less open, and not a negative number.
+    fewer = flat(error_model={"kind": "metric", "scale": "none"})
+    rungs = ladder(fewer, simulated(fewer)).rungs
+    own = next(one for one in rungs if one.is_of_file)
+    opens = [
+        linearise(with_model(lay_out(fewer), model)).deficiency
+        for model in (lay_out(fewer).model, kinematic_rung(fewer, 2, 1).model)
+    ]
+    assert opens[0] < opens[1] and own.undetermined == 0
+    assert all(one.undetermined >= 0 for one in rungs)
+
+
+def test_models_that_the_verdict_names_are_shown() -> None:
+    """In this campaign the best of the richer ones is off the way up."""
+    experiment = small()
+    found = ladder(experiment, simulated(experiment, 8))
+    assert found.beaten.by in found.verdict()[0]
+    assert found.beaten.by in {one.model for one in found.rungs}
+    counts = [one.parameters for one in found.rungs]
+    assert counts == sorted(counts) and len(counts) == len(set(one.model for one in found.rungs))

@@ -52,6 +52,31 @@ def test_maps_of_files_are_compared(
     assert {"balls of plate", "EXX", "edges"} <= set(frame["kind"])
 
 
+def test_the_same_readings_twice_are_no_agreement(
+    tmp_path: Path, maps: list[str], fits: list[Fit], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever the table is called, in whatever order it stands, and for another error model."""
+    table = bp.simulate(bp.quickstart(), 1)
+    table.sample(frac=1.0, random_state=2).to_csv(tmp_path / "again.csv", index=False)
+    again = bp.fit(bp.quickstart(), tmp_path / "again.csv")
+    bp.write_map(again.to_map(), tmp_path / "again.npz")  # type: ignore[attr-defined]
+    assert main(["diff", maps[0], str(tmp_path / "again.npz"), "--grid", "2", "--fail"]) == 1
+    said = capsys.readouterr()
+    assert "rest on the same readings" in said.err and "change is shown" not in said.out
+    poorer = bp.quickstart().with_({"error_model.position_coefficients": 4})
+    for second in (again, bp.fit(poorer, table)):
+        found = bp.diff(fits[0], second, grid=2)  # type: ignore[arg-type]
+        assert found.is_changed is None and "same readings" in found.headline()
+        assert found.to_dict()["same_readings"] is True
+    mixed = bp.simulate(bp.quickstart(), 2)
+    assert bp.diff(fits[0], bp.fit(bp.quickstart(), mixed), grid=2).is_changed is False  # type: ignore[arg-type]
+    mixed.loc[mixed["position"] == "x low"] = table.loc[table["position"] == "x low"]
+    found = bp.diff(fits[0], bp.fit(bp.quickstart(), mixed), grid=2)  # type: ignore[arg-type]
+    assert found.is_changed is False and "the same in both campaigns in x low:" in found.notes[-1]
+    assert main(["adjust", maps[0], "--scale", "x=1 ppm", "--after", maps[0]]) == 2
+    assert "has the readings of the first" in capsys.readouterr().err
+
+
 def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     assert main([*arguments, "--json"]) in (0, 1)
     return json.loads(capsys.readouterr().out)

@@ -90,3 +90,8 @@ def test_a_value_with_an_option_that_is_unknown(capsys: pytest.CaptureFixture[st
 def test_a_mistyped_choice(capsys: pytest.CaptureFixture[str]) -> None:
     told = complaint(capsys, "check", "x.yaml", "--format", "juint")
     assert told.endswith("argument --format: invalid choice: 'juint'; did you mean \"junit\"?")
+
+
+def test_the_grammar_of_one_command_is_that_among_all() -> None:
+    for name, command in commands().items():
+        assert parser([name]).commands[name].format_help() == command.format_help()

@@ -13,6 +13,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.cli import main
 from ballplate.error_maps.compensation_tables import made_compensation, tabled_machine
 from ballplate.simulator.experiment.compensation.axis_tables import in_arrangement, on_tool_side
 from ballplate.simulator.experiment.compensation.making import TabledMachine, nodes_along
@@ -197,6 +198,19 @@ def test_heidenhain_tables_are_made_without_rotations_only_if_that_is_said() -> 
         on_line[:, k] = np.linspace(machine.lower[k], machine.upper[k], 50)
         apart = made.correction(on_line) - true_errors(machine, on_line, still[:50], machine.zero)
         assert np.abs(apart).max() <= made.made.interpolation + made.made.rounding
+
+
+def test_all_that_a_heidenhain_table_wants_to_be_told_is_told_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = [str(MACHINES / "measured-errors.yaml"), "--format", "heidenhain"]
+    given = ["--pitch", "1 mm", "-o", str(tmp_path / "t.com")]
+    assert main(["compensation", *asked, *given]) == 2
+    told = capsys.readouterr().err
+    for words in ("should end in .cma", "choose the sense", "the pitch along x takes", "turn by"):
+        assert told.count(words) == 1
+    remedies = ["--sense", "corrections", "--without-rotations", "--pitch", "50 mm"]
+    assert main(["compensation", *asked, *remedies, "-o", str(tmp_path / "t.cma")]) == 0
 
 
 def test_the_stated_difference_is_the_largest_of_many_places() -> None:

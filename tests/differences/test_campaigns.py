@@ -8,6 +8,7 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.results.differences.compared_maps import map_of_fit
 from ballplate.results.differences.comparison import ComparisonSettings, MapComparison, compared
 from ballplate.results.differences.normalised_errors import FigureGroup
 from ballplate.results.differences.shared_certificates import (
@@ -16,7 +17,7 @@ from ballplate.results.differences.shared_certificates import (
 )
 from ballplate.results.study import fit as fit_observed
 from ballplate.simulator.machines.protocol import Array
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from tests.differences.campaigns import simulated_fit, simulated_map
 
@@ -75,48 +76,72 @@ def test_one_figure_in_twenty_exceeds_by_chance(is_shared: bool) -> None:
     assert abs(np.mean(p < 0.05) - 0.05) < 3.0 * np.sqrt(0.05 * 0.95 / len(p))
 
 
-def along_x(found: MapComparison) -> tuple[FigureGroup, int]:
-    """The length of the machine's x axis."""
-    edges = next(one for one in found.lengths if one.kind == "edges")
-    return edges, edges.names.index("(0, 0, 0) mm to (1000, 0, 0) mm")
+# Lengths that are changed: an edge, and all body diagonals, by their kind and name.
+LENGTHS = [
+    ("edges", "(0, 0, 0) mm to (1000, 0, 0) mm"),
+    ("body diagonals", "(0, 0, 0) mm to (1000, 1000, 1000) mm"),
+    ("body diagonals", "(0, 1000, 1000) mm to (1000, 0, 0) mm"),
+]
 
 
-def scale_change(size: float) -> tuple[Array, float]:
-    """A change of EXX that makes the x axis longer by `size` times U of that difference, and U."""
-    first, second = (simulated_map(bp.quickstart(), seed) for seed in (1, 2))
-    group, place = along_x(compared(first, second, SETTINGS))
+def length(found: MapComparison, kind: str, name: str) -> tuple[FigureGroup, int]:
+    group = next(one for one in found.lengths if one.kind == kind)
+    return group, group.names.index(name)
+
+
+def length_change(kind: str, name: str, size: float) -> tuple[Array, float]:
+    """A change of the machine's parameters that makes a length longer by `size` times U of that
+    difference, and U.
+
+    U is that of readings that scatter as stated: the scatter found in one pair of campaigns is some
+    per cent more or less, and a change in proportion to it would be found more or less often.
+    """
+    fits = [simulated_fit(bp.quickstart(), seed) for seed in (1, 2)]
+    maps = [map_of_fit(one) for one in fits]
+    stated = [replace(one, root=one.root / fit.sigma) for one, fit in zip(maps, fits, strict=True)]
+    group, place = length(compared(stated[0], stated[1], SETTINGS), kind, name)
     expanded = float(2.0 * group.standard_uncertainties[place])
-    change = np.zeros(len(first.values))
-    own = [k for k, one in enumerate(first.model.parameters) if one.function == "EXX"]
-    ends = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    rows = first.rows(ends, first.offsets["down"]).reshape(2, 3, -1)[:, 0, own]
-    effect = rows[1] - rows[0]
-    change[own] = size * expanded * effect / (effect @ effect)
-    return change, expanded
+    ends = np.array(
+        [
+            [1e-3 * float(one) for one in part.split("(")[1].split(")")[0].split(",")]
+            for part in name.split(" to ")
+        ]
+    )
+    along = np.diff(ends, axis=0)[0] / np.linalg.norm(np.diff(ends, axis=0))
+    rows = maps[0].rows(ends, maps[0].offsets["down"]).reshape(2, 3, -1)
+    effect = along @ (rows[1] - rows[0])
+    squares = np.array([1.0 / one.effect for one in maps[0].model.parameters]) ** 2
+    return size * expanded * squares * effect / (effect @ (squares * effect)), expanded
 
 
-@pytest.mark.long
-def test_a_change_is_what_it_is() -> None:
-    change, expanded = scale_change(2.0)
-    first = simulated_map(bp.quickstart(), 1)
-    second = simulated_map(bp.quickstart(), 2)
-    group, place = along_x(compared(first, second, SETTINGS))
-    changed, _ = along_x(compared(first, replace(second, values=second.values + change), SETTINGS))
+@pytest.mark.parametrize(("kind", "name"), LENGTHS[:2])
+def test_a_change_is_what_it_is(kind: str, name: str) -> None:
+    change, expanded = length_change(kind, name, 2.0)
+    first, second = (simulated_map(bp.quickstart(), seed) for seed in (1, 2))
+    group, place = length(compared(first, second, SETTINGS), kind, name)
+    other = replace(second, values=second.values + change)
+    changed, _ = length(compared(first, other, SETTINGS), kind, name)
     grown = changed.differences[place] - group.differences[place]
-    assert grown == pytest.approx(2.0 * expanded, rel=1e-9)
+    # Lines through a machine with errors are not quite straight.
+    assert grown == pytest.approx(2.0 * expanded, rel=1e-4)
 
 
 @pytest.mark.long
-def test_a_change_of_twice_the_denominator_is_found() -> None:
-    change, _ = scale_change(2.0)
+@pytest.mark.parametrize(("kind", "name"), LENGTHS)
+def test_a_change_of_twice_the_denominator_is_found(kind: str, name: str) -> None:
+    """As often as a normal variable with the mean 4 is beyond 2 in size: the scatter of some 1,160
+    degrees of freedom makes a difference of a tenth of a per cent.
+    """
+    change, _ = length_change(kind, name, 2.0)
     found = []
     for k in range(200):
         first = simulated_map(bp.quickstart(), 5000 + 2 * k)
         second = simulated_map(bp.quickstart(), 5001 + 2 * k, changed=change)
-        group, place = along_x(compared(first, second, SETTINGS))
+        group, place = length(compared(first, second, SETTINGS), kind, name)
         found.append(abs(group.normalised[place]) > 1.0)
-    # P(|N(4, 1)| > 2) is 0.977.
-    assert np.mean(found) >= 0.95
+    power = norm.sf(2.0, 4.0) + norm.cdf(-2.0, 4.0)
+    assert power == pytest.approx(0.977, abs=5e-4)
+    assert abs(np.mean(found) - power) < 3.0 * np.sqrt(power * (1.0 - power) / len(found))
 
 
 def test_what_a_certificate_does_is_what_another_value_of_it_would() -> None:

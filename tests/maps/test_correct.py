@@ -159,6 +159,14 @@ def test_what_is_undetermined_is_told(folder: Path, capsys: pytest.CaptureFixtur
     assert "nan" not in told
 
 
+def test_the_headline_of_what_is_undetermined_states_no_uncertainty(fitted: FittedMap) -> None:
+    nothing = replace(fitted, undetermined=np.diag(fitted.scale))
+    assert bp.correct(nothing, [[0.1, 0.2, 0.3]]).headline() == "1 point, undetermined"
+    told = bp.correct(nothing, [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]).lines()
+    assert told[0].endswith(": 2 points, undetermined") and "µm at most" not in "".join(told)
+    assert bp.correct(fitted, [[0.1, 0.2, 0.3]]).headline().startswith("1 point; U = 2 u = 0.")
+
+
 def test_the_command_writes_what_python_gives(
     fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -248,3 +256,42 @@ def test_few_degrees_of_freedom_are_told(folder: Path) -> None:
     )
     found = bp.correct(fitted, [[0.1, 0.1]])
     assert any("degrees of freedom is itself uncertain by" in one for one in found.warnings)
+
+
+def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A fit, its map, and a file whose readings are fitted first."""
+    bp.simulate(bp.quickstart(), 3).to_csv(folder / "named.csv", index=False)
+    text = Path("designs/quickstart.yaml").read_text("utf-8")
+    (folder / "named.yaml").write_text(f"{text}readings: {{files: named.csv}}\n", "utf-8")
+    points = folder / "ends.csv"
+    points.write_text("x_mm,y_mm,z_mm\n100,200,300\n900,800,700\n", "utf-8")
+    fit = bp.fit(bp.quickstart(), folder / "named.csv")
+    fitted = fit.to_map()  # type: ignore[attr-defined]
+    expected = bp.correct(fitted, points)
+    assert np.array_equal(bp.correct(fit, points).points, expected.points)  # type: ignore[arg-type]
+    assert np.array_equal(bp.correct(fit, points).covariance(), expected.covariance())  # type: ignore[arg-type]
+    for call in (
+        lambda one: bp.curves(one, points=3),
+        lambda one: bp.map(one, grid=(2, 2, 2)),
+        lambda one: bp.adjust(one, "x=1 ppm"),
+        lambda one: bp.convert(one, "{kind: empirical, coefficients: 5}"),
+        lambda one: bp.compensation(one, "isg"),
+    ):
+        assert call(fit).to_dict() == call(fitted).to_dict()
+    with pytest.raises(TypeError, match="give a fit, what its to_map"):
+        bp.correct(3, points)  # type: ignore[arg-type]
+    for command, given in (("correct", [str(points)]), ("curves", [])):
+        bp.write_map(fitted, folder / "named-map.yaml")
+        told = []
+        for name in ("named.yaml", "named-map.yaml"):
+            assert main([command, str(folder / name), *given, "--json"]) == 0
+            told.append(json.loads(capsys.readouterr().out))
+        for one in told:
+            one.pop("label", None), one.pop("file", None), one.pop("map", None)
+        assert told[0] == told[1]
+    assert main(["correct", "designs/quickstart.yaml", str(points)]) == 3
+    assert "names no readings" in capsys.readouterr().err
+    assert main(["check", str(folder / "named-map.yaml")]) == 3
+    assert "this is a map that a fit left behind" in capsys.readouterr().err

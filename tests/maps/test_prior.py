@@ -9,6 +9,7 @@ from typing import Any
 
 import ballplate as bp
 import numpy as np
+import pandas
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -289,3 +290,31 @@ def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
     assert before == told() != told(draw=1)
     bp.write_map(replace(fitted, values=1.01 * fitted.values), tmp_path / "first.yaml")
     assert told() != before
+
+
+def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
+    """A map as prior knowledge of a fit to the readings that it comes from, or to some of them."""
+    plain = bp.quickstart()
+    first, second = (bp.simulate(plain, seed) for seed in (1, 2))
+    fit = bp.fit(plain, first)
+    bp.write_map(fit.to_map(), tmp_path / "map.yaml")  # type: ignore[attr-defined]
+    known = plain.with_({"priors": [{"kind": "map", "file": str(tmp_path / "map.yaml")}]})
+
+    def told(table: pandas.DataFrame) -> list[str]:
+        return [text for text in bp.fit(known, table).cautions if "count twice" in text]
+
+    assert told(second) == []
+    assert "(z low, z high, x low, x high, y low, y high)" in told(first.sample(frac=1.0))[0]
+    both = second.copy()
+    both.loc[both["position"] == "x high"] = first.loc[first["position"] == "x high"]
+    assert "fitted here too (x high): they count twice" in told(both)[0]
+    # They do: twice the information leaves 0.7 of the uncertainty, but for what certificates do.
+    rows = [one.quantities["U6"].average / one.sigma for one in (fit, bp.fit(known, first))]  # type: ignore[attr-defined]
+    assert rows[1] == pytest.approx(rows[0] / np.sqrt(2.0), rel=0.05)
+    # A map that rests on another one is no independent campaign either.
+    later = bp.fit(known, second).to_map()  # type: ignore[attr-defined]
+    bp.write_map(later, tmp_path / "later.npz")
+    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.npz", grid=2)
+    assert found.has_one_campaign and found.is_changed is None
+    apart = bp.fit(plain, second).to_map()  # type: ignore[attr-defined]
+    assert bp.diff(tmp_path / "map.yaml", apart, grid=2).is_changed is False

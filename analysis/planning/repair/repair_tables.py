@@ -69,7 +69,9 @@ def _worth(repair: Repair, judged: Verdict) -> str:
 
 
 def _directions(repair: Repair, judged: Verdict) -> str:
-    names = list(dict.fromkeys(name for k in repair.removes for name in _names(judged.null[k])))
+    names = list(
+        dict.fromkeys(name for k in repair.removes for name in changed_names(judged.null[k]))
+    )
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{_numbers(repair)} ({', '.join(names[:MOST_NAMES])}{more})"
 
@@ -81,7 +83,7 @@ def _numbers(repair: Repair) -> str:
     return f"undetermined {listed(list(map(str, numbers)))}"
 
 
-def _names(direction: Direction) -> list[str]:
+def changed_names(direction: Direction) -> list[str]:
     """Errors that a direction changes, or else what it changes instead."""
     if direction.functions:
         return [part.name for part in direction.functions]

@@ -14,9 +14,12 @@ from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
+from ballplate.simulator.maps.fitted_map import MapData
+from ballplate.simulator.readings.same_readings import position_fingerprints
 
 from ...error_maps.volumetric_errors import Volumetric
 from ..fit import Fit
+from ..map_of_fit import data_of
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it
 # can do a motion of its frame.
@@ -80,7 +83,8 @@ class ComparedMap:
     they are as stated. `offsets` are those of probes by name, `probe` the one that is meant where
     none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
     maps of the same model have them in common, as otherwise their spaces of errors would differ by
-    what is of second order. `fit` has the balls of plates. `is_expected`: nothing was measured, and
+    what is of second order. `fit` has the balls of plates, and `data` are the readings that the map
+    comes from, where they are known. `is_expected`: nothing was measured, and
     the map is exact but for what is stated, of which `stated` is the standard uncertainty of
     lengths.
     """
@@ -102,6 +106,7 @@ class ComparedMap:
     stated: LengthFunction | None = None
     shared_balls: Array | None = None
     about: Array | None = None
+    data: MapData | None = None
 
     @property
     def dimension(self) -> int:
@@ -173,6 +178,26 @@ class ComparedMap:
         return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
 
 
+def come_from_same_readings(first: ComparedMap, second: ComparedMap) -> bool:
+    """Whether two maps come from the same readings, or one from part of the other's."""
+    both = first.data, second.data
+    return both[0] is not None and both[1] is not None and both[0].is_one_campaign(both[1])
+
+
+def read_once(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
+    """Positions whose readings two maps have in common, by their names where one is a fit, or how
+    many they are.
+    """
+    if first.data is None or second.data is None:
+        return ()
+    common = first.data.common(second.data)
+    fit = second.fit or first.fit
+    if fit is None or not common:
+        return (f"{len(common)} position{'s' * (len(common) != 1)}",) if common else ()
+    prints = position_fingerprints(fit.observed)
+    return tuple(name for name, one in prints.items() if one in common)
+
+
 def motions(points: Array) -> Array:
     """What small motions of the frame do at `points` (n, d): (n, d, 6), or (n, d, 3) in the plane;
     shifts in metres, turns about the origin in radians.
@@ -208,6 +233,7 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
         design.probes.names[design.evaluation.probe],
         date,
         fit,
+        data=data_of(fit.observed, fit.experiment),
     )
 
 

@@ -6,16 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.readings.same_readings import read_once_words
 
 from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
 from ..adjustments import FEW
-from .compared_maps import MOTIONS, ComparedMap
+from .compared_maps import MOTIONS, ComparedMap, come_from_same_readings, read_once
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
 
@@ -31,6 +33,12 @@ DAYS_OF_A_YEAR = 365.25
 INDEPENDENT = (
     "the campaigns are taken to be independent: if both rest on the same certificate, its errors"
     " cancel in the difference, U here is too large, and a change may be missed"
+)
+
+
+SAME_READINGS = (
+    "both rest on the same readings: U and E_n, which take campaigns to be independent, say nothing"
+    " here, and differences are those of the evaluation alone"
 )
 
 
@@ -67,6 +75,11 @@ class MapDifference(Result):
         days = date.fromisoformat(self.second.date) - date.fromisoformat(self.first.date)
         return days.days / DAYS_OF_A_YEAR if days.days else None
 
+    @cached_property
+    def has_one_campaign(self) -> bool:
+        """Whether both maps come from the same readings, or one from part of the other's."""
+        return come_from_same_readings(self.first, self.second)
+
     @property
     def tests(self) -> tuple[JointTest, ...]:
         """The joint tests that decide: of the map as a whole, and of each plate."""
@@ -78,10 +91,12 @@ class MapDifference(Result):
     def is_changed(self) -> bool | None:
         """Whether the joint test of the map shows a change; None where nothing can be tested."""
         test = self.comparison.test
-        return None if test is None else test.p < LEVEL
+        return None if test is None or self.has_one_campaign else test.p < LEVEL
 
     def headline(self) -> str:
         test = self.comparison.test
+        if self.has_one_campaign:
+            return "the same readings on both sides: no change can be shown"
         if test is None:
             return "nothing that is determined in both can be tested"
         return f"{_verdict(test)} (p = {_chance(test.p)})"
@@ -99,12 +114,11 @@ class MapDifference(Result):
             "",
             *self._motion_table(),
             "",
-            *_group_table(self._told_groups()),
-            "",
-            *self._test_lines(),
-            "",
+            *([] if self.has_one_campaign else self._tested_lines()),
             *self._length_table(),
         ]
+        if self.has_one_campaign:
+            return lines
         if found.functions:
             lines += ["", *self._function_table()]
         else:
@@ -122,9 +136,15 @@ class MapDifference(Result):
         for one in (self.first, self.second):
             cautions = () if one.fit is None else one.fit.cautions
             found += [f"warning: {one.label}: {caution}" for caution in cautions]
+        if self.has_one_campaign:
+            found.append(f"warning: {SAME_READINGS}")
+        elif once := read_once(self.first, self.second):
+            found.append(f"warning: {read_once_words(once)}")
         return tuple(found)
 
     def _assumption(self) -> str:
+        if self.has_one_campaign:
+            return SAME_READINGS
         expected = [one for one in (self.first, self.second) if one.is_expected]
         if expected:
             one = expected[0]
@@ -172,8 +192,8 @@ class MapDifference(Result):
         joined = (_joined(of_functions),) if of_functions else ()
         return (*lengths, found.places, *joined, *plates)
 
-    def _test_lines(self) -> list[str]:
-        lines = []
+    def _tested_lines(self) -> list[str]:
+        lines = [*_group_table(self._told_groups()), ""]
         for one in self.tests:
             freedom = one.degrees_of_freedom
             scatter = "" if math.isinf(freedom) else f" (sigma of {freedom:.0f} degrees of freedom)"
@@ -186,7 +206,7 @@ class MapDifference(Result):
             "a single |E_n| > 1 among many figures shows nothing, since about as many as stated by"
             f" chance exceed 1; joint tests count, and each errs once in {round(1 / LEVEL)}"
         )
-        return lines
+        return [*lines, ""]
 
     def _length_table(self) -> list[str]:
         years = self.years
@@ -240,6 +260,7 @@ class MapDifference(Result):
             "probe": found.probe,
             "coverage_factor": self.coverage_factor,
             "shared_values": self.shared,
+            "same_readings": self.has_one_campaign,
             "years": self.years,
             "changed": self.is_changed,
             "level": LEVEL,

@@ -6,22 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.experiment.map_files import BINARY, read_map
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.experiment.map_files import read_map
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.inputs.tables import header_names, read_table
-from ballplate.simulator.inputs.yamltree import Mapping, read_tree
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.readings.point_files import NAMING
-from ballplate.simulator.readings.reading_files import AXES, read_readings
+from ballplate.simulator.readings.reading_files import AXES
 
 from ..fit import Fit
-from ..study import fit as fit_observed
+from ..fit_of_file import fit_of_file, kind_of_file
 from .compared_maps import ComparedMap, expected_map, map_of_fit
 from .comparison import ComparisonSettings, NotComparableError, compared
 from .map_difference import MapDifference
@@ -50,7 +46,7 @@ def map_difference(
     """
     labels = _labels(sides)
     described = [
-        load_machine(side) if isinstance(side, Path) and _kind(side) == "machine" else None
+        load_machine(side) if isinstance(side, Path) and kind_of_file(side) == "machine" else None
         for side in sides
     ]
     if all(described):
@@ -119,25 +115,12 @@ def _labels(sides: tuple[Side, Side]) -> tuple[str, str]:
     return "first", "second"
 
 
-def _kind(path: Path) -> str:
-    """What a file is: map, machine or experiment."""
-    if path.suffix.lower() == BINARY:
-        return "map"
-    root = read_tree(path)
-    keys = root.items if isinstance(root, Mapping) else {}
-    if "map" in keys:
-        return "map"
-    if "positions" in keys or "machine" in keys or "pool" in keys:
-        return "experiment"
-    return "machine" if "arrangement" in keys else "map"
-
-
 def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
     if isinstance(side, Fit):
         return map_of_fit(side, label, day)
     if isinstance(side, Path):
-        if _kind(side) == "experiment":
-            return map_of_fit(_fit_of(side), label, day)
+        if kind_of_file(side) == "experiment":
+            return map_of_fit(fit_of_file(side), label, day)
         side = read_map(side)
     own = slice(len(side.values))
     return ComparedMap(
@@ -153,29 +136,5 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         dict(zip(side.probes.names, side.probes.offsets, strict=True)),
         side.probe,
         day or side.date,
+        data=side.data,
     )
-
-
-def _fit_of(path: Path) -> Fit:
-    """The fit of an experiment to the readings that it names.
-
-    :raises ExperimentError: the file is wrong, has variants or names no readings, or the estimate
-        did not converge.
-    """
-    variants = load(path)
-    if len(variants) > 1:
-        raise refused(path, "the file has several variants; compare their map files", "variants")
-    experiment = variants[0]
-    named = experiment.readings.named_files
-    if not named:
-        text = (
-            "names no readings, so that there is no fit to compare; add readings: {files: […]}, or"
-            " name a map that fit -o wrote"
-        )
-        raise refused(path, text, "readings")
-    files = [experiment.source.parent / name for name in named]
-    observed = read_readings(files, lay_out(experiment), settings=experiment.readings)
-    found = fit_observed(experiment, observed)
-    if not found.converged:
-        raise ExperimentError([experiment.message((), found.complaint)])
-    return found

@@ -22,6 +22,11 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.same_readings import (
+    is_one_campaign,
+    read_once_words,
+    same_positions,
+)
 
 from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
@@ -40,7 +45,8 @@ class CrossValidation(FitResult):
 
     `sum_of_squares` of the differences, weighted with their covariance, has `dimensions`, and
     `chance` is that of one so large. `lengths` are the largest difference of a length between two
-    places, and its standard uncertainty. `common` tells whether both had the same certificates.
+    places, and its standard uncertainty. `common` tells whether both had the same certificates,
+    and `read_once` names positions whose readings are the same in both.
     """
 
     label: str
@@ -56,6 +62,11 @@ class CrossValidation(FitResult):
     sigmas: tuple[float, float]
     coverage_factor: float
     common: bool = True
+    read_once: tuple[str, ...] = ()
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        return (read_once_words(self.read_once),) if self.read_once else ()
 
     @property
     def complaint(self) -> str:
@@ -160,8 +171,12 @@ def cross_validate(
 
     Errors of its certificates are in `common`, unless the plates were others.
 
-    :raises ExperimentError: one of them does not converge, or nothing can be compared.
+    :raises ExperimentError: one of them does not converge, both are the same readings, or nothing
+        can be compared.
     """
+    if is_one_campaign(first, second):
+        text = "both campaigns have the same readings, which agree with themselves; name others"
+        raise refused(experiment.source, text)
     given = (sigma or experiment.sigma) == "given"
     fits = [_fitted(experiment, one, given) for one in (first, second)]
     (one, scale_1), (two, scale_2) = fits
@@ -206,6 +221,7 @@ def cross_validate(
         (scale_1, scale_2),
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         common,
+        same_positions(first, second),
     )
 
 

@@ -53,6 +53,11 @@ from .rungs import (
     with_model,
 )
 
+NO_RICHER = (
+    "this design determines no richer model than the one recommended: nothing shows that it is rich"
+    " enough"
+)
+
 # Chance below which residuals do not come from the scatter of the readings.
 MISFIT = 1e-3
 
@@ -218,6 +223,7 @@ def ladder(
     for model in models:
         fits.append(fit_rung(experiment, observed, model))
         report(ProgressStep(f"error models of {experiment.label}", len(fits), len(models)))
+    fits = _with_best_richer(experiment, observed, fits, found, file, test)
     chosen, richest = (
         next(one for one in fits if one.model.words == wanted.model.words)
         for wanted in (found.chosen, found.richest)
@@ -227,8 +233,11 @@ def ladder(
     if faults and richest is not chosen and not _faults(richest, observed.x, repeats, given):
         chosen, faults, beaten = richest, (), Beaten(1.0, 0, "")
     unconfirmed, for_want = found.unconfirmed(chosen.model)
+    unsure = unconfirmed if for_want else ""
     if unconfirmed and not for_want:
         faults = (*faults, unconfirmed)
+    elif not (unconfirmed or faults or beaten.count):
+        unsure = NO_RICHER
     scale = chosen.sigma(given)
     rungs = (
         Rung(
@@ -241,7 +250,7 @@ def ladder(
             _change(one.at, chosen.at),
             one is chosen,
             one.model.words == file.words,
-            one.at.deficiency - richest.at.deficiency,
+            max(one.at.deficiency - richest.at.deficiency, 0),
         )
         for one in fits
     )
@@ -262,8 +271,27 @@ def ladder(
         found.beyond,
         lengths,
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
-        tuple(filter(None, (unconfirmed if for_want else "", _untested(chosen.at.design)))),
+        tuple(filter(None, (unsure, _untested(chosen.at.design)))),
     )
+
+
+def _with_best_richer(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    fits: list[RungFit],
+    found: Climb,
+    file: LadderModel,
+    test: Comparison,
+) -> list[RungFit]:
+    """The fits with those of the richer models that explain most beside the chosen one and the
+    file's, which are told by name.
+    """
+    own = next(one.fitted for one in fits if one.model.words == file.words)
+    named = {found.beaten.by, test.beaten(own, richer(own, found.every)).by}
+    missing = named - {one.model.words for one in fits}
+    more = [one.model for one in found.every if one.model.words in missing]
+    fits = [*fits, *(fit_rung(experiment, observed, one) for one in more)]
+    return sorted(fits, key=lambda one: one.model.count)
 
 
 def _untested(design: Design) -> str:

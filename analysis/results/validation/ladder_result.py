@@ -109,12 +109,14 @@ class Ladder(FitResult):
                 ),
             ]
         if self.beaten.count:
+            count, least = self.beaten.count, chance_words(self.beaten.least)
+            some, does = ("the one richer model", "does not explain")
+            if count > 1:
+                some, does = f"none of {count} richer models", "explains"
             why = (
-                f"none of {self.beaten.count} richer models that this design determines explains"
-                f" significantly more; least chance {chance_words(self.beaten.least)}"
+                f"{some} that this design determines {does} significantly more; least chance"
+                f" {least}, of {self.beaten.by}"
             )
-            if self.beaten.by:
-                why += f", of {self.beaten.by}"
         else:
             why = "it is the richest that this design determines"
         found = [f"recommended: {self.recommended}; {why}"]
@@ -125,7 +127,9 @@ class Ladder(FitResult):
 
     def _of_file(self, file: Rung) -> str:
         chosen = next(one for one in self.rungs if one.is_recommended)
-        if file.beaten.chance < FALSE_STEP and file.beaten.count:
+        if file.undetermined:
+            told = "is not determined by this design"
+        elif file.beaten.chance < FALSE_STEP and file.beaten.count:
             chance = chance_words(file.beaten.chance)
             told = f"is too poor: {file.beaten.by} explains more (chance {chance})"
         elif file.parameters > chosen.parameters:
@@ -140,10 +144,10 @@ class Ladder(FitResult):
                 else "the worse"
             )
             told = f"is no poorer or richer form of these; by BIC it is {word}"
-        return (
-            f"the file's error model, {file.model.removeprefix(FILE)}, {told}; it changes"
-            f" lengths by {self._length(file.change.rms)} µm rms"
-        )
+        told = f"the file's error model, {file.model.removeprefix(FILE)}, {told}"
+        if self.lengths.undetermined:
+            return told
+        return f"{told}; it changes lengths by {self._length(file.change.rms)} µm rms"
 
     def lines(self) -> list[str]:
         how = "given" if self.sigma_is_given else "estimated"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,11 @@ PLACES, RANDOM = 33, 4000
 
 
 class CannotMakeError(ValueError):
-    """No table of the machine can be made as asked; the text says why and what would do."""
+    """No table of the machine can be made as asked; the `reasons` say why and what would do."""
+
+    def __init__(self, *reasons: str) -> None:
+        super().__init__("; ".join(reasons))
+        self.reasons = reasons
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,49 +111,57 @@ def made_table(
     `volumetric` tables hold the errors of the whole machine on a grid. Rotations that the format
     has no room for are left out only if so asked.
 
-    :raises CannotMakeError: the format cannot hold the machine's errors.
+    :raises CannotMakeError: the format cannot hold the machine's errors, with all reasons.
     """
     origin = machine.zero if zero is None else zero
+    usual = (machine.upper - machine.lower) / INTERVALS
+    steps = usual if pitch is None else pitch
+    reasons = [*_beyond(machine, made, steps, origin)]
+    if not (volumetric or made.has_rotations or without_rotations):
+        # At nodes that any format has room for.
+        nodes = _nodes(machine, made, usual, machine.zero)
+        reasons += _refused_rotations(_of_axes(machine, made, nodes, machine.zero), made)
+    if reasons:
+        raise CannotMakeError(*reasons)
+    nodes = _nodes(machine, made, steps, origin)
+    exact: Table
+    if volumetric:
+        exact = _volumetric(machine, made, nodes, origin)
+    else:
+        exact = _of_axes(machine, made, nodes, origin)
+    written = _rounded(exact, made)
+    return _compared(machine, exact, written, made, origin)
+
+
+def _beyond(
+    machine: TabledMachine, made: TableFormat, steps: Array, origin: Array
+) -> Iterator[str]:
+    """What is beyond the volume, or the room of the format."""
     outside = (origin < machine.lower - SAME) | (origin > machine.upper + SAME)
     if outside.any():
         named = " and ".join("xyz"[k] for k in np.flatnonzero(outside))
-        raise CannotMakeError(f"the origin is outside the volume in {named}")
-    steps = (machine.upper - machine.lower) / INTERVALS if pitch is None else pitch
-    nodes = _nodes(machine, made, steps, origin)
-    if volumetric:
-        exact: Table = _volumetric(machine, made, nodes, origin)
-    else:
-        exact = _of_axes(machine, made, nodes, origin, without_rotations)
-    written = _rounded(exact, made)
-    return _compared(machine, exact, written, made, origin)
+        yield f"the origin is outside the volume in {named}"
+    most = made.most_points or MOST_NODES
+    for k in range(machine.dimension):
+        count = float(machine.upper[k] - machine.lower[k]) / float(steps[k])
+        if count <= most:
+            count = len(_along(machine, made, steps, origin, k))
+        if count > most:
+            yield (
+                f"the pitch along {'xyz'[k]} takes {count:.0f} positions, and {made.name} has at"
+                f" most {most}; choose a larger one"
+            )
+
+
+def _along(machine: TabledMachine, made: TableFormat, steps: Array, origin: Array, k: int) -> Array:
+    ends = float(machine.lower[k]), float(machine.upper[k])
+    return nodes_along(*ends, float(origin[k]), float(steps[k]), made.even)
 
 
 def _nodes(
     machine: TabledMachine, made: TableFormat, steps: Array, origin: Array
 ) -> tuple[Array, ...]:
-    found = []
-    most = made.most_points or MOST_NODES
-    for k in range(machine.dimension):
-        count = float(machine.upper[k] - machine.lower[k]) / float(steps[k])
-        if count > most:
-            raise CannotMakeError(
-                f"the pitch along {'xyz'[k]} would take more than {most} positions; choose a larger"
-                " one"
-            )
-        own = nodes_along(
-            float(machine.lower[k]),
-            float(machine.upper[k]),
-            float(origin[k]),
-            float(steps[k]),
-            made.even,
-        )
-        if len(own) > most:
-            raise CannotMakeError(
-                f"the pitch along {'xyz'[k]} takes {len(own)} positions, and {made.name} has at"
-                f" most {most}; choose a larger one"
-            )
-        found.append(own)
-    return tuple(found)
+    return tuple(_along(machine, made, steps, origin, k) for k in range(machine.dimension))
 
 
 def _volumetric(
@@ -170,12 +183,12 @@ def _of_axes(
     made: TableFormat,
     nodes: tuple[Array, ...],
     origin: Array,
-    without_rotations: bool,
 ) -> AxisTables:
     try:
         functions = axis_functions(machine.model, machine.a)
     except NotOfAxesError as error:
         more = "; a volumetric table can hold them" if made.has_volumes else ""
+        more += "; a map that is converted to a kinematic model may have such errors"
         raise CannotMakeError(
             f"a table of single axes cannot hold its errors: {error}{more}"
         ) from None
@@ -190,14 +203,17 @@ def _of_axes(
     exact = _continued(exact, nodes)
     if made.from_zero or not made.has_rotations:
         exact = on_tool_side(exact)
-    if not made.has_rotations:
-        largest = max(float(np.abs(one.values[:, 3:]).max()) for one in exact.axes)
-        if largest > made.angle_step and not without_rotations:
-            raise CannotMakeError(
-                f"its axes turn by up to {1e6 * largest:.4g} µrad, for which {made.name} tables"
-                " have no room; leave rotations out only if you say so, or choose another format"
-            )
     return exact
+
+
+def _refused_rotations(exact: AxisTables, made: TableFormat) -> Iterator[str]:
+    """Rotations of axes that a format has no room for."""
+    largest = max(float(np.abs(one.values[:, 3:]).max()) for one in exact.axes)
+    if largest > made.angle_step:
+        yield (
+            f"its axes turn by up to {1e6 * largest:.4g} µrad, for which {made.name} tables have no"
+            " room; say that they are to be left out (without rotations), or choose another format"
+        )
 
 
 def _continued(tables: AxisTables, nodes: tuple[Array, ...]) -> AxisTables:
