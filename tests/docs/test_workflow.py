@@ -60,7 +60,7 @@ def test_it_may_do_little_and_uses_what_cannot_change() -> None:
         "contents": "read"
     } and "pull_request_target" not in WORKFLOW.read_text("utf-8")
     used = [step["uses"] for step in STEPS if "uses" in step]
-    assert len(used) == 4 and all(
+    assert len(used) == 6 and all(
         re.fullmatch(r"actions/[a-z-]+@[0-9a-f]{40}", one) for one in used
     )
     assert not any("permissions" in job for job in workflow["jobs"].values())
@@ -81,7 +81,12 @@ def test_it_runs_the_commands_of_the_readme() -> None:
     on_windows = (
         command("test command").replace("/bin/", "/Scripts/").replace("python3 ", "python ")
     )
+    with_browser = scripts.pop(2).splitlines()
     assert scripts == [".ci/run", "\n".join(on_windows.split(" && ")), command("oldest versions")]
+    contributing = Path("CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert with_browser[0] == "python -m venv .venv"
+    documented = [line.partition("   #")[0].strip() for line in contributing.splitlines()]
+    assert set(with_browser[1:]) <= set(documented)
 
 
 def test_every_dependency_states_the_oldest_version_tried() -> None:
@@ -92,7 +97,7 @@ def test_every_dependency_states_the_oldest_version_tried() -> None:
         re.fullmatch(r"[A-Za-z0-9-]+>=[0-9.]+|ballplate\[[a-z,]+\]", one) for one in stated
     ), stated
     # What the tests take along is what the command above installs: all but what only benchmarks
-    # need.
+    # and tests in a browser need.
     tried = {
         "test",
         *re.findall(
@@ -105,7 +110,7 @@ def test_every_dependency_states_the_oldest_version_tried() -> None:
         if one.startswith("ballplate[")
         for name in re.findall(r"\w+", one[9:])
     }
-    assert set(extras) - tried == {"benchmark"}
+    assert set(extras) - tried == {"benchmark", "browser"}
     assert "3.11" in project["requires-python"] and command("oldest versions").startswith(
         "python3.11 "
     )

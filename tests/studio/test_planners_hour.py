@@ -16,7 +16,7 @@ from ballplate.designs import shipped
 from tests.studio.chromium import Studio, chromium, settled, tab, until
 
 pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[browser]', and a Chromium"
+INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
 pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
 
 pytestmark = [
