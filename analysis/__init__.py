@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         load_all,
         load_map,
         map,
+        page,
         plan,
         quickstart,
         reach,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
         simulate,
         spline,
         validate,
+        view,
         write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
@@ -79,6 +81,7 @@ __all__ = [
     "load_all",
     "load_map",
     "map",
+    "page",
     "plan",
     "quickstart",
     "reach",
@@ -95,6 +98,7 @@ __all__ = [
     "sweep",
     "sweep_report",
     "validate",
+    "view",
     "write_map",
 ]
 

@@ -12,9 +12,9 @@ import sys
 
 from ballplate.simulator.computing.signals import ANSWERS
 
-# Objects made between two searches for garbage. What a command loads stays, and to search all of it
-# again and again takes a tenth of the time that a short command takes.
-OBJECTS_BETWEEN_SEARCHES = 50_000
+# Objects made between two searches for garbage. What a command loads stays, some hundred thousand
+# objects, and to search all of it again and again takes a tenth of a short command's time.
+OBJECTS_BETWEEN_SEARCHES = 150_000
 
 
 def _leave(number: int, _: object) -> None:
@@ -41,6 +41,9 @@ def main() -> int:
 
         traceback.print_exc()
         return internal_error(f"{type(error).__name__}: {error}")
+    finally:
+        # Python searches all objects for garbage at its end, when all of them go anyway.
+        gc.freeze()
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_type,
     ensure_whole,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.quantities import QuantityError
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
     from .planning.sheet import Sheet
+    from .presentation.pages.embedded import View
     from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
     from .reproduction.score_result import CertifiedScores
@@ -79,6 +81,7 @@ if TYPE_CHECKING:
     from .simulator.machines.protocol import Array
     from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings.observed_readings import ObservedReadings
+    from .sweeps.running import SweepResult
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -224,7 +227,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
         found = to_write(repairs(with_pool(one)), judged)
         if found is None:
             words = "no changes were found that determine everything"
-            raise ExperimentError([one.message((), words)])
+            raise one.refused((), words)
         text = mended(text, Path(path), one.name, found)
     return text
 
@@ -268,6 +271,84 @@ def run(
         chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report
     )
     return replace(predicted, monte_carlo=found)
+
+
+def view(given: Experiment | PathLike | Prediction | Fit) -> View:
+    """A design in space: positions of plates, balls and probes of an experiment; of a prediction or
+    a fit also ellipsoids of uncertainty, residuals, and what undetermined directions move.
+
+    A notebook shows it, to be turned by mouse, buttons or keyboard, and shows it below experiments,
+    predictions and fits by itself. `save(path)` of the result writes a page, or the picture alone.
+
+    >>> view(quickstart())
+    <View of quickstart: positions>
+    >>> view(run(quickstart()))
+    <View of quickstart: positions, points, balls of plate>
+    """
+    from .results.fit import Fit
+    from .results.prediction import Prediction
+
+    if isinstance(given, Fit | Prediction):
+        return given.view()
+    from .presentation.pages.embedded import View
+    from .results.views import position_picture
+    from .simulator.experiment.layout import lay_out
+
+    chosen = _experiment(given)
+    return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
+
+
+def page(
+    given: Experiment | PathLike | Prediction | Fit | SweepResult,
+    path: PathLike | None = None,
+    run_modules: bool = False,
+    compare: PathLike | None = None,
+    report: Report = unreported,
+) -> str:
+    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and `report`
+    write: HTML that needs no other file and no network. With a path it is written as well.
+
+    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
+    drawings of designs whose error models are in Python need `run_modules`, and the store of
+    another one to `compare` with is set beside it.
+
+    :raises ValueError: a fit or a prediction that does not know its experiment; sweeps that cannot
+        be compared.
+    :raises ImportError: what pages of sweeps need is not installed.
+    :raises OSError: the file cannot be written.
+
+    >>> page(fit(quickstart(), simulate(quickstart()))).splitlines()[0]
+    '<!DOCTYPE html>'
+    """
+    from .presentation.files import write_file
+    from .results.fit import Fit
+    from .results.prediction import Prediction
+    from .sweeps.running import SweepResult
+
+    ensure_type(bool, "True or False", run_modules=run_modules)
+    ensure_report(report)
+    if path is not None:
+        ensure_path("path", path)
+    if (run_modules or compare is not None) and not isinstance(given, SweepResult):
+        raise ValueError("run_modules and compare go with sweeps only; leave them out")
+    if isinstance(given, Fit):
+        text = given.page()
+    elif isinstance(given, SweepResult):
+        from .stores import sweep_report
+
+        chosen_sweep = given.store, given.number
+        text = sweep_report(*chosen_sweep, "html", run_modules, report, compare)
+    else:
+        from .report.design_contents import page_of_design
+
+        predicted = given if isinstance(given, Prediction) and given.quantities else None
+        chosen = given.experiment if isinstance(given, Prediction) else _experiment(given)
+        if chosen is None:
+            raise ValueError("the prediction does not know its experiment; predict it anew")
+        text = page_of_design(chosen, predicted or run(chosen), report)
+    if path is not None:
+        write_file(Path(path), text.encode("utf-8", "replace"))
+    return text
 
 
 def simulate(
@@ -458,7 +539,7 @@ def fit(
     from .results.fit import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
-    ensure_one_of(ESTIMATORS, estimator=estimator)
+    ensure_one_of(ESTIMATORS, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
@@ -645,10 +726,14 @@ def diff(
     ensure_one_of(("certificate",), shared=shared)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
+    if isinstance(dates, str) or len(dates) != 2:
+        raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
     days = tuple(None if one is None else stated_day(one) for one in dates)
     known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
     is_file = isinstance(points, str | os.PathLike)
     places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
+    if isinstance(places, np.ndarray) and places.ndim != 2:
+        raise ValueError("points: give a list of points, each with its co-ordinates in metres")
     sides = [_side(name, one) for name, one in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
@@ -674,7 +759,7 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     from .results.budget import budget as budget_of
     from .results.fit import Fit
 
-    ensure_one_of(GROUPINGS, by=by)
+    ensure_one_of(GROUPINGS, by=str(by))
     if isinstance(given, Fit):
         if given.experiment is None:
             raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
@@ -707,7 +792,7 @@ def compare(
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trials import MOST_TRIALS
 
-    ensure_one_of(COMPARED, estimator=estimator)
+    ensure_one_of(COMPARED, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_type(bool, "True or False", across_probes=across_probes)
     ensure_whole(1, MOST_TRIALS, trials=trials)
@@ -774,7 +859,7 @@ def plan(
     from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
-    ensure_one_of(NAMES, criterion=criterion)
+    ensure_one_of(NAMES, criterion=str(criterion))
     ensure_positive("hours above 0", 1e5, hours=hours)
     ensure_whole(1, positions=positions, readings=readings, workers=workers)
     ensure_whole(0, seed=seed)
@@ -1098,7 +1183,7 @@ def compensation(
     """
     from .error_maps.compensation_tables import made_compensation, of_map, tabled_machine
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
     given = _machine("machine", machine)
     if isinstance(given, Path):
@@ -1134,7 +1219,7 @@ def read_compensation(
     """
     from .error_maps.compensation_tables import read_compensation_files
 
-    ensure_one_of(get_args(TableFormatName), format=format)
+    ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
     ensure_type(str, "an arrangement, such as MB2", arrangement=arrangement)
     several = [files] if isinstance(files, str | os.PathLike) else files
@@ -1368,3 +1453,19 @@ def _experiment(given: Any) -> Experiment:
     what = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
     kind = type(given).__name__
     raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")
+
+
+def _shown_in_notebook(experiment: Experiment) -> str:
+    """An experiment in a notebook: its table, and its picture, of which it knows nothing."""
+    return experiment._repr_html_() + view(experiment)._repr_html_()
+
+
+def _teach_notebook() -> None:
+    """Let the session of IPython, if this is one, show experiments so."""
+    session = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    if session is not None:
+        formatter = session.display_formatter.formatters["text/html"]
+        formatter.for_type(Experiment, _shown_in_notebook)
+
+
+_teach_notebook()

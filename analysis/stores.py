@@ -105,12 +105,15 @@ def sweep_report(
     form: Literal["html", "text", "markdown", "csv", "latex"] = "html",
     run_modules: bool = False,
     report: Report = unreported,
+    compare: PathLike | None = None,
 ) -> str:
     r"""A sweep of a store as an HTML page, or its tables in another form.
 
-    Drawings of designs whose error models are in Python need `run_modules`.
+    Drawings of designs whose error models are in Python need `run_modules`. On a page the newest
+    sweep of a store to `compare` with is set beside it.
 
     :raises ImportError: what pages need is not installed.
+    :raises ValueError: the two sweeps cannot be compared.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -129,14 +132,23 @@ def sweep_report(
     ensure_path("store", store)
     ensure_whole(1, sweep=sweep)
     ensure_one_of(FORMS, form=form)
+    if compare is not None:
+        ensure_path("compare", compare)
+        if form != "html":
+            raise ValueError("compare goes with a page only; leave it out")
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
     with closing(open_store(Path(store))) as opened:
         results = read_results(opened, sweep)
         if form == "html":
             from .report.page import page
+            from .report.store_comparison import compared
 
-            return page(opened, results, run_modules, report)
+            beside = None
+            if compare is not None:
+                with closing(open_store(Path(compare))) as other:
+                    beside = compared(results, read_results(other, None), Path(compare).name)
+            return page(opened, results, run_modules, report, beside)
         from .presentation.formats import FORMATS
         from .report.tables import report_tables
 

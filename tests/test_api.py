@@ -148,6 +148,15 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
             lambda: bp.reach(QUICKSTART, unknowns="rows"),
             'unknowns: "rows" is unknown; known: repeatability',
         ),
+        (lambda: bp.budget(QUICKSTART, by=None), 'by: "None" is unknown; known: axis'),  # type: ignore[arg-type]
+        (
+            lambda: bp.diff("a.yaml", "b.yaml", dates=("2026-11-22",)),  # type: ignore[arg-type]
+            "dates=.*; give two",
+        ),
+        (
+            lambda: bp.diff("a.yaml", "b.yaml", points=[0.1, 0.2, 0.3]),  # type: ignore[list-item]
+            "points: give a list of points",
+        ),
     ],
 )
 def test_wrong_arguments_are_refused(call: Callable[[], object], told: str) -> None:

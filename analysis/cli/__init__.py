@@ -30,8 +30,8 @@ COMMANDS = (
 )
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line's grammar."""
+def parser(names: Sequence[str] = COMMANDS) -> _Parser:
+    """The command line's grammar, with all commands or some of them."""
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
@@ -53,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    for name in COMMANDS:
+    for name in names:
         # Loaded only now, so that hardly anything is when an interruption begins to be answered.
         module = import_module(f".{name}", __package__)
         command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
@@ -97,7 +97,10 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
         write_readably(sys.stdout, sys.stderr)
         try:
             try:
-                options = parser().parse_args(arguments)
+                given = sys.argv[1:] if arguments is None else arguments
+                # The grammar of all commands is needed only where none is named.
+                named = [one for one in given[:1] if one in COMMANDS]
+                options = parser(named or COMMANDS).parse_args(given)
             except SystemExit:
                 # Help is data, too.
                 sys.stdout.flush()

@@ -156,11 +156,12 @@ def _goals(options: Namespace) -> tuple[Goal, ...]:
 def _print(checked: CheckedFile, options: Namespace) -> None:
     from .common import print_lines
     from .excerpts import print_errors
-    from .github import annotation_lines
 
     tell_notes(checked.notes)
     warn(checked.doubts)
     if options.format == "github":
+        from .github import annotation_lines
+
         workspace = os.environ.get("GITHUB_WORKSPACE")
         for line in annotation_lines(checked, Path(workspace) if workspace else None):
             print(line, flush=True)

@@ -70,7 +70,7 @@ def run(options: Namespace) -> int:
     for experiment in chosen:
         plans.append(predict(experiment, with_scale=True))
         if options.report:
-            _write_page(options, experiment, plans[-1])
+            _write_page(options, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
         data: dict[str, Any] = plans[-1].to_dict()
@@ -96,12 +96,12 @@ def run(options: Namespace) -> int:
     return 0 if all(p.verdict.as_expected for p in plans) else 1
 
 
-def _write_page(options: Namespace, experiment: Experiment, prediction: Prediction) -> None:
-    from ..report.design_contents import page_of_design
+def _write_page(options: Namespace, prediction: Prediction) -> None:
+    from ..api import page
     from .progress import progress
 
     with progress(options) as shown:
-        text = page_of_design(experiment, prediction, shown.show)
+        text = page(prediction, report=shown.show)
     write(options, {options.report: text})
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from importlib.resources import files
-from webbrowser import open_new_tab
 
 from .common import add_file, whole
 from .outputs import Needed, UsageError
@@ -57,6 +56,8 @@ def run(options: Namespace) -> int:
         print(address, flush=True)
         note(options, "the studio runs until Ctrl-C")
         if not options.no_browser:
+            from webbrowser import open_new_tab
+
             open_new_tab(address)
 
     try:

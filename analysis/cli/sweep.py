@@ -147,12 +147,13 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
 
 def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
     from ballplate.simulator.inputs.messages import in_one_line
+    from ballplate.simulator.inputs.settings import number_of
 
     from ..sweeps.running import shortcomings
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
-    counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
+    counted = number_of(summary.cells, "cell")
     told = (
         f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed}"
         f" failed{before}{left}"
@@ -164,6 +165,7 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
     from ballplate.simulator.computing.processes import processors
+    from ballplate.simulator.inputs.settings import number_of
 
     from ..sweeps.estimate import seconds_of
     from .progress import duration
@@ -172,8 +174,8 @@ def _dry_run(sweep: Sweep, options: Namespace) -> int:
         print(f"{number}: {sweep.label(number)}")
     workers = options.workers or processors()
     seconds, rows = seconds_of(sweep)
-    words = f"with {workers} worker{'s' if workers > 1 else ''}, judged by {len(rows)} of them"
-    cells = f"{len(sweep.cells)} cell{'s' if len(sweep.cells) > 1 else ''}"
+    words = f"with {number_of(workers, 'worker')}, judged by {len(rows)} of them"
+    cells = number_of(len(sweep.cells), "cell")
     print(f"{cells}, about {duration(seconds / workers)} {words}", file=sys.stderr)
     failed = [row for row in rows if row.status == "failed"]
     for row in failed:

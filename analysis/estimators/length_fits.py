@@ -21,7 +21,7 @@ from ballplate.simulator.estimation.length_equations import (
 from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -218,7 +218,7 @@ def _refuse_other_artefacts(
     if bars and design.dimension == 3:
         text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
         mark = experiment.place(("artefacts", bars[0]))
-        raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
+        raise mark.refused(text, f"artefacts.{bars[0]}")
     raise refused(experiment.source, text, what)
 
 

@@ -73,9 +73,7 @@ def fit_reversal(
         chance = float("nan") if offsets else _chance(found, reverse(seen[k], seen[m], scale))
     except UndeterminedError as error:
         text = f"{error}; read balls that are not"
-        raise ExperimentError(
-            [experiment.message(("artefacts", design.artefacts.names[0]), text)]
-        ) from None
+        raise experiment.refused(("artefacts", design.artefacts.names[0]), text) from None
     axes = axes_of_plates(experiment)[design.artefacts.names[0]]
     full = fit(experiment, observed, sigma)
     values = [found.alpha, found.beta, found.gamma, *found.offset.tolist()][: 5 if offsets else 3]

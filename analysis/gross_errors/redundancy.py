@@ -17,7 +17,6 @@ from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
 
 from ..uncertainty.quantities import QUANTITIES, functions_of
@@ -53,12 +52,8 @@ def reliability(
     design = lay_out(experiment)
     reason = too_many_entries(design)
     if reason:
-        raise ExperimentError(
-            [
-                experiment.message(
-                    ("positions",), f"{reason}: read fewer balls, or in fewer positions"
-                )
-            ]
+        raise experiment.refused(
+            ("positions",), f"{reason}: read fewer balls, or in fewer positions"
         )
     return reliability_of(
         design, false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment, report

@@ -106,33 +106,36 @@ def accumulate(
     for aim in aims:
         change = aim.change(estimates.found)
         change = change if used.all() else change[used]
-        count_of = change.shape[1]
-        error, absolute = work[:, : change.size].reshape(2, *change.shape)
-        np.multiply(change, 1.0 / aim.uncertainty, out=error)
-        of_scatter = np.einsum("bq,bq->b", error, error) / count_of
-        error += aim.base / aim.uncertainty
-        of_error = np.einsum("bq,bq->b", error, error) / count_of
-        size = np.abs(error, out=error)
-        is_known = size <= limits.known
-        is_estimated = size <= limits.estimated * sigma[:, None]
+        error, squared = work[:, : change.size].reshape(2, *change.shape)
+        # Sums over the quantity's members are products with vectors of weights: one pass each.
+        weight = aim.uncertainty**-2.0
+        of_scatter = np.square(change, out=squared) @ weight
+        # What the squares of the errors have beyond those of their scatter, without the difference
+        # of two sums that may be far larger.
+        systematic = change @ (2.0 * aim.base * weight) + aim.base**2 @ weight
+        np.add(change, aim.base, out=error)
+        np.square(error, out=squared)
+        errors, squares_of_errors = error.sum(axis=0), squared.sum(axis=0)
         # Over the mean square uncertainty of those in the same unit: in units of their own
         # uncertainties they would be ruled by the few that have almost none.
-        np.add(change, aim.base, out=absolute)
-        against_typical = np.square(absolute, out=error)
-        against_typical /= aim.typical
+        against_typical = squared @ (1.0 / aim.typical)
+        squared *= weight
+        is_known = squared <= limits.known**2
+        is_estimated = squared <= (limits.estimated * sigma[:, None]) ** 2
         numbers = np.stack(
             [
                 of_scatter,
-                against_typical.mean(axis=1),
-                of_error - of_scatter,
-                np.count_nonzero(is_known, axis=1) / count_of,
-                np.count_nonzero(is_estimated, axis=1) / count_of,
+                against_typical,
+                systematic,
+                np.count_nonzero(is_known, axis=1),
+                np.count_nonzero(is_estimated, axis=1),
             ]
         )
+        numbers /= change.shape[1]
         quantities.append(
             QuantityAccumulator(
-                absolute.sum(axis=0),
-                np.einsum("bq,bq->q", absolute, absolute),
+                errors,
+                squares_of_errors,
                 numbers.sum(axis=1),
                 (numbers**2).sum(axis=1),
             )

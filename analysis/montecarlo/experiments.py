@@ -21,7 +21,6 @@ from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.readings.generate import NoReadingError
 from ballplate.simulator.readings.simulated import on_stated_machine
@@ -133,7 +132,7 @@ def _shared(experiment: Experiment) -> Reference | str:
         shared = reference(design, truth)
     except (NoReadingError, DivergedError) as error:
         text = f"{error}; state smaller errors"
-        raise ExperimentError([experiment.message(("true_machine",), text)]) from None
+        raise experiment.refused(("true_machine",), text) from None
     return shared if targets(shared) else "the design determines nothing that could be compared"
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Position
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
@@ -35,7 +36,7 @@ class Budget:
             words.append(f"{self.seconds / HOUR:.4g} h")
         for value, word in ((self.readings, "reading"), (self.positions, "position")):
             if value is not None:
-                words.append(f"{value} {word}{'' if value == 1 else 's'}")
+                words.append(number_of(value, word))
         return ", ".join(words)
 
 

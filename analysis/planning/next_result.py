@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import finite, number
@@ -89,7 +89,7 @@ class NextStep(Result):
         """The answer first, then what it rests on."""
         count, planned = len(self.read), self.next
         told = [
-            f"{count} position{'s' * (count != 1)} read, last {self.read[-1]}; {self._answer()}",
+            f"{number_of(count, 'position')} read, last {self.read[-1]}; {self._answer()}",
             *self._missing(),
             *self.observed.redone,
             *self._known(),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
@@ -254,8 +255,7 @@ def _interrupted(campaign: Campaign) -> list[str]:
     lines = []
     for one in campaign.interrupted:
         text = (
-            f"{campaign.title_of(one)} was interrupted after {one.readings}"
-            f" reading{'' if one.readings == 1 else 's'}"
+            f"{campaign.title_of(one)} was interrupted after {number_of(one.readings, 'reading')}"
         )
         if campaign.completed is not None and campaign.completed.whole.name == one.name:
             text += f"; {campaign.completed.rest.readings} more complete it"

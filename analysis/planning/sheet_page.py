@@ -8,6 +8,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.geometry.ball_layouts import BallLayout
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.paper import escaped
 from .drawings import LONGEST_NAME, place_drawing
@@ -15,7 +16,7 @@ from .reading_lists import sequence
 from .schedule import RunSheet, Step
 from .sheet_drawings import artefact_drawing, volume_drawing
 from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows
-from .sheet_words import count, price, set_up_rows, summary, times
+from .sheet_words import price, set_up_rows, summary, times
 
 STYLE = """
 :root { color-scheme: light; }
@@ -70,6 +71,7 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
 @media (max-width: 40em) { .words { display: block; } }
 @media print {
   body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
+  td { overflow-wrap: anywhere; }
   .fields { grid-template-columns: repeat(3, 1fr); }
   .step .fields { grid-template-columns: 1fr 1fr 1fr 2fr; }
   .wide { overflow: visible; }
@@ -154,7 +156,9 @@ def _order(sheet: RunSheet) -> str:
 
 def _table(heads: list[str], rows: list[str], numbers: set[int]) -> str:
     cells = [
-        f'<th class="number">{head}</th>' if k in numbers else f"<th>{head}</th>"
+        f'<th scope="col" class="number">{head}</th>'
+        if k in numbers
+        else f'<th scope="col">{head}</th>'
         for k, head in enumerate(heads)
     ]
     return f'<div class="wide"><table><tr>{"".join(cells)}</tr>{"".join(rows)}</table></div>'
@@ -262,7 +266,7 @@ def _readings(step: Step) -> str:
         parts.append(
             '<p class="probe"><input type="checkbox" class="tick"'
             f' aria-label="{escaped(probe)} read"> with <b>{escaped(probe)}</b>,'
-            f" {count(readings, 'reading')}</p>"
+            f" {number_of(readings, 'reading')}</p>"
             f'<ol class="balls" style="--width: {0.6 * longest + 1.5:.1f}em">{items}</ol>'
         )
     return "".join(parts)

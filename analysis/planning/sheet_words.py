@@ -6,6 +6,7 @@ import numpy as np
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.quantities import format_duration
+from ballplate.simulator.inputs.settings import number_of
 
 from .schedule import RunSheet, Step
 
@@ -14,16 +15,19 @@ def summary(sheet: RunSheet) -> str:
     """What there is to do, in a sentence."""
     todo = [step for step in sheet.steps if not step.done]
     done = len(sheet.steps) - len(todo)
-    words = [count(len(todo), "position"), count(sum(step.readings for step in todo), "reading")]
+    words = [
+        number_of(len(todo), "position"),
+        number_of(sum(step.readings for step in todo), "reading"),
+    ]
     words += (
-        [count(len(sheet.calibration), "item") + " of calibration"] if sheet.calibration else []
+        [number_of(len(sheet.calibration), "item") + " of calibration"] if sheet.calibration else []
     )
     text = ", ".join(words)
     if sheet.timed:
         text += f": {sheet.hours:.2f} h"
         change = sum(step.change_seconds for step in todo)
         text += f", including change-over {change / 3600.0:.2f} h" if change else ""
-    return f"{text}; {count(done, 'position')} done before" if done else text
+    return f"{text}; {number_of(done, 'position')} done before" if done else text
 
 
 def set_up_rows(step: Step, experiment: Experiment) -> list[tuple[str, str]]:
@@ -43,7 +47,7 @@ def set_up_rows(step: Step, experiment: Experiment) -> list[tuple[str, str]]:
         ("artefact", step.artefact),
         ("set up", step.place),
         ("so that", " and ".join(places)),
-        ("read", f"{step.balls}; {count(step.readings, 'reading')}"),
+        ("read", f"{step.balls}; {number_of(step.readings, 'reading')}"),
     ]
     return rows if len(experiment.artefacts) > 1 else rows[1:]
 
@@ -59,8 +63,3 @@ def times(step: Step) -> tuple[str, str]:
 def price(seconds: float) -> str:
     """A time as a file says it."""
     return format_duration(round(seconds, 3))
-
-
-def count(number: int, word: str) -> str:
-    """A number of things."""
-    return f"{number} {word}{'' if number == 1 else 's'}"

@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 # Points around a map.
 LEFT, RIGHT, BELOW, ABOVE = 50.0, 18.0, 40.0, 10.0
 
-# Positions whose names fit into the drawing; more are numbered.
-MOST_NAMES = 8
-
 # Part of the drawing's size below which an edge is too short for its name between its numbers.
 SHORT = 0.25
 
@@ -69,7 +66,7 @@ def draw_design(design: Design, words: str, path: str | Path | None = None) -> F
 @contextmanager
 def _drawn(drawn: Scene) -> Iterator[Figure]:
     with drawing(330.0) as figure:
-        draw_scene(blank_axes(figure), drawn, len(drawn.places) > MOST_NAMES)
+        draw_scene(blank_axes(figure), drawn, not drawn.is_named)
         yield figure
 
 

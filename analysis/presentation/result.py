@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.simulator.inputs.settings import number_of
+
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .table import Block, Entry, Row, Table
@@ -189,7 +191,7 @@ class FitResult(Result):
 
     def __repr__(self) -> str:
         count = len(self.warnings)
-        words = f"; {count} warning{'s' if count > 1 else ''}>" if count else ">"
+        words = f"; {number_of(count, 'warning')}>" if count else ">"
         return super().__repr__().removesuffix(">") + words
 
 

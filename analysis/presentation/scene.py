@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ TURN, RISE = -35.0, 24.0
 
 # Balls of a position that are drawn; of more, every so many.
 MOST_BALLS = 200
+
+# Positions that are told by their names, and letters of these; otherwise by their numbers.
+MOST_NAMES, LETTERS = 8, 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,17 @@ class Scene:
     box: Box
     places: tuple[DrawnPosition, ...]
     tips: tuple[tuple[str, Array], ...]
+
+    @property
+    def is_named(self) -> bool:
+        return names_fit([place.name for place in self.places])
+
+
+def names_fit(names: Sequence[str]) -> bool:
+    """Whether positions are told by their names in a drawing, which has room for few and short
+    ones.
+    """
+    return len(names) <= MOST_NAMES and all(len(name) <= LETTERS for name in names)
 
 
 def scene(design: Design) -> Scene:

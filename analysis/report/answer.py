@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listing, number_of
 from numpy.typing import NDArray
 
 from ..presentation.formatting import number, percent
@@ -169,7 +169,7 @@ def _left_out(results: ReportedSweep, done: Integers) -> list[str]:
 
 
 def _settings(count: int) -> str:
-    return f"{count} setting" if count == 1 else f"{count} settings"
+    return number_of(count, "setting")
 
 
 def _verb(count: int, verb: str) -> str:

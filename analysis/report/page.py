@@ -19,8 +19,8 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
 
 from ..presentation.formatting import micro, number, percent, uncertainty_words
-from ..presentation.pages.document import shipped
-from ..presentation.pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
+from ..presentation.pages.document import style
+from ..presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
 from ..presentation.scene import MOST_BALLS, Scene, scene
 from ..presentation.table import Block, Entry, Row, Table
 from ..sweeps.columns import symbol_column
@@ -96,7 +96,7 @@ def page(
     context: dict[str, Any] = {
         "title": in_one_line(results.title),
         "summary": _summary(results),
-        "style": Markup(shipped("page.css")),
+        "style": Markup(style()),
         "facts": _facts(results),
         "answer": answer(results),
         "comparison": comparison,
@@ -244,7 +244,7 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
         " machine's "
     )
     caption += "reference point (squares)."
-    if len(drawn.places) > MOST_NAMES:
+    if not drawn.is_named:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
         caption += " Only some of the balls are drawn."

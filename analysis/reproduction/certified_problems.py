@@ -151,6 +151,6 @@ def read_json(path: Path) -> Any:
         raise refused(path, f"cannot be read ({error.strerror}); name a JSON file") from None
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
-        raise ExperimentError(
-            [Message(str(path), line, column, "", f"is not JSON ({error}); write it anew")]
+        raise refused(
+            path, f"is not JSON ({error}); write it anew", line=line, column=column
         ) from None

@@ -9,7 +9,7 @@ from typing import Any
 
 from ballplate.designs import shipped
 from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.settings import hint, number_of
 
 from ..presentation.result import Result
 from .compare import Reproduction, reproduce
@@ -40,7 +40,7 @@ class ReproducedDocument(Result):
     def headline(self) -> str:
         count = len(self.found.sections)
         agrees = "agree" if self.is_right else "do not all agree"
-        return f"{count} section{'s' if count > 1 else ''}, figures {agrees}"
+        return f"{number_of(count, 'section')}, figures {agrees}"
 
     def lines(self) -> list[str]:
         return reproduction_lines(self.found)

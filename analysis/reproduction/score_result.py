@@ -9,6 +9,7 @@ from typing import Any
 
 from ballplate.designs import shipped
 from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.result import Result
 from .certified_answers import answers
@@ -41,7 +42,7 @@ class CertifiedScores(Result):
     def headline(self) -> str:
         count = len(self.problems)
         right = "all right" if self.is_right else "not all right"
-        return f"{count} problem{'s' if count > 1 else ''}, {right}"
+        return f"{number_of(count, 'problem')}, {right}"
 
     def lines(self) -> list[str]:
         return score_lines(self.problems, self.scores)

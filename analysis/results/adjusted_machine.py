@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.geometry.motions import AXIS_NAMES, rigid_motions
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array, Unit
 from ballplate.simulator.maps.corrected_points import corrected, drawn_rows
 from ballplate.simulator.maps.fitted_map import FittedMap
@@ -227,7 +228,7 @@ class AdjustedMachine(Result):
     def headline(self) -> str:
         if self.found is None:
             count = len(self.changes)
-            return f"{count} change{'s' * (count != 1)}, predicted"
+            return f"{number_of(count, 'change')}, predicted"
         if not self.compared:
             return "nothing is determined by both campaigns"
         return (

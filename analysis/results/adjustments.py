@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.error_names import (
     SQUARENESS_ERRORS,
     TRANSLATIONS,
@@ -120,7 +121,7 @@ def coverage_factor(degrees_of_freedom: float) -> float:
 
 def freedom_words(degrees_of_freedom: int) -> str:
     """The number of degrees of freedom in words."""
-    return f"{degrees_of_freedom} degree{'' if degrees_of_freedom == 1 else 's'} of freedom"
+    return f"{number_of(degrees_of_freedom, 'degree')} of freedom"
 
 
 def few_degrees_of_freedom(degrees_of_freedom: int, what: str, instead: str) -> str:

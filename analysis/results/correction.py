@@ -11,7 +11,7 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Flags, Tasks
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.corrected_points import (
@@ -355,7 +355,7 @@ def left_out_words(fitted: FittedMap) -> str:
 def _of_campaign(estimated: Sequence[str]) -> str:
     names, count = listing(estimated, 4), len(estimated)
     return (
-        f"{count} parameter{'s' * (count > 1)} of influence quantities that the fit estimated"
+        f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"
         f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"
         " correct for these beforehand where they matter"
     )

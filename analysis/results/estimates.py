@@ -20,7 +20,7 @@ from ballplate.simulator.geometry.motions import (
     vector_from_rotation,
 )
 from ballplate.simulator.inputs.arguments import ensure_type
-from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
 from ..uncertainty.quantities import task_distances
@@ -301,7 +301,7 @@ class CorrectedPoints:
     def __repr__(self) -> str:
         """One line: points and covariances are long."""
         count = len(self.points)
-        return f"<{type(self).__name__} of {count} scale reading{'s' * (count != 1)}>"
+        return f"<{type(self).__name__} of {number_of(count, 'scale reading')}>"
 
     @property
     def standard_uncertainties(self) -> Array:

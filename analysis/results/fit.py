@@ -22,6 +22,7 @@ from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
+from ..presentation.formats import as_html
 from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
 from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
+    from ..presentation.pages.embedded import View
     from .certificates.plate_certificate import PlateCertificate
     from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
@@ -77,6 +79,9 @@ REWEIGHTED = (
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
+
+# Of the table of estimates in a notebook, so that what is below it is seen, too.
+ROWS_BESIDE_VIEW = 12
 
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3
@@ -301,6 +306,25 @@ class Fit(FitResult):
                 self.untested,
             )
         )
+
+    def view(self) -> View:
+        """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
+        or weak directions, which move; of a fit that has failed the positions alone.
+        """
+        from ..presentation.pages.embedded import View
+        from .views import judged_pictures, position_picture, residual_pictures
+
+        if self.estimated is None or not self.converged:
+            return View(self.label, self.title, (position_picture(self.design),))
+        target = None if self.experiment is None else self.experiment.target_uncertainty
+        # Without scatter residuals are mere rounding.
+        residuals = () if self.without_scatter else residual_pictures(self.observed, self.solution)
+        at = self.estimated.at
+        pictures = judged_pictures(at, self.verdict, target, self.sigma, residuals)
+        return View(self.label, self.title, pictures)
+
+    def _repr_html_(self) -> str:
+        return self._written(as_html, ROWS_BESIDE_VIEW) + self.view()._repr_html_()
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.objects import Tasks
-from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 
@@ -58,7 +58,7 @@ def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
         found.append(left_out_words(fitted))
     count = fitted.undetermined.shape[1]
     if count:
-        words = f"{count} direction{'s' * (count > 1)} of the parameters"
+        words = f"{number_of(count, 'direction')} of the parameters"
         found.append(f"the readings left {words} undetermined; what these change is not stated")
     return tuple(filter(None, found))
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from ballplate.simulator.computing.rounding import printable
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listing, number_of
 
 from ..presentation.formatting import (
     aligned,
@@ -154,7 +154,7 @@ def verdict_lines(
         ]
         if len(told) < len(directions):
             count = len(directions) - len(told)
-            poses = f"{count} direction{'s' * (count > 1)} of poses"
+            poses = f"{number_of(count, 'direction')} of poses"
             lines.append(f"{title}: {not_read(unread)}, which leaves {poses} open")
         for k, direction in told[:20]:
             lines.append(f"{title} {k}: {direction}")

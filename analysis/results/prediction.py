@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import picked
 from ..presentation.result import Result
@@ -32,9 +33,11 @@ from .parts import (
 )
 
 if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
     from ..montecarlo.experiments import Trials
+    from ..presentation.pages.embedded import View
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class Prediction(Result):
     `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if
     that was asked for and is determined. `monte_carlo` has replicates, and `advice` what a check
     was asked for besides the rank, if they were asked for. `influences` go with the quantities.
+    `experiment` is that which was judged.
     """
 
     label: str
@@ -68,6 +72,7 @@ class Prediction(Result):
     monte_carlo: Trials | None = None
     advice: Advice | None = None
     influences: tuple[InfluenceUncertainty, ...] = ()
+    experiment: Experiment | None = None
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
@@ -76,7 +81,7 @@ class Prediction(Result):
 
     def headline(self) -> str:
         count = 0 if self.advice is None else len(self.advice.missed)
-        missed = [f"{count} goal{'s' if count > 1 else ''} missed"] if count else []
+        missed = [f"{number_of(count, 'goal')} missed"] if count else []
         return ", ".join([rank_words(self.verdict), *length_headline(self.quantities), *missed])
 
     def lines(self) -> list[str]:
@@ -134,6 +139,22 @@ class Prediction(Result):
 
         names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
+
+    def view(self) -> View:
+        """The design in space: positions, ellipsoids of points and balls, and undetermined or weak
+        directions, which move.
+        """
+        from ballplate.simulator.estimation.linearisation import linearise
+
+        from ..presentation.pages.embedded import View
+        from .views import judged_pictures
+
+        target = None if self.experiment is None else self.experiment.target_uncertainty
+        pictures = judged_pictures(linearise(self.design), self.verdict, target)
+        return View(self.label, self.title, pictures)
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() + self.view()._repr_html_()
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of U1 to U6; where these were not asked for, one with the rank and

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
@@ -91,6 +90,7 @@ def _predict(
         lengths,
         scale,
         influences=influence_uncertainties(at) if with_quantities else (),
+        experiment=experiment,
     )
 
 
@@ -113,6 +113,8 @@ def fit(
     :raises ExperimentError: variance components take more memory than there is.
     """
     # Loaded only now, so that what plans and checks need not load answers sooner.
+    from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+
     from ..gross_errors.exact_values import diagnosis_of_all
     from ..gross_errors.leftover import too_many_entries
     from ..gross_errors.suspects import Diagnosis

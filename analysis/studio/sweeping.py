@@ -8,6 +8,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -21,9 +22,12 @@ from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.inputs.yamltree import Mark, Node
 
 from ..presentation.formatting import finite
-from ..stores import sweep, sweep_report
-from ..sweeps.bundle import Bundle, names_of, unpack
+from ..sweeps.bundle import Bundle, bundle_of, names_of, unpack
+from ..sweeps.load import load_sweep
+from ..sweeps.local import local_runner
 from ..sweeps.named_files import named_in
+from ..sweeps.running import SweepResult, compute_sweep, enter, result_of, writable_store
+from ..sweeps.store import Store
 from .actions import ActionError, value_of
 from .document import DesignDocument, encoded, experiment_of
 
@@ -63,11 +67,9 @@ def swept(
         _ensure_no_modules(document, tree, axes)
     with tempfile.TemporaryDirectory() as folder:
         file = _written(document, tree, axes, Path(folder))
-        found = sweep(file, report=report)
-        try:
-            page = sweep_report(found.store, run_modules=document.with_modules)
-        except ImportError:
-            page = ""
+        with writable_store(file.with_suffix(".sqlite")) as store:
+            found = _computed(file, store, report)
+            page = _page(store, document.with_modules)
     return {
         "headline": found.headline(),
         "axes": [list(axis.paths) for axis in axes],
@@ -79,6 +81,26 @@ def swept(
         ],
         "page": page,
     }
+
+
+def _computed(file: Path, store: Store, report: Report) -> SweepResult:
+    sweep = load_sweep(file)
+    bundle = bundle_of(sweep)
+    entered = enter(store, sweep, bundle, beside=False)
+    runner = nullcontext(local_runner(sweep, bundle, workers=1))
+    summary = compute_sweep(store, sweep, entered, runner, report=report)
+    return result_of(store, sweep, entered, summary)
+
+
+def _page(store: Store, with_modules: bool) -> str:
+    from ..report.results import read_results
+
+    try:
+        from ..report.page import page
+
+        return page(store, read_results(store, None), with_modules)
+    except ImportError:
+        return ""
 
 
 def _cell(row: Mapping[str, Any], values: Sequence[str]) -> dict[str, Any]:

@@ -8,9 +8,9 @@ import hashlib
 import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.observations.python_values import PythonCalibration
@@ -93,10 +93,6 @@ def without_method(key: str) -> str:
     return key.partition(" ")[2] if key.partition(" ")[0].isdigit() and " " in key else key
 
 
-class _Digest(Protocol):
-    def update(self, data: bytes, /) -> None: ...
-
-
 def fingerprint(experiment: Experiment, *more: object) -> str:
     """A hash of everything that the figures of an experiment depend on, and of `more`.
 
@@ -105,48 +101,48 @@ def fingerprint(experiment: Experiment, *more: object) -> str:
 
     :raises TypeError: a value of a kind that is not known here, so that nothing is passed over.
     """
-    digest = hashlib.blake2b(digest_size=20)
-    _add(digest, replace(experiment, name=None))
+    pieces: list[bytes] = []
+    _add(pieces, replace(experiment, name=None))
     for one in more:
-        _add(digest, one)
-    return digest.hexdigest()
+        _add(pieces, one)
+    return hashlib.blake2b(b"".join(pieces), digest_size=20).hexdigest()
 
 
-def _add(digest: _Digest, value: Any) -> None:
+def _add(pieces: list[bytes], value: Any) -> None:
     """Add a value with its type and length, so that neighbours cannot be mistaken for one
     another.
     """
-    if value is None or isinstance(value, bool | int | str):
-        _text(digest, f"{type(value).__name__} {value!r}")
-    elif isinstance(value, float):
-        _text(digest, f"float {value.hex()}")
-    elif isinstance(value, np.ndarray):
-        _text(digest, f"array {value.dtype.str} {value.shape}")
-        digest.update(np.ascontiguousarray(value).tobytes())
-    elif isinstance(value, np.generic):
-        _add(digest, value.item())
-    elif isinstance(value, Path):
-        _text(digest, f"path {value.as_posix()}")
-    elif isinstance(value, Mapping):
-        _text(digest, f"mapping {len(value)}")
-        for key, item in value.items():
-            _add(digest, key)
-            _add(digest, item)
-    elif isinstance(value, tuple | list):
-        _text(digest, f"list {len(value)}")
+    if value is None or isinstance(value, (bool, int, str)):
+        pieces.append(_text(f"{type(value).__name__} {value!r}"))
+    elif isinstance(value, (tuple, list)):
+        pieces.append(_text(f"list {len(value)}"))
         for item in value:
-            _add(digest, item)
+            _add(pieces, item)
+    elif isinstance(value, float):
+        pieces.append(_text(f"float {value.hex()}"))
+    elif isinstance(value, np.ndarray):
+        pieces.append(_text(f"array {value.dtype.str} {value.shape}"))
+        pieces.append(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, np.generic):
+        _add(pieces, value.item())
+    elif isinstance(value, Path):
+        pieces.append(_text(f"path {value.as_posix()}"))
+    elif isinstance(value, Mapping):
+        pieces.append(_text(f"mapping {len(value)}"))
+        for key, item in value.items():
+            _add(pieces, key)
+            _add(pieces, item)
     elif isinstance(value, BaseModel):
-        _settings(digest, value)
+        _settings(pieces, value)
     elif is_dataclass(value) and not isinstance(value, type):
-        _text(digest, f"object {type(value).__name__}")
+        pieces.append(_text(f"object {type(value).__name__}"))
         left_out = (*LEFT_OUT, *LEFT_OUT_OF.get(type(value).__name__, ()))
         for name, found in _entries(value):
             if name not in left_out and not _is_as_before(value, name, found):
-                _text(digest, EARLIER_NAMES.get(name, name))
-                _add(digest, found)
+                pieces.append(_text(EARLIER_NAMES.get(name, name)))
+                _add(pieces, found)
         if isinstance(value, PythonCalibration):
-            _text(digest, module_text(value.object, value.source))
+            pieces.append(_text(module_text(value.object, value.source)))
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
 
@@ -184,25 +180,26 @@ def _is_as_before(value: Any, name: str, found: Any) -> bool:
     return bool(found == (default.default if made is MISSING else made()))
 
 
-def _text(digest: _Digest, text: str) -> None:
+# The same names and counts come again and again, in a cell and from cell to cell.
+@lru_cache(maxsize=10_000)
+def _text(text: str) -> bytes:
     data = text.encode("utf-8", errors="surrogatepass")
-    digest.update(f"{len(data)}:".encode())
-    digest.update(data)
+    return b"%d:%b" % (len(data), data)
 
 
-def _settings(digest: _Digest, value: BaseModel) -> None:
-    _text(digest, f"settings {type(value).__name__}")
+def _settings(pieces: list[bytes], value: BaseModel) -> None:
+    pieces.append(_text(f"settings {type(value).__name__}"))
     for name in type(value).model_fields:
         found = getattr(value, name)
         if name not in TOLD_LATER and not _is_as_before(value, name, found):
-            _text(digest, EARLIER_NAMES.get(name, name))
-            _add(digest, found)
+            pieces.append(_text(EARLIER_NAMES.get(name, name)))
+            _add(pieces, found)
     for name, item in sorted((value.__pydantic_private__ or {}).items()):
         if name not in LEFT_OUT:
-            _text(digest, name)
-            _add(digest, item)
+            pieces.append(_text(name))
+            _add(pieces, item)
     if isinstance(value, PythonSettings):
-        _text(digest, module_text(value.object, value._folder))
+        pieces.append(_text(module_text(value.object, value._folder)))
 
 
 def module_text(made_by: str, folder: Path | None) -> str:

@@ -60,7 +60,7 @@ def load_sweep(
         text = (
             "this is an experiment file; use it with ballplate run, or name it as base: of a sweep"
         )
-        raise ExperimentError([root.mark.message("", text)])
+        raise root.mark.refused(text)
     settings = _settings(root, problems)
     if settings is None:
         raise ExperimentError(sorted(problems.messages))
@@ -133,7 +133,7 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
             try:
                 tree = override(tree, path, node, mark)
             except ValueError as error:
-                raise ExperimentError([mark.message(path, str(error))]) from None
+                raise mark.refused(str(error), path) from None
     experiment, messages = build(tree, sweep.base, sweep.label(number))
     if experiment is None:
         raise ExperimentError(sorted(messages))
@@ -148,13 +148,11 @@ def _subset(tree: Node, path: str, kept: tuple[str, ...], mark: Mark) -> tuple[s
     try:
         place = node_at(tree, path)
     except ValueError as error:
-        raise ExperimentError([mark.message(path, str(error))]) from None
+        raise mark.refused(str(error), path) from None
     names = (entry_names(place) if place is not None else None) or []
     absent = next((name for name in kept if name not in names), None)
     if absent is not None or not isinstance(place, Sequence):
-        raise ExperimentError(
-            [mark.message(path, f'no entry "{absent}" in this variant; {hint(str(absent), names)}')]
-        )
+        raise mark.refused(f'no entry "{absent}" in this variant; {hint(str(absent), names)}', path)
     return path, Sequence(place.mark, tuple(place.items[names.index(name)] for name in kept)), mark
 
 

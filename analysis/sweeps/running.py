@@ -69,7 +69,8 @@ class SweepResult(Result):
     """A sweep as far as it is computed: a row of the store for each cell.
 
     `remarks` say what the store held that could not be used, and is computed anew, and
-    `shortcomings` why cells have failed, and that versions differ.
+    `shortcomings` why cells have failed, and that versions differ. `number` is the sweep's in its
+    store.
     """
 
     label: str
@@ -77,6 +78,7 @@ class SweepResult(Result):
     store: Path
     summary: Summary
     table: pandas.DataFrame
+    number: int
     remarks: tuple[str, ...] = ()
     shortcomings: tuple[str, ...] = ()
 
@@ -233,6 +235,7 @@ def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) ->
         Path(store.path),
         summary,
         table,
+        entered.number,
         entered.remarks,
         shortcomings(store, entered.number, summary.cells),
     )
@@ -258,6 +261,7 @@ def stored_result(store: Store, sweep: int | None = None) -> SweepResult:
         Path(store.path),
         summary,
         frame_of(found, defined),
+        number,
         (damage,) if damage else (),
         shortcomings(store, number, cells),
     )

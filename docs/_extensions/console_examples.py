@@ -11,8 +11,8 @@ another:
 with `-` go, lines with `+` come, others stay. `{python-run}`   runs a program and shows what it
 prints. `:continued:` goes on where the page's last program has ended,
                  with its names, as the cells of a notebook do. `{picture} NAME` shows an SVG or PNG
-file that an example has written, with `:alt:` for those who do not see it and its
-                 text below.
+file that an example has written, or a page of HTML in a frame, with `:alt:` for those who do not
+                 see it and its text below.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 TOP = Path(__file__).resolve().parents[2]
-PICTURES = {".svg": "image/svg+xml", ".png": "image/png"}
+PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".html": "text/html"}
 # Where a program leaves its names for the next one, in the page's folder.
 NAMES = ".names"
 LANGUAGES = {".yaml": "yaml", ".yml": "yaml", ".py": "python"}
@@ -193,17 +193,20 @@ class Picture(_Example):
         path = self.folder / self.arguments[0]
         if "alt" not in self.options or path.suffix not in PICTURES or not path.is_file():
             raise self.refuse(
-                f"{self.arguments[0]} is no SVG or PNG file that an example has written, or has no"
-                " :alt:"
+                f"{self.arguments[0]} is no SVG, PNG or HTML file that an example has written, or"
+                " has no :alt:"
             )
         # As an address the picture keeps its ids to itself, and needs no file that outlives the
         # page's folder.
-        data = base64.b64encode(path.read_bytes()).decode("ascii")
         alt = html.escape(self.options["alt"], quote=True)
+        if path.suffix == ".html":
+            page = html.escape(path.read_text(encoding="utf-8"), quote=True)
+            shown = f'<iframe class="page" srcdoc="{page}" title="{alt}"></iframe>'
+        else:
+            data = base64.b64encode(path.read_bytes()).decode("ascii")
+            shown = f'<img src="data:{PICTURES[path.suffix]};base64,{data}" alt="{alt}">'
         figure = nodes.figure()
-        figure += nodes.raw(
-            "", f'<img src="data:{PICTURES[path.suffix]};base64,{data}" alt="{alt}">', format="html"
-        )
+        figure += nodes.raw("", shown, format="html")
         if self.content:
             caption = nodes.caption()
             parsed, messages = self.parse_inline("\n".join(self.content))

@@ -5,7 +5,7 @@ read.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,11 +20,10 @@ from ..geometry.positions import ball_coordinates
 from ..inputs.messages import ExperimentError, Message, Steps
 from ..inputs.problems import Problems, written_text
 from ..inputs.quantities import format_length
-from ..inputs.settings import listing
+from ..inputs.settings import listing, number_of
 from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.description import MachineDescription, random_part
 from ..machines.error_names import AXIS_ERRORS
 from ..machines.settings import (
     MachineFileSettings,
@@ -39,11 +38,11 @@ from ..machines.true_machine_settings import (
     TrueMapSettings,
 )
 from ..machines.truth import TruthError, true_machine
-from .curve_files import read_curves
-from .machine_file import load_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
-from .used_maps import read_true_map
+
+if TYPE_CHECKING:
+    from ..machines.description import MachineDescription
 
 TOLERANCE = 1e-9
 
@@ -107,6 +106,9 @@ def _check_model(
 def _machine_of_file(
     file: str, steps: Steps, references: References, doubts: list[Message] | None = None
 ) -> MachineDescription | None:
+    # What reads other files is loaded where one is named: few experiments have any.
+    from .machine_file import load_machine
+
     try:
         return load_machine(references.folder / file, doubts)
     except ExperimentError as error:
@@ -118,6 +120,8 @@ def _true_machine_of_file(
     truth: TrueMachineFileSettings, machine: Machine | None, references: References
 ) -> None:
     """Let the true machine be that of its file, or report what is wrong with it."""
+    from ..machines.description import random_part
+
     steps: Steps = ("true_machine", "file")
     found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
@@ -168,6 +172,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         _true_machine_of_file(truth, machine, references)
         return
     if isinstance(truth, TrueMapSettings):
+        from .used_maps import read_true_map
+
         read_true_map(truth, machine, references)
         return
     problems = references.problems
@@ -198,6 +204,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine have the curves of its files, or report what is wrong with them."""
+    from .curve_files import read_curves
+
     problems, curves = references.problems, dict[str, Points]()
     for i, file in enumerate(truth.files):
         steps: Steps = ("true_machine", "files", i)
@@ -286,11 +294,7 @@ def check_inside(
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
     offset, place = float(probes[probe].offset[axis]), float(places[balls[worst], axis])
-    others = (
-        f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}"
-        if len(outside) > 1
-        else ""
-    )
+    others = f", and {number_of(len(outside) - 1, 'more reading')}" if len(outside) > 1 else ""
     less = (
         f" (the ball at {format_length(place)} less the offset of {format_length(offset)})"
         if offset

@@ -56,7 +56,7 @@ def read_numbered_curves(
             f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"
             " of them out"
         )
-        raise ExperimentError([Message(file, lines[0][0], 1, "", text)])
+        raise refused(file, text, line=lines[0][0])
     known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
     names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], known)
     messages: list[Message] = []
@@ -77,15 +77,13 @@ def read_numbered_curves(
     if messages:
         raise ExperimentError(messages)
     if len(rows) < 2:
-        raise ExperimentError(
-            [Message(file, lines[0][0], 1, "", "a curve needs at least two points; add rows")]
-        )
+        raise refused(file, "a curve needs at least two points; add rows", line=lines[0][0])
     place = names.index(POSITION)
     rows.sort(key=lambda row: row[1][place])
     for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
         if after[place] == before[place]:
             text = "this position is in the file twice; leave one of the rows out"
-            raise ExperimentError([Message(file, number, 1, "", text)])
+            raise refused(file, text, line=number)
     positions = tuple(row[place] for _, row in rows)
     curves = {
         name: Points(positions, tuple(row[k] for _, row in rows))

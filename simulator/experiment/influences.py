@@ -74,7 +74,7 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
         try:
             influences.append(one.influence(parts))
         except ValueError as error:
-            raise ExperimentError([experiment.message(("influences", i), str(error))]) from None
+            raise experiment.refused(("influences", i), str(error)) from None
         text = wrong_of_parameters(influences[-1].parameters, len(design.positions.names))
         if text:
             raise _of_class(experiment, i, text)
@@ -92,7 +92,7 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
     twice = [name for name, count in Counter(one.name for one in parameters).items() if count > 1]
     if twice:
         text = f"{twice[0]} is stated by two of them; remove it from one"
-        raise ExperimentError([experiment.message(("influences",), text)])
+        raise experiment.refused(("influences",), text)
     _refuse_too_many(disturbed, experiment, is_pool)
     known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
     stated = [parameters[k] for k in known]
@@ -133,10 +133,10 @@ def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -
             f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
             " of single positions as exact"
         )
-        raise ExperimentError([experiment.message(("influences",), text)])
+        raise experiment.refused(("influences",), text)
 
 
 def _of_class(experiment: Experiment, i: int, text: str) -> ExperimentError:
     """What is wrong with the class of the i-th influence quantity."""
     name = type(experiment.influences[i]).__name__
-    return ExperimentError([experiment.message(("influences", i), f"the class {name}: {text}")])
+    return experiment.refused(("influences", i), f"the class {name}: {text}")

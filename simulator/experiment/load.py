@@ -129,11 +129,11 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
     mark = Mark("experiment", 0, 0)
     if "variants" in sections:
         text = "are for files; change an experiment with its method with_()"
-        raise ExperimentError([mark.message("variants", text)])
+        raise mark.refused(text, "variants")
     try:
         tree = with_present_keys(node_of(sections, mark))
     except ValueError as error:
-        raise ExperimentError([mark.message("", str(error))]) from None
+        raise mark.refused(str(error)) from None
     return _built(tree, folder / "experiment", None, False)
 
 

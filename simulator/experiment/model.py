@@ -20,7 +20,7 @@ from ..design.observations.calibration import Calibration
 from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
-from ..inputs.messages import Message, Steps, format_path
+from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
 from ..maps.fitted_map import MapData
@@ -322,6 +322,10 @@ class Experiment:
     def message(self, steps: Steps, text: str) -> Message:
         """A message about the value at a path."""
         return self.place(steps).message(format_path(steps), text)
+
+    def refused(self, steps: Steps, text: str) -> ExperimentError:
+        """The one error of the experiment, about the value at a path."""
+        return ExperimentError([self.message(steps, text)])
 
     def with_(
         self, changes: Mapping[str, object] | None = None, /, **sections: object

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.yamltree import Mapping, Node, Scalar, walk
-from .map_files import map_tree
 
 
 def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
@@ -55,6 +54,9 @@ def _named_maps(root: Node) -> Iterator[tuple[Steps, Scalar]]:
 
 
 def _has_model_in_python(path: Path) -> bool:
+    # Loaded where a map is named: few experiments have any.
+    from .map_files import map_tree
+
     try:
         return any(python_models(map_tree(path, [])[0]))
     except ExperimentError:

@@ -20,7 +20,6 @@ from ..machines.settings import build_error_model, kind_of
 from .model import Position, Prior, Probe
 from .sections import MapPriorSettings, PriorSettings
 from .structure import Sections
-from .used_maps import resolve_map_prior
 
 MOST_PRIORS = 5000
 PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
@@ -49,6 +48,9 @@ def resolve_priors(
     for i, entry in entries.items():
         steps: Steps = ("priors", int(i))
         if isinstance(entry, MapPriorSettings):
+            # Loaded where a map is named: few experiments have any.
+            from .used_maps import resolve_map_prior
+
             found += resolve_map_prior(entry, steps, model, machine, references, probes)
         else:
             found += _prior(entry, steps, known, references)

@@ -8,7 +8,6 @@ from ..design.lookup import References
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.quantities import LENGTH_UNITS, QuantityError, parse_positive_length, plain_unit
 from ..inputs.settings import hint
-from .machine_file import load_machine
 from .name_rules import check_rule
 from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings
 from .structure import Sections
@@ -95,6 +94,9 @@ def _read_correction(settings: ReadingsSettings, references: References) -> None
         text = "a machine file has 3 dimensions, but machine.volume has 2"
         references.problems.add(steps, text)
         return
+    # Loaded where a file is named: few experiments have any.
+    from .machine_file import load_machine
+
     try:
         correction.of(load_machine(references.folder / correction.file))
     except ExperimentError as error:

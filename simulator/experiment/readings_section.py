@@ -11,7 +11,6 @@ from pydantic import Field
 from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.settings import Forms, NonEmpty, Settings, Text
 from ..machines.described import OfMachineFile
-from ..machines.description import true_volumetric
 from ..machines.protocol import TrueMachine
 
 Coordinate = Literal["scale readings", "ball centres", "part"]
@@ -28,6 +27,9 @@ class CompensationSettings(OfMachineFile):
 
     def machine(self) -> TrueMachine:
         """What the correction added to scale readings."""
+        # Loaded where a machine file is named: few experiments name any.
+        from ..machines.description import true_volumetric
+
         return true_volumetric(self.described)
 
 
@@ -123,4 +125,4 @@ class ReadingsSettings(Settings):
 
 def no_settings() -> ReadingsSettings:
     """The settings of an experiment that says nothing of its readings."""
-    return ReadingsSettings.model_validate({})
+    return ReadingsSettings.model_construct()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 from weakref import WeakKeyDictionary
 
 from pydantic import TypeAdapter, ValidationError
@@ -15,7 +15,7 @@ from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
-from ..inputs.settings import describe, hint, nearest
+from ..inputs.settings import Settings, describe, hint, nearest
 from ..inputs.validation import explain_in, type_adapter
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
@@ -120,7 +120,7 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         elif key == "pool":
             values |= _validate_pool(node_or_none, problems)
         elif key != "variants":
-            values |= _validate(_adapter(key), node_or_none, (key,), problems)
+            values |= _validate(_adapters(key, node_or_none), node_or_none, (key,), problems)
     return Sections(values)
 
 
@@ -143,17 +143,17 @@ def _validate_entries(key: str, node: Node, problems: Problems) -> dict[Steps, A
     entries = node.items.items() if isinstance(node, Mapping) else enumerate(node.items)
     values: dict[Steps, Any] = {}
     for step, item in entries:
-        values |= _validate(_adapter(key), item, (key, step), problems)
+        values |= _validate(_adapters(key, item), item, (key, step), problems)
     return values
 
 
 def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
     """Values of the pool's times and limits, and of each of its entries."""
     if not isinstance(node, Mapping):
-        return _validate(_adapter("pool"), node, ("pool",), problems)
+        return _validate([_adapter("pool")], node, ("pool",), problems)
     values: dict[Steps, Any] = {("pool",): None}
     rest = {key: item for key, item in node.items.items() if key not in POOL_ENTRIES}
-    whole = _validate(_adapter("pool"), replace(node, items=rest), ("pool",), problems).get(
+    whole = _validate([_adapter("pool")], replace(node, items=rest), ("pool",), problems).get(
         ("pool",)
     )
     whole = whole or PoolSettings.model_validate({})
@@ -162,7 +162,8 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
         entries = node.items.get(key)
         if isinstance(entries, Sequence):
             for i, item in enumerate(entries.items):
-                values |= _validate(type_adapter(kind_of(item)), item, ("pool", key, i), problems)
+                adapter = type_adapter(kind_of(item))
+                values |= _validate([adapter], item, ("pool", key, i), problems)
         elif entries is not None and not (isinstance(entries, Scalar) and entries.value is None):
             found = describe(to_python(entries) if isinstance(entries, Scalar) else {})
             description = PoolSettings.model_fields[key].description
@@ -187,23 +188,58 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 
 
 def _validate(
-    adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems
+    adapters: Iterable[TypeAdapter[Any]], node: Node, steps: Steps, problems: Problems
 ) -> dict[Steps, Any]:
+    """The value of a node by the first of some adapters that takes it; the last says what is
+    wrong.
+    """
     known = {} if steps[0] in COMPLETED_LATER else _VALID.setdefault(node, {})
-    if adapter in known:
-        return {steps: known[adapter]}
-    try:
-        known[adapter] = adapter.validate_python(to_python(node))
-        return {steps: known[adapter]}
-    except ValidationError as error:
-        explain_in(problems, error, adapter, node, steps)
+    for adapter in adapters:
+        if adapter in known:
+            return {steps: known[adapter]}
+        try:
+            known[adapter] = adapter.validate_python(to_python(node))
+            return {steps: known[adapter]}
+        except ValidationError as error:
+            refusal = error
+    explain_in(problems, refusal, adapter, node, steps)
+    return {}
+
+
+def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
+    """What may take a section, or an entry of it: the kind that it says it is, then any kind.
+
+    The form of one kind is made in a fraction of the time that those of all kinds take, which are
+    needed to say what would be right.
+    """
+    said = node.items.get("kind") if isinstance(node, Mapping) else None
+    if isinstance(said, Scalar) and isinstance(said.value, str):
+        own = _kinds(key).get(said.value)
+        if own is not None:
+            yield type_adapter(own)
+    yield _adapter(key)
+
+
+@cache
+def _kinds(key: str) -> dict[str, type[Settings]]:
+    """The classes among which the word `kind` chooses in a section or its entries, by that word."""
+    union, *about = get_args(_form(key)) or (None,)
+    if not any(getattr(one, "discriminator", None) == "kind" for one in about):
         return {}
+    return {
+        word: one
+        for one in get_args(union)
+        for word in get_args(one.model_fields["kind"].annotation)
+    }
 
 
 @cache
 def _adapter(key: str) -> TypeAdapter[Any]:
+    return type_adapter(_form(key))
+
+
+def _form(key: str) -> Any:
     if key in ENTRIES:
-        return type_adapter(ENTRIES[key][1])
+        return ENTRIES[key][1]
     field = ExperimentSettings.model_fields[key]
-    annotated: Any = Annotated[field.annotation, field]
-    return type_adapter(annotated)
+    return Annotated[field.annotation, field]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .messages import MOST_MESSAGES, ExperimentError, Message
+from .messages import MOST_MESSAGES, ExperimentError, Message, refused
 from .quantities import LENGTH_UNITS, plain_unit
 from .settings import hint, shorten
 from .spreadsheets import text_of_cell
@@ -82,16 +82,16 @@ def read_matrix(path: Path) -> NamedMatrix:
     lines, file = table_lines(path), str(path)
     if not lines:
         text = "the file is empty; its first line should be covariance_um2 and the names of values"
-        raise ExperimentError([Message(file, 1, 1, "", text)])
+        raise refused(file, text, line=1)
     head = Mark(file, lines[0][0], 1)
     cells = split_cells(lines[0][1])
     if cells is None or len(cells) < 2:
         text = "the first line should be covariance_um2, or correlation, and the names of values"
-        raise ExperimentError([head.message("", text)])
+        raise head.refused(text)
     factor = _factor(head, text_of_cell(cells[0][1]))
     names = [text_of_cell(cell) for _, cell in cells[1:]]
     if len(names) > MOST_NAMES:
-        raise ExperimentError([head.message("", f"{len(names)} values; at most {MOST_NAMES}")])
+        raise head.refused(f"{len(names)} values; at most {MOST_NAMES}")
     messages = [
         head.message("", f'a second column "{shorten(name)}"; remove one of the two')
         for name in sorted({name for name in names if names.count(name) > 1})
@@ -182,7 +182,7 @@ def _factor(mark: Mark, cell: str) -> float | None:
     text = f'the first cell is "{shorten(cell)}"; write covariance_um2, or correlation'
     if what.lower() == "covariance":
         text = f'"{shorten(cell)}" has no unit of area; {hint(plain, known)}'
-    raise ExperimentError([mark.message("", text)])
+    raise mark.refused(text)
 
 
 def _number(cell: str) -> float:

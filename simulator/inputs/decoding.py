@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 
-from .messages import ExperimentError, Message, refused
+from .messages import refused
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig", "UTF-8"),
@@ -72,9 +72,7 @@ def refuse_controls(text: str, file: object) -> None:
     if control is not None:
         line = len(LINE_END.findall(text, 0, control.start())) + 1
         told = f"the control character U+{ord(control[0]):04X} is no part of a text"
-        raise ExperimentError(
-            [Message(str(file), line, 1, "", f"{told}; take a whole copy of the file")]
-        )
+        raise refused(file, f"{told}; take a whole copy of the file", line=line)
 
 
 def _by_zeros(content: bytes) -> list[tuple[str, str]]:

@@ -101,11 +101,11 @@ def read_digital_certificate(path: Path) -> tuple[str, tuple[DigitalResult, ...]
             f"is no Digital Calibration Certificate: its first element is <{shorten(root.name)}>,"
             f" not <{ROOT}>"
         )
-        raise ExperimentError([root.mark.message("", text)])
+        raise root.mark.refused(text)
     version = root.attributes.get("schemaVersion", "")
     if version.partition(".")[0] not in VERSIONS:
         told = f'schemaVersion is "{shorten(version)}"' if version else "there is no schemaVersion"
-        raise ExperimentError([root.mark.message("", f"{told}; versions 2.x and 3.x are read")])
+        raise root.mark.refused(f"{told}; versions 2.x and 3.x are read")
     results = []
     for measurement in root.walk():
         if measurement.name == "measurementResult":
@@ -113,7 +113,7 @@ def read_digital_certificate(path: Path) -> tuple[str, tuple[DigitalResult, ...]
             for one in measurement.all("results", "result"):
                 results.append(_result(one, temperatures))
     if not results:
-        raise ExperimentError([root.mark.message("", "has no result")])
+        raise root.mark.refused("has no result")
     return version, tuple(results)
 
 
@@ -347,7 +347,7 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
         return None
     if count > MOST_NAMES:
         text = f"a covariance of {count} values; at most {MOST_NAMES} are possible"
-        raise ExperimentError([region.mark.message("", text)])
+        raise region.mark.refused(text)
     columns = [one for one in region.walk() if one.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
     marks, factors = [], set[float]()
@@ -363,17 +363,17 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
                 f"a covariance of {len(columns)} columns, this one of {len(numbers)} entries, for"
                 f" {count} values; it must be square"
             )
-            raise ExperimentError([column.mark.message("", text)])
+            raise column.mark.refused(text)
         for j, number in enumerate(numbers):
             try:
                 factor = float(length_factor(_one_of(units, j, count) or "", 2))
             except QuantityError as error:
-                raise ExperimentError([column.mark.message("", f"covariance: {error}")]) from None
+                raise column.mark.refused(f"covariance: {error}") from None
             factors.add(factor)
             values[j, k], rounding[j, k] = _plain(number) * factor, half_digit(number) * factor
             if not math.isfinite(values[j, k]):
                 text = f'covariance: "{shorten(number)}" is not a number'
-                raise ExperimentError([column.mark.message("", text)])
+                raise column.mark.refused(text)
     names = tuple(f"value {k + 1}" for k in range(count))
     unit = unit_of_area(factors.pop()) if len(factors) == 1 else "um"
     found = NamedMatrix(names, values, rounding, False, tuple(marks), unit)

@@ -52,9 +52,14 @@ class ExperimentError(Exception):
         return type(self), (self.messages,)
 
 
-def refused(file: object, text: str, path: str = "") -> ExperimentError:
-    """The one error of a whole file, or of a place in it, without a line."""
-    return ExperimentError([Message(str(file), 0, 0, path, text)])
+def refused(
+    file: object, text: str, path: str = "", line: int = 0, column: int | None = None
+) -> ExperimentError:
+    """The one error of a file, of a place in it without a line, or of a line, by default from its
+    beginning.
+    """
+    column = min(line, 1) if column is None else column
+    return ExperimentError([Message(str(file), line, column, path, text)])
 
 
 def _by_number(found: re.Match[str]) -> str:

@@ -76,6 +76,15 @@ def listing(words: Iterable[str], limit: int = 8) -> str:
     return ", ".join(words)
 
 
+def number_of(count: int, thing: str) -> str:
+    """A number of things in words.
+
+    >>> number_of(1, "line"), number_of(2, "line")
+    ('1 line', '2 lines')
+    """
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
 def hint(word: str, known: Iterable[str]) -> str:
     """Say which known word was probably meant, or which there are.
 

@@ -11,7 +11,7 @@ from itertools import islice, pairwise
 from pathlib import Path
 from types import MappingProxyType
 
-from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
+from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from .quantities import (
     LENGTH_UNITS,
     QuantityError,
@@ -86,9 +86,7 @@ def read_table(
     lines = table_lines(path)
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:
-        raise ExperimentError(
-            [Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")]
-        )
+        raise refused(file, f"the file is empty; its first line should be {example}", line=1)
     places, factors = _columns(
         Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
     )
@@ -154,7 +152,7 @@ def _refuse_unfilled(
     ):
         text = f"nothing is filled in: {listing(lengths)} are empty in all {len(lines) - 1} rows"
         text += "; write in what was read, and remove the lines of what was not"
-        raise ExperimentError([Message(file, lines[1][0], 1, "", text)])
+        raise refused(file, text, line=lines[1][0])
 
 
 def _lengths_of(
@@ -247,10 +245,10 @@ def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, 
     count = header.count(",") + 1
     if count > MOST_COLUMNS:
         text = f"{count} columns are too many; the first line should be {example}"
-        raise ExperimentError([mark.message("", text)])
+        raise mark.refused(text)
     if "," not in header and re.search("[;\t]", header):
         text = f"the columns are not separated by commas; write {example}"
-        raise ExperimentError([mark.message("", text)])
+        raise mark.refused(text)
     for column, cell in split_cells(header) or []:
         name, _, unit = cell.rpartition("_")
         yield Mark(mark.file, mark.line, column), cell, name, plain_unit(unit)

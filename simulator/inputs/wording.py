@@ -16,6 +16,8 @@ from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python, written
 
 Schema = AnyMapping[str, Any]
 
+# Keys that may state an expanded uncertainty in place of a standard one.
+NOT_STANDARD = ("expanded_uncertainty", "uncertainty", "expanded", "u", "u95", "accuracy")
 # Kinds by other names that they have, in lower case without what is no letter.
 OTHER_NAMES = {
     **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),
@@ -143,17 +145,7 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         about = _description(schema, root, steps)
         return Explanation(steps, f'missing; add "{steps[-1]}"{about}')
     if kind == "extra_forbidden":
-        known = [
-            key
-            for one in _schemas_at(schema, root, steps[:-1])
-            for key in one.get("properties", {})
-        ]
-        taken = written_keys(root, *steps[:-1])
-        free = [key for key in dict.fromkeys(known) if key not in taken]
-        # A misspelt key may stand beside the right one.
-        meant = hint(str(steps[-1]), known)
-        meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
-        return Explanation(steps, f"unknown key; {meant}", of_key=True)
+        return _unknown_key(steps, root, schema)
     if isinstance(node, Scalar) and node.value is None:
         return Explanation(steps, "empty; give a value, or leave it out")
     if kind in ("union_tag_invalid", "union_tag_not_found"):
@@ -190,6 +182,23 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
     if kind == "value_error":
         return Explanation(steps, str(context["error"]))
     return Explanation(steps, error["msg"][:1].lower() + error["msg"][1:])
+
+
+def _unknown_key(steps: Steps, root: Node, schema: Schema) -> Explanation:
+    known = [
+        key for one in _schemas_at(schema, root, steps[:-1]) for key in one.get("properties", {})
+    ]
+    taken = written_keys(root, *steps[:-1])
+    free = [key for key in dict.fromkeys(known) if key not in taken]
+    # A misspelt key may stand beside the right one.
+    meant = hint(str(steps[-1]), known)
+    meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
+    if "standard_uncertainty" in free and str(steps[-1]).casefold() in NOT_STANDARD:
+        meant = (
+            "uncertainties are standard ones, U / k of an expanded uncertainty U; give U / k as"
+            " standard_uncertainty"
+        )
+    return Explanation(steps, f"unknown key; {meant}", of_key=True)
 
 
 def _wrong_literal(value: Any, allowed: list[str]) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
-from .messages import ExperimentError, Message, refused
+from .messages import ExperimentError, refused
 from .settings import shorten
 from .yamltree import GivenText, Mark, read_bytes
 
@@ -109,10 +109,10 @@ def parse_xml(content: bytes, file: str, encoding: str | None = None) -> Element
                 f"the file ends within <{shorten(builder.open[-1].name)}>; it was cut off, take a"
                 " whole copy"
             )
-        raise ExperimentError([Message(file, error.lineno, error.offset + 1, "", text)]) from None
+        raise refused(file, text, line=error.lineno, column=error.offset + 1) from None
     except (LookupError, ValueError) as error:
         text = f"the encoding cannot be read ({error}); save the file with the encoding UTF-8"
-        raise ExperimentError([Message(file, 1, 1, "", text)]) from None
+        raise refused(file, text, line=1) from None
     return builder.roots[0]
 
 
@@ -147,7 +147,7 @@ class _Builder:
         return Mark(self.file, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
 
     def _refuse(self, text: str) -> ExperimentError:
-        return ExperimentError([self._mark().message("", text)])
+        return self._mark().refused(text)
 
     def _refuse_type(self, *_: object) -> None:
         text = "a document type (<!DOCTYPE …>) is not read, nor any entity of it; remove it"

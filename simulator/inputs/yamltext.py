@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import yaml
 
-from .messages import ExperimentError, Message, Step, Steps, format_path
+from .messages import ExperimentError, Step, Steps, format_path, refused
 from .yamltree import LOADER, Mark, parse_tree, resolve_scalar, to_python
 
 # What ends a line for YAML's parser.
@@ -212,7 +212,7 @@ def _way(text: _Text, steps: Steps) -> list[_Span]:
 
 def _refusal(span: _Span, steps: Steps, text: str) -> ExperimentError:
     mark = span.mark
-    return ExperimentError([Message(mark.file, mark.line, mark.column, format_path(steps), text)])
+    return refused(mark.file, text, format_path(steps), line=mark.line, column=mark.column)
 
 
 def _changed(text: _Text, change: TextChange) -> str:
@@ -326,13 +326,9 @@ def _keep_what_is_told(text: _Text, span: _Span, start: int, end: int, change: T
             before = text.text[: gap_start + found.start()]
             lines = LINE_END.split(before)
             place = Mark(span.mark.file, len(lines), len(lines[-1]) + 1)
-            raise ExperimentError(
-                [
-                    place.message(
-                        format_path(change.steps),
-                        f"{what} here would be lost by the change; change it by hand",
-                    )
-                ]
+            raise place.refused(
+                f"{what} here would be lost by the change; change it by hand",
+                format_path(change.steps),
             )
 
 

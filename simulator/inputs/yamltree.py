@@ -76,6 +76,10 @@ class Mark:
         """Return a message about this place."""
         return Message(self.file, self.line, self.column, path, text)
 
+    def refused(self, text: str, path: str = "") -> ExperimentError:
+        """The one error of a file, about this place."""
+        return ExperimentError([self.message(path, text)])
+
 
 @dataclass(frozen=True, eq=False)
 class Scalar:

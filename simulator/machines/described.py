@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from pydantic import PrivateAttr
 
 from ..inputs.settings import Settings
-from .description import MachineDescription
+
+if TYPE_CHECKING:
+    from .description import MachineDescription
 
 
 class OfMachineFile(Settings):

@@ -15,7 +15,6 @@ from ..inputs.messages import Steps
 from ..inputs.settings import Settings, listing
 from .custom import custom_model
 from .described import OfMachineFile
-from .description import fitted_in_plane, fitted_volumetric
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
@@ -122,6 +121,9 @@ def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorMode
 
 
 def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    # Loaded where a machine file is named: few experiments name any.
+    from .description import fitted_in_plane, fitted_volumetric
+
     machine = settings.described if len(lower) == 3 else fitted_in_plane(settings.described)
     model = fitted_volumetric(machine, *in_space(lower, upper), settings.knots)
     return model if len(lower) == 3 else PlaneModel(model, 0.0)

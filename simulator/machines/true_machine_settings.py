@@ -17,7 +17,6 @@ from .arrangement_settings import (
 )
 from .curves import Interpolation, Points, curves_model
 from .described import OfMachineFile
-from .description import true_volumetric
 from .model_kinds import Corner
 from .plane import PlaneModel
 from .protocol import ErrorModel, TrueMachine
@@ -125,6 +124,9 @@ class TrueMachineFileSettings(OfMachineFile):
 
     def machine(self, dimension: int = 3) -> TrueMachine:
         """The systematic errors of the machine, of two dimensions those at the level."""
+        # Loaded where a machine file is named: few experiments name any.
+        from .description import true_volumetric
+
         found = true_volumetric(self.described)
         if dimension == 3:
             return found

@@ -103,7 +103,7 @@ def read_any_table(
     if not lines:
         columns = ["position", "ball", "probe", *(f"{axis}_mm" for axis in words.axes)]
         text = f"the file is empty; its first line should be {','.join(columns)}"
-        raise ExperimentError([Message(str(source), 1, 1, "", text)])
+        raise refused(source, text, line=1)
     if len(lines) > MOST_ROWS:
         raise refused(source, f"more than {MOST_ROWS} rows; leave some out")
     try:
@@ -116,7 +116,7 @@ def read_any_table(
             )
     except NoFormError as error:
         text = error.text or missing_columns(error.cells, words.axes)
-        raise ExperimentError([Message(str(source), error.line, 1, "", text)]) from None
+        raise refused(source, text, line=error.line) from None
     return _Reader(source, encoding, words, settings, form).read(is_possible)
 
 
@@ -131,9 +131,7 @@ class _Reader:
     form: Form
 
     def error(self, text: str, line: int = 0) -> ExperimentError:
-        return ExperimentError(
-            [Message(str(self.source), line or max(self.form.header, 1), 1, "", text)]
-        )
+        return refused(self.source, text, line=line or max(self.form.header, 1))
 
     def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
         form = self.form

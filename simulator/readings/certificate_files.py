@@ -189,7 +189,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
             "this is a table of the certified values of one calibration; name it in the experiment"
             f" file under calibration: values: {Path(path.name).name}, and leave --certificate out"
         )
-        raise ExperimentError([Message(str(path), 1, 1, "", told)])
+        raise refused(path, told, line=1)
     rows = read_table(table, COLUMNS, [], problems=problems)
     known = certified_values(experiment)
     if not known:

@@ -37,7 +37,7 @@ def refuse_gross_errors(
         seen = x + design.probes.offsets[design.readings.probe]
         mistaken = mistaken_positions(design, design.readings, seen)
         if {wrong.position for wrong in positions} <= set(mistaken):
-            raise ExperimentError([marks[0].message("", words_of_mistaken(design, mistaken))])
+            raise marks[0].refused(words_of_mistaken(design, mistaken))
     if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
         cause = common_cause(design, x, settings)
         if cause:
@@ -45,7 +45,7 @@ def refuse_gross_errors(
                 f"the readings of most positions do not fit; all do {cause}: correct the columns,"
                 " the unit or the readings section; otherwise the names of balls are wrong"
             )
-            raise ExperimentError([marks[0].message("", text)])
+            raise marks[0].refused(text)
     messages = [_of_position(design, wrong, marks) for wrong in positions]
     told: set[int] = set()
     for wrong in readings:

@@ -18,7 +18,7 @@ from ..design.arrays import Design
 from ..estimation.spheres import FEWEST_POINTS, SphereFit, closest_sphere
 from ..experiment.readings_section import Coordinate
 from ..inputs.messages import ExperimentError, refused
-from ..inputs.settings import listing, shorten
+from ..inputs.settings import listing, number_of, shorten
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.yamltree import GivenText, Mark
 from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file, without_point
@@ -363,7 +363,7 @@ def _probe(feature: Feature, position: str, design: Design | None, file: str) ->
     )
     if feature.probe:
         text = text.replace("tells which", "does not tell which", 1)
-    raise ExperimentError([feature.mark.message("", text)])
+    raise feature.mark.refused(text)
 
 
 def _counted(counts: Counter[str]) -> list[str]:
@@ -371,7 +371,7 @@ def _counted(counts: Counter[str]) -> list[str]:
     words = []
     for kind, count in counts.most_common():
         noun, bracket, why = kind.partition(" (")
-        words.append(f"{count} {noun}{'s' * (count != 1)}{bracket}{why}")
+        words.append(f"{number_of(count, noun)}{bracket}{why}")
     return words
 
 
@@ -381,6 +381,6 @@ def _told(one: _Taken) -> str:
         "centre" if feature.kind == UNSTATED else f"{feature.kind} centre"
         for feature, _, _ in one.features
     )
-    counts = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in taken.items())
+    counts = ", ".join(number_of(count, kind) for kind, count in taken.items())
     left = ", ".join(_counted(one.left)) or "nothing"
     return f"{one.report.file}: {one.report.title}; taken: {counts or 'nothing'}; left: {left}"

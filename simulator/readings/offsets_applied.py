@@ -16,7 +16,6 @@ from ..design.arrays import Design, Readings, locations, measured, nominal_state
 from ..estimation.consensus import consensus_motion
 from ..estimation.initial import initial_state
 from ..experiment.readings_section import CompensationSettings, ReadingsSettings
-from ..inputs.messages import ExperimentError
 from ..inputs.quantities import format_length
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
@@ -175,7 +174,7 @@ def doubt_about_offsets(
             text += (
                 "; or write part instead, since the artefact stands turned against the plan in them"
             )
-    raise ExperimentError([mark.message("", text)])
+    raise mark.refused(text)
 
 
 def said_of(settings: ReadingsSettings) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from ..design.arrays import Design, Readings, in_sequence, measured, nominal_sta
 from ..design.observations.readings import expected_readings
 from ..experiment.readings_section import ReadingsSettings, no_settings
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
-from ..inputs.settings import hint, listing
+from ..inputs.settings import hint, listing, number_of
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
@@ -135,16 +135,8 @@ def read_readings(
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
-        raise ExperimentError(
-            [
-                Message(
-                    str(sources[0]),
-                    1,
-                    1,
-                    "",
-                    f"no reading of the balls {names}; read each at least once",
-                )
-            ]
+        raise refused(
+            sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
     doubt = found.doubts + doubt_about_offsets(design, readings, given, settings, rows[0].mark)
     doubt += doubts_about_digits(design, given, uncertainty)
@@ -195,11 +187,7 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
         index.append(places[row.texts])
     messages = []
     for text, found in unknown.items():
-        more = (
-            f" (and in {len(found) - 1} line{'s' * (len(found) > 2)} more)"
-            if len(found) > 1
-            else ""
-        )
+        more = f" (and in {number_of(len(found) - 1, 'line')} more)" if len(found) > 1 else ""
         messages.append(found[0].mark.message("", text + more))
     return np.array(index, np.int64).reshape(-1, 3), messages
 

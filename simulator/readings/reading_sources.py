@@ -190,7 +190,7 @@ def read_source(
             return report
         # Who names columns knows what the file is.
         if settings.columns is None and (other := what_it_is(text)):
-            raise ExperimentError([Message(str(source), 1, 1, "", other)]) from None
+            raise refused(source, other, line=1) from None
         if not wrong:
             raise
     if not rows:

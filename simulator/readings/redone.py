@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 
 from ..design.arrays import Design
+from ..inputs.settings import number_of
 from ..inputs.tables import FileRow
 from .observed_readings import reading_keys
 
@@ -46,20 +47,16 @@ def without_redone(
             earlier = []
         kept[position] = [*earlier, *(i for found in own.values() for i in found)]
     told = [
-        f"{position} was read again: {_readings(count)} taken before are left out"
+        f"{position} was read again: {number_of(count, 'reading')} taken before are left out"
         for position, count in left_out.items()
     ]
     told += [
-        f"{position}: of {_readings(count)} {'that are' if count > 1 else 'that is'} repeated the"
-        " last counts"
+        f"{position}: of {number_of(count, 'reading')} {'that are' if count > 1 else 'that is'}"
+        " repeated the last counts"
         for position, count in repeated.items()
     ]
     chosen = sorted(i for members in kept.values() for i in members)
     return tuple(rows[i] for i in chosen), tuple(told)
-
-
-def _readings(count: int) -> str:
-    return f"{count} reading{'s' * (count != 1)}"
 
 
 def _planned(design: Design) -> Counter[Names]:

@@ -47,7 +47,7 @@ def on_stated_machine(experiment: Experiment, design: Design) -> tuple[Design, S
 
 def too_large(experiment: Experiment, error: Exception) -> ExperimentError:
     """That there are no readings, or no fit of them, with such a true machine."""
-    return ExperimentError([experiment.message(("true_machine",), f"{error}; state smaller ones")])
+    return experiment.refused(("true_machine",), f"{error}; state smaller ones")
 
 
 def simulated_readings(

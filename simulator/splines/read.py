@@ -124,7 +124,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
                 f"the uncertainty is an {wanted[-1].kind} and {y_column.name} a {y_column.kind};"
                 " correct the unit"
             )
-            raise ExperimentError([Message(file, lines[0][0], 1, "", text)])
+            raise refused(file, text, line=lines[0][0])
     messages: list[Message] = []
     values: list[list[float]] = []
     names: list[str] = []

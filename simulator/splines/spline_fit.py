@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..inputs.settings import number_of
 from .constraints import Constraint, rows
 from .space import Array, Side, SplineSpace
 from .spline_problems import SplineError, SplineProblem
@@ -199,7 +200,7 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
         inside = int(((x >= lower) & (x <= upper)).sum())
         within = open_ * (np.abs(space.pieces[first : last + 1]).max(axis=(0, 1)) > 0)[:, None]
         missing = np.linalg.matrix_rank(within, tol=1e-6)
-        lacks = f"{missing} point{'s' if missing > 1 else ''}"
+        lacks = number_of(missing, "point")
         where = f"between {{0}} and {{1}}, where it has {inside}"
         text = f"the curve lacks {lacks} {where}; leave out knots or prescribe more"
         problems.append(SplineProblem(text, (lower, upper)))

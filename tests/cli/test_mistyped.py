@@ -113,3 +113,8 @@ def test_files_in_each_others_place_are_told(
             arguments = [str(tmp_path / one) if one == "map.yaml" else one for one in arguments]
         assert main(arguments) == 2, arguments
         assert words in capsys.readouterr().err
+
+
+def test_the_grammar_of_one_command_is_that_among_all() -> None:
+    for name, command in commands().items():
+        assert parser([name]).commands[name].format_help() == command.format_help()

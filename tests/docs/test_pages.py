@@ -119,7 +119,7 @@ def test_examples_have_run(built: Path) -> None:
         ),
         (
             "```{picture} none.svg\n:alt: nothing\n```",
-            "none.svg is no SVG or PNG file that an example has written",
+            "none.svg is no SVG, PNG or HTML file that an example has written",
         ),
     ],
 )
@@ -148,7 +148,8 @@ def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) ->
     drawing = "<svg xmlns='http://www.w3.org/2000/svg'/>"
     page = (
         f"# Right\n\n```{{file}} one.svg\n{drawing}\n```\n\n```{{picture}} one.svg\n:alt: a < b\nA"
-        " *caption*.\n```\n"
+        ' *caption*.\n```\n\n```{file} one.html\n<p title="x">&amp;</p>\n```\n\n'
+        "```{picture} one.html\n:alt: a < b\n```\n"
     )
     (tmp_path / "index.md").write_text(page, encoding="utf-8")
     command = [
@@ -171,6 +172,8 @@ def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) ->
         f'src="data:image/svg+xml;base64,{data}" alt="a &lt; b"' in built
         and "A <em>caption</em>." in built
     )
+    framed = "&lt;p title=&quot;x&quot;&gt;&amp;amp;&lt;/p&gt;\n"
+    assert f'srcdoc="{framed}" title="a &lt; b"></iframe>' in built
 
 
 def test_a_program_goes_on_with_the_names_of_the_last_one(tmp_path: Path) -> None:

@@ -262,6 +262,9 @@ POSITIONS = [
         "15:45: calibration[1].pairs: no position reads ball 2; read them, or leave them out"]),
 ]  # fmt: skip
 CALIBRATION = [
+    (SIDES, "pairs: corner sides, expanded_uncertainty: 0.4 um", [
+        "14:61: calibration[0].expanded_uncertainty: unknown key; uncertainties are standard ones, U / k"
+        " of an expanded uncertainty U; give U / k as standard_uncertainty"]),
     (SIDES, "pairs: corner, standard_uncertainty: 0.2 um", [
         '14:47: calibration[0].pairs: "corner" is not defined for this artefact; did you mean '
         '"corners"? choose from: corner sides, corner diagonals, corners, neighbours, braced, all, '

@@ -308,7 +308,8 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
     monkeypatch.setattr(
         planning, "in_processes", lambda task, tasks, workers: (task(*one) for one in tasks)
     )
-    assert main(["plan", str(drawn), "--positions", "5", "--curve", "--workers", "1"]) == 70
+    command = ["plan", str(drawn), "--positions", "5", "--curve", "--workers", "1", "--quiet"]
+    assert main(command) == 70
     out, err = capsys.readouterr()
     assert out == "" and err.startswith("internal error: U6") and "the bound of any choice" in err
     assert len(err.splitlines()) == 1

@@ -516,3 +516,23 @@ def test_whatever_is_told_holds(
         for one in repair.changes if len(repair.changes) > 1 else ():
             left = judge(experiment, [other for other in repair.changes if other is not one])
             assert left is not None and (left.deficiency or left.weak > repair.weak)
+
+
+def test_suggestions_do_not_ask_for_all_candidates_in_one_design(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Parameters of influence quantities that each candidate brings do not add up."""
+    each = {"kind": "reproducibility", "each": ["position", "ball"], "standard_uncertainty": "1 um"}
+    few = {"balls": [2, 2], "size": ["500 mm", "500 mm"], "kind": "grid"}
+    base = load("designs/quickstart.yaml")[0].with_(
+        {"influences": [each], "artefacts.plate": few, "error_model": {"kind": "metric"}}
+    )
+    deficient = replace(base, positions=base.positions[:1])
+    at_large = repairs(deficient, most=1)
+    shared = examine(deficient).at.design
+    most = shared.parameter_count + 100
+    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", most)
+    limited = repairs(deficient, most=1)
+    assert at_large is not None and limited is not None
+    assert limited.complete
+    assert [one.edits for one in limited.complete] == [one.edits for one in at_large.complete]

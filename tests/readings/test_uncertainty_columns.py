@@ -155,7 +155,9 @@ def test_an_uncertainty_without_a_unit_is_not_taken_for_one_in_that_of_co_ordina
             uncertainties(experiment, heads, cells)
 
 
-@pytest.mark.parametrize(("u", "is_odd"), [(2e-4, True), (2e-6, False), (5e-8, False), (1e-9, True)])
+@pytest.mark.parametrize(
+    ("u", "is_odd"), [(2e-4, True), (2e-6, False), (5e-8, False), (1e-9, True)]
+)
 def test_uncertainties_that_are_rather_in_another_unit_are_warned_of(
     experiment: Experiment, u: float, is_odd: bool
 ) -> None:

@@ -14,11 +14,11 @@ TOP = Path(__file__).parents[2]
 
 
 def package_copy(folder: Path) -> Path:
-    """The package copied into a folder; where it is."""
-    package, ignored = folder / "ballplate", shutil.ignore_patterns("__pycache__")
-    shutil.copytree(TOP / "analysis", package, ignore=ignored)
+    """The package, with what it is compiled to, copied into a folder; where it is."""
+    package = folder / "ballplate"
+    shutil.copytree(TOP / "analysis", package)
     for part in ("simulator", "designs"):
-        shutil.copytree(TOP / part, package / part, ignore=ignored)
+        shutil.copytree(TOP / part, package / part)
     return package
 
 

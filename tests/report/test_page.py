@@ -9,7 +9,9 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import ballplate as bp
 import pytest
 from ballplate.cli import main
 from ballplate.report.cells import NoExperimentError, experiments
@@ -290,3 +292,19 @@ def test_missing_packages_are_named(
     assert main(["report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 3
     assert "python -m pip install 'ballplate[report]'" in capsys.readouterr().err
     assert main(["report", str(plate_sizes), "--format", "markdown"]) == 0
+
+
+def test_python_writes_the_page_of_a_sweep(
+    plate_sizes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr("ballplate.report.page.page", lambda *given: asked.append(given) or "page")
+    result = bp.stored(plate_sizes)
+    told = {"run_modules": True, "compare": plate_sizes}
+    assert bp.page(result, tmp_path / "a.html", **told) == "page"
+    assert (tmp_path / "a.html").read_text(encoding="utf-8") == "page"
+    ((store, results, run_modules, _, beside),) = asked
+    assert Path(store.path) == plate_sizes and results.count("done") == 12 and run_modules
+    assert beside.sentences[1:] == ("All averages are the same.",)
+    with pytest.raises(ValueError, match="compare goes with a page only"):
+        bp.sweep_report(plate_sizes, form="text", compare=plate_sizes)

@@ -24,14 +24,24 @@ pytestmark = [
 OUTSIDE = """[...document.querySelectorAll('body *')].filter(one => !one.closest('.scroll, svg, .skip') &&
 one.getBoundingClientRect().right > document.documentElement.clientWidth + 1).map(one => one.outerHTML.slice(0, 80))"""
 
+# Labels of pictures that stand out of these.
+CUT = """[...document.querySelectorAll('svg')].flatMap(svg => {
+  const box = svg.getBoundingClientRect();
+  return [...svg.querySelectorAll('text')].filter(text => {
+    const one = text.getBoundingClientRect();
+    return one.width && (one.left < box.left - 1 || one.right > box.right + 1
+      || one.top < box.top - 1 || one.bottom > box.bottom + 1);
+  }).map(text => text.textContent);
+})"""
+
 
 def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
     assert CHROMIUM is not None
     with browser(CHROMIUM, tmp_path) as tab:
-        for width in (360, 768, 1600):
+        for width in (360, 400, 900, 1400):
             tab.resize(width)
             tab.open(plate_sizes_page)
-            assert tab.value(OUTSIDE) == []
+            assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
         assert tab.value("document.title") == "size of the plate and number of its balls"
         assert tab.value("document.querySelectorAll('svg').length") == 15
         assert (

@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.presentation.pages.charts import Chart, Trace, chart_svg
-from ballplate.presentation.pages.spatial import Layer, view
+from ballplate.presentation.pages.spatial import Layer, SpatialPicture, figure_of
 from ballplate.presentation.scene import projection
 
 
 def numbers(text: str) -> list[float]:
     return [float(one) for one in re.findall(r"-?\d+(?:\.\d+)?", text)]
+
+
+def figure(layers: list[Layer]) -> str:
+    return figure_of(SpatialPicture(layers, "a", "label", "words", "caption"))
 
 
 def path_of(picture: str, kind: str) -> str:
@@ -52,7 +56,7 @@ def test_lines_and_bands_of_a_chart_are_broken_where_nothing_is_known() -> None:
 def test_a_view_shows_points_as_the_projection_of_still_pictures(dimension: int) -> None:
     draws = np.random.default_rng(3)
     points, moves = draws.normal(size=(2, 7, dimension))
-    text = view([Layer("lines", "s0", points, (3, 4), 0.1 * moves)], "a", "words", "caption")
+    text = figure([Layer("lines", "s0", points, (3, 4), 0.1 * moves)])
     shown = np.array(numbers(path_of(text, "lines"))).reshape(-1, 2)
     flat = (points + 0.1 * moves) @ projection(dimension)[0].T * [1.0, -1.0]
     # But for one scale and one shift for all.
@@ -71,7 +75,7 @@ def test_an_ellipse_is_the_outline_of_its_ellipsoid() -> None:
     draws = np.random.default_rng(5)
     centres, shapes = draws.normal(size=(4, 3)), 0.2 * draws.normal(size=(4, 3, 3))
     layers = [Layer("ellipsoids", "s0", centres, shapes=shapes), Layer("dots", "s1", centres)]
-    text = view(layers, "a", "words", "caption")
+    text = figure(layers)
     dots = np.array(numbers(path_of(text, "dots").replace("h0", " "))).reshape(-1, 2)
     plane, _ = projection(3)
     scale = np.ptp(dots, axis=0) / np.ptp(centres @ plane.T, axis=0)

@@ -202,9 +202,14 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     bp.simulate(path, seed=1).to_csv(readings, index=False)
     assert main(["fit", path, str(readings), "--report", str(tmp_path / "fit.html")]) == 0
     assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 0
-    for name in ("fit", "design"):
+    results = {"fit": bp.fit(path, readings), "design": path}
+    moment = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC")
+    for name, result in results.items():
         page = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
         assert page.startswith("<!DOCTYPE html>") and "two-dimensions.yaml" in page
+        own = bp.page(result, tmp_path / "own.html")
+        assert moment.sub("", own) == moment.sub("", page)
+        assert (tmp_path / "own.html").read_text(encoding="utf-8") == own
     assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 3
     assert "exists already" in capsys.readouterr().err
     other = ["fit", path, str(readings), "--estimator", "distances", "--report", "a.html"]
@@ -213,6 +218,18 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "--variant" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["run", path, "--report", "a.pdf"])
+
+
+def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
+    prediction = bp.run(small())
+    with pytest.raises(ValueError, match="predict it anew"):
+        bp.page(replace(prediction, experiment=None))
+    with pytest.raises(ValueError, match="go with sweeps only"):
+        bp.page(prediction, run_modules=True)
+    with pytest.raises(TypeError, match="neither an experiment nor the path"):
+        bp.page(3)  # type: ignore[arg-type]
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        bp.page(bp.fit(small(), bp.simulate(small())), tmp_path / "none" / "a.html")
 
 
 @pytest.mark.long

@@ -13,7 +13,7 @@ import pytest
 from ballplate.report.design_contents import page_of_design
 
 from tests.report.browser import Browser, browser, program
-from tests.report.test_page_in_browser import OUTSIDE
+from tests.report.test_page_in_browser import CUT, OUTSIDE
 from tests.report.test_page_pictures import numbers
 from tests.report.test_result_pages import CHANGED, small
 
@@ -61,7 +61,7 @@ def test_pages_open_alone_and_pictures_turn(tmp_path: Path) -> None:
             for width in (400, 900, 1400):
                 tab.resize(width)
                 tab.open(page)
-                assert tab.value(OUTSIDE) == []
+                assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
         drawn = paths(tab, "volume-view")
         press(tab, "Tab")
         tab.value("document.querySelector('#volume-view svg').focus()")

@@ -26,7 +26,7 @@ from tests.robustness.worker import Worker
 
 # Where a test ends, as the next may fail for the same reason.
 ENOUGH = 10
-FEW, MANY = range(500), range(20_000)
+FEW, MANY = range(300), range(20_000)
 
 
 @pytest.fixture(scope="module")

@@ -127,7 +127,7 @@ def test_some_sweeps(folder: Path) -> None:
 
 
 def test_some_tables_of_readings(folder: Path) -> None:
-    try_readings(range(15), folder)
+    try_readings(range(10), folder)
 
 
 def test_some_trees(folder: Path) -> None:

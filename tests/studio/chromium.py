@@ -57,14 +57,27 @@ class Studio:
         self.process.stdout.close()
 
 
+def chromium() -> str | None:
+    """The Chromium of this machine, or the one that Playwright has fetched."""
+    from playwright.sync_api import sync_playwright
+
+    if found := program():
+        return found
+    with sync_playwright() as playwright:
+        fetched = playwright.chromium.executable_path
+    return fetched if Path(fetched).exists() else None
+
+
 @contextmanager
 def tab(width: int = 1400, height: int = 900) -> Iterator:
     """A tab of a browser, with `errors`, what went wrong in it, and `asked`, all requests."""
     from playwright.sync_api import sync_playwright
 
+    path = chromium()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program(), args=list(FLAGS))
-        page = browser.new_page(viewport={"width": width, "height": height})
+        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        size = {"width": width, "height": height}
+        page = browser.new_context(viewport=size).new_page()
         page.errors, page.asked = [], []
         page.on("pageerror", lambda error: page.errors.append(str(error)))
         page.on(

@@ -5,22 +5,24 @@ browser.
 from __future__ import annotations
 
 import statistics
+import subprocess
+import sys
 from pathlib import Path
 
 import ballplate as bp
 import pytest
 from ballplate.designs import shipped
 
-from tests.report.browser import program
-from tests.studio.chromium import Studio, settled, tab, until
+from tests.studio.chromium import Studio, chromium, settled, tab, until
 
 pytest.importorskip("starlette", reason="the studio is an extra")
-pytest.importorskip("playwright", reason="playwright drives the browser")
+INSTALL = "python -m pip install 'ballplate[browser]', and a Chromium"
+pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
 
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.slow,
-    pytest.mark.skipif(program() is None, reason="no Chromium on this machine; install it"),
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
 ]
 
 # Nothing sticks out of the page, other than inside parts that scroll by themselves.
@@ -51,6 +53,7 @@ def drag(page, name: str, by: tuple[int, int], steps: int = 5) -> None:
     page.mouse.up()
 
 
+# In one piece: an hour in its order.
 def test_an_hour(design: Path) -> None:
     with Studio(design) as studio, tab() as page:
         page.goto(studio.address)
@@ -64,6 +67,10 @@ def test_an_hour(design: Path) -> None:
             pictures.add(canvas.screenshot())
             page.wait_for_timeout(400)
         assert len(pictures) == 3
+        # And rests when it is stopped.
+        page.click("[data-motion='0']")
+        page.wait_for_timeout(300)
+        assert len({canvas.screenshot() for _ in range(2)}) == 1
         # A suggestion is shown where it would stand, and applied.
         page.click("[data-job=suggest]")
         page.wait_for_selector("#suggestions li")
@@ -104,7 +111,9 @@ def test_an_hour(design: Path) -> None:
         )
         predicted = bp.run(design).quantities["U6"]
         assert lengths["average"] == predicted.average
-        assert bp.check(design).verdict.deficiency == 0
+        command = [sys.executable, "-m", "ballplate", "check", str(design)]
+        checked = subprocess.run(command, capture_output=True, text=True)
+        assert checked.returncode == 0 and "full rank" in checked.stdout, checked
         # What another program writes meanwhile is not overwritten.
         page.click("#positions button.name >> nth=0")
         page.click("#turn")
@@ -115,36 +124,167 @@ def test_an_hour(design: Path) -> None:
         page.wait_for_selector("#notice.bad")
         assert "has changed on disk" in page.inner_text("#notice")
         assert design.read_bytes() == written
-        latency = moves(page)
-        # The server is killed: the page says so, and the studio begins again.
+        # Nor is the other window's design: this one shows it, and asks again.
+        with page.context.new_page() as other:
+            other.goto(f"http://127.0.0.1:{studio.port}/")
+            until(other, "!!window.studio?.state()?.design")
+            seen = other.evaluate("window.studio.state().revision")
+            other.click("#positions button.name >> nth=1")
+            other.click("#turn")
+            theirs = settled(other, seen + 1)
+        page.evaluate("window.studio.act({do: 'turn', position: 'z low'})")
+        assert "another window" in page.inner_text("#notice")
+        assert page.evaluate("window.studio.state()")["text"] == theirs["text"]
+        page.reload()
+        until(page, "!!window.studio?.state()?.design")
+        page.click("#undo")
+        unsaved = settled(page, theirs["revision"] + 1)["text"]
+        assert unsaved != theirs["text"]
+        # The server is killed: the page says so, and nothing that was done is lost.
         studio.end(9)
+        page.click("#positions button.name >> nth=0")
         page.click("#turn")
-        until(page, "document.querySelector('#notice').textContent.includes('start it')")
-        assert page.errors == [] or all("ERR_CONNECTION" in one for one in page.errors)
-        page.errors.clear()
-        page.on("dialog", lambda dialog: dialog.accept())
+        until(page, "document.querySelector('#notice').textContent.includes('Start it again')")
+        assert all("ERR_CONNECTION" in one for one in page.errors)
         with Studio(design, studio.port) as again:
+            page.wait_for_timeout(2500)
+            # It is another studio, which knows this page no more until its address is opened.
+            assert "with its token" in page.inner_text("#notice")
+            page.errors.clear()
             page.goto(again.address)
             until(page, "!!window.studio?.state()?.design")
             assert "full rank" in page.inner_text("#verdict")
+            assert "not saved in an earlier session" in page.inner_text("#notice")
+            assert page.evaluate("window.studio.state().text") == unsaved
+            page.click("#save")
+            page.wait_for_selector("#notice.bad")
+            assert "has changed on disk" in page.inner_text("#notice")
+            page.click("#toggle-text")
+            page.click("#reopen")
+            until(page, "window.studio.state().saved")
             assert page.evaluate("window.studio.state().text").endswith("# another hand\n")
-            assert page.errors == []
+            assert page.errors == [] and "token" not in page.url
             home = again.address.split("?")[0]
         assert all(url.startswith((home, "data:")) for url in page.asked)
-    print(f"median of twenty moves {latency[0]:.0f} ms, engine {latency[1]:.0f} ms")
 
 
-def moves(page) -> tuple[float, float]:
-    """Median milliseconds of twenty moves by the keyboard, and of the engine's part."""
-    page.evaluate("window.studio.latency.length = 0")
-    engine = []
-    revision = page.evaluate("window.studio.state().revision")
-    for k in range(20):
-        page.focus("#view")
-        page.keyboard.press("PageUp" if k % 2 == 0 else "PageDown")
-        revision += 1
-        engine.append(1e3 * settled(page, revision)["design"]["engine"])
-    return statistics.median(page.evaluate("window.studio.latency")), statistics.median(engine)
+@pytest.mark.long
+def test_twenty_moves_of_seven_by_seven_balls_are_answered(design: Path) -> None:
+    text = Path(shipped("quickstart.yaml")).read_text()
+    design.write_text(text.replace("balls: [5, 5]", "balls: [7, 7]"))
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        first = page.evaluate("window.studio.state()")
+        page.click("#positions button.name >> nth=0")
+        page.evaluate("window.studio.latency.length = 0")
+        engine, states = [], []
+        for k in range(20):
+            page.focus("#view")
+            page.keyboard.press("PageUp" if k % 2 == 0 else "PageDown")
+            states.append(settled(page, first["revision"] + k + 1))
+            engine.append(1e3 * states[-1]["design"]["engine"])
+        latency = page.evaluate("window.studio.latency")
+        assert len(latency) == 20 and page.errors == []
+        # Two moves undo one another; each is answered with figures of its own.
+        for state in states[1::2]:
+            assert state["text"] == first["text"]
+            assert state["design"]["quantities"] == first["design"]["quantities"]
+        moved = states[0]["design"]["quantities"]
+        assert moved != first["design"]["quantities"]
+        design.write_text(states[0]["text"])
+        expected = bp.run(design).quantities
+        assert [(one["symbol"], one["average"]) for one in moved] == [
+            (symbol, one.average) for symbol, one in expected.items()
+        ]
+    middle = {key: statistics.median(one[key] for one in latency) for key in latency[0]}
+    print(
+        f"median of twenty moves: answered {middle['answered']:.0f} ms, shown"
+        f" {middle['shown']:.0f} ms, engine {statistics.median(engine):.0f} ms"
+    )
+
+
+@pytest.mark.long
+def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> None:
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+
+        def sweep(values: str) -> None:
+            page.click("#sweep")
+            page.fill("[data-axis=values]", values)
+            page.click("#more-axes")
+            page.fill(
+                "[data-axis=paths] >> nth=1", "artefacts.plate.size[0], artefacts.plate.size[1]"
+            )
+            page.fill("[data-axis=values] >> nth=1", "600 mm; 750 mm")
+            page.click("#ok")
+
+        sweep("; ".join(f"{k} nm" for k in range(100, 600)))
+        page.wait_for_selector("#jobs li[data-state=running] >> text=of 1000 cells")
+        page.click("#jobs button >> text=stop")
+        until(page, "!document.querySelector('#jobs li')")
+        sweep("0.1 um; 0.2 um; 0.4 um")
+        page.wait_for_selector("#jobs li:not([data-state=running])", timeout=200_000)
+        assert page.locator("[data-page]").count() == 1, page.inner_text("#jobs")
+        assert page.locator("#jobs tbody tr").count() == 6
+        assert "rank deficiency" in page.inner_text("#jobs thead")
+        with page.context.expect_page() as opened:
+            page.click("[data-page]")
+        swept = opened.value
+        failures = []
+        swept.on("console", lambda said: failures.append(said.text))
+        swept.on("pageerror", lambda error: failures.append(str(error)))
+        swept.reload()
+        assert "6 of 6 cells done" in swept.inner_text("body")
+        assert failures == [] and page.errors == []
+
+
+@pytest.mark.long
+def test_the_keyboard_is_enough(design: Path) -> None:
+    """Who works without a mouse stays where he was, though parts of the page are made anew."""
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+
+        def reach(selector: str) -> None:
+            for _ in range(150):
+                page.keyboard.press("Tab")
+                if page.evaluate("([s]) => document.activeElement.matches(s)", [selector]):
+                    return
+            raise AssertionError(f"no {selector} by the Tab key")
+
+        def press(key: str) -> dict:
+            revision = page.evaluate("window.studio.state().revision")
+            page.keyboard.press(key)
+            return settled(page, revision + 1)
+
+        at = "document.activeElement.getAttribute('aria-label') || document.activeElement.id"
+        reach("#positions button.name")
+        page.keyboard.press("Enter")
+        assert page.evaluate(at) == "choose z low"
+        reach("#turn")
+        turned = press("Enter")["text"]
+        assert page.evaluate(at) == "turn"
+        assert press("Enter")["text"] != turned and page.evaluate(at) == "turn"
+        reach("#position .balls button")
+        press("Space")
+        assert page.evaluate(at) == "r1c1"
+        reach("[data-section=machine] > summary")
+        page.keyboard.press("Enter")
+        path = '["machine","repeatability"]'
+        reach(f"#forms [data-path='{path}']")
+        page.keyboard.press("Control+a")
+        page.keyboard.type("0.3 um")
+        assert press("Enter")["data"]["machine"]["repeatability"] == "0.3 um"
+        assert page.evaluate("document.activeElement.dataset.path") == path
+        reach("#view")
+        before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
+        after = press("PageUp")["design"]["scene"]["positions"][0]["origin"]
+        assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+        assert page.evaluate(at).startswith("The volume")
+        state = press("Control+s")
+        assert state["saved"] and page.errors == []
 
 
 def test_a_machine_of_its_own_from_an_empty_folder(tmp_path: Path) -> None:

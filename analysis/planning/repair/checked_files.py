@@ -14,6 +14,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.yamltree import Mark
 
 from ...results.prediction import Advice, Prediction
@@ -148,7 +149,7 @@ def checked_design(
     goals, missed = _goals(experiment, wanted.goals)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
-        missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
+        missed += (number_of(count, "weakly determined direction"),)
     design = CheckedDesign(prediction, None, found, goals, missed, certificate, experiment.name)
     design = advised(design, wanted.repairs)
     if not design.complaints:

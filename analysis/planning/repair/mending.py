@@ -9,7 +9,7 @@ from typing import Any
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import place_of
-from ballplate.simulator.inputs.messages import ExperimentError, Steps, format_path
+from ballplate.simulator.inputs.messages import Steps, format_path
 from ballplate.simulator.inputs.yamltext import TextChange, changed_data, with_changes
 from ballplate.simulator.inputs.yamltree import (
     Mapping as MappingNode,
@@ -67,7 +67,7 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
         text = "the repaired file does not have the rank that was found; nothing is changed"
-        raise ExperimentError([experiment.message((), text)])
+        raise experiment.refused((), text)
     return new
 
 
@@ -108,7 +108,7 @@ def with_experiment(
     written_as = after.get(experiment.name, experiment)
     if others_differ or edits(written_as, changed) or edits(changed, written_as):
         text = "the change cannot be written as it was made; write it by hand"
-        raise ExperimentError([experiment.message((), text)])
+        raise experiment.refused((), text)
     return new
 
 
@@ -200,7 +200,7 @@ def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[Te
             mark = mark_of(root, ("variants", variant, path), of_key=True)
             place_text = format_path(whole)
             text = f"the repair changes {place_text}, which includes this; write it by hand"
-            raise ExperimentError([mark.message(format_path(("variants", variant)), text)])
+            raise mark.refused(text, format_path(("variants", variant)))
     said: Any = changed_data(to_python(root), change)
     for step in whole:
         said = said[step]

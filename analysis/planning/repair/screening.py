@@ -79,7 +79,8 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
         positions=(*experiment.positions, *added.values()),
         probes={**experiment.probes, **new_tips(experiment)},
     )
-    extended = lay_out(placed_only(together))
+    # As a pool: they are never solved for together.
+    extended = lay_out(placed_only(together), is_pool=True)
     state = nominal_state(extended)
     order = np.argsort(extended.readings.position, kind="stable")
     first = np.searchsorted(extended.readings.position[order], np.arange(own + len(added) + 1))

@@ -14,7 +14,7 @@ from .elements import Html, element, joined
 
 # Of a chart and the room around what is drawn, in units of which a letter is about ten high.
 WIDTH, HEIGHT = 360.0, 200.0
-LEFT, RIGHT, ABOVE, BELOW = 46.0, 12.0, 10.0, 34.0
+LEFT, RIGHT, ABOVE, BELOW = 46.0, 16.0, 10.0, 34.0
 # Ticks along an axis, about.
 TICKS = 4
 # Letters of a name below an axis that is told.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from .elements import Html, element, folded, joined, note, sentence, table
 from .length_sections import lengths_section
 from .quoted import QuotedData
 from .residual_sections import reliability_section
+from .spatial import figure_of
 from .uncertainty_sections import (
     expansion,
     lengths_words,
@@ -76,7 +77,7 @@ def design_page(contents: DesignContents) -> str:
             "Lengths throughout the volume",
             lengths_section(quoted["lengths"], contents.target),
         ),
-        PageSection("ellipsoids", "Points and balls", figures_wide(ellipsoids)),
+        PageSection("ellipsoids", "Points and balls", figures_wide(map(figure_of, ellipsoids))),
         PageSection("scale", "Where scale comes from", scale_section(run)),
         PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
@@ -88,10 +89,10 @@ def design_page(contents: DesignContents) -> str:
 
 def _experiment(contents: DesignContents) -> Html:
     """The volume with what is in it, and what was assumed."""
-    return figures_wide([volume_view(contents.at.design), facts_list(contents.facts)])
+    return figures_wide([figure_of(volume_view(contents.at.design)), facts_list(contents.facts)])
 
 
-def figures_wide(content: Sequence[Html]) -> Html:
+def figures_wide(content: Iterable[Html]) -> Html:
     """Pictures beside one another where there is much room."""
     return element("div", *content, class_="figures views")
 
@@ -161,7 +162,7 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
             if drawn is None:
                 rest.append(element("li", told, value=k))
             else:
-                pictures.append(drawn)
+                pictures.append(figure_of(drawn))
         parts += [element("h3", title), note(words), figures_wide(pictures)]
         if rest:
             summary = "Directions without a picture" if pictures else "Directions"
@@ -224,14 +225,13 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         "in the file",
     ]
     made_table = table("repairs", "Changes, cheapest first, each verified", heads, rows, (0, 1, 5))
-    return joined(
-        [
-            sentence("Each of these determines what is open.", now)
-            if repairs.data["complete"]
-            else "",
-            made_table,
-        ]
-    )
+    whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
+    told = "Each of these determines what is open."
+    if not whole:
+        told = "None of these determines all that is open."
+    elif parts:
+        told = "Each repair determines what is open; the other changes determine a part of it."
+    return joined([sentence(told, now), made_table])
 
 
 def _influences(run: QuotedData) -> Html:

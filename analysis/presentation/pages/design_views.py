@@ -13,13 +13,11 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...rank.motions import Motion, moved_balls, moved_points
-from ..scene import MOST_BALLS, box_edges, hull, projection
+from ..scene import MOST_BALLS, box_edges, hull, names_fit, projection
 from ..svg import round_number
 from .elements import Html, element, joined
-from .spatial import Layer, view
+from .spatial import Layer, SpatialPicture
 
-# Positions that are told by their names, and letters of these; otherwise by their numbers.
-MOST_NAMES, LETTERS = 8, 20
 # Of the picture's size: the longest half axis of an ellipsoid, and the largest displacement.
 LONGEST_AXIS, LARGEST_MOTION = 0.05, 0.09
 # What moves no point by more, in metres, moves none: a direction moves something by 1e-6.
@@ -57,14 +55,14 @@ def volume_layers(design: Design) -> list[Layer]:
     ]
 
 
-def volume_view(design: Design) -> Html:
-    """Positions in the volume, the balls that are read, and styli."""
+def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
+    """Positions in the volume, the balls that are read, `most` of each position, and styli."""
     where = locations(design, nominal_state(design), design.readings)
     layers = volume_layers(design)
     labels, names, styli = [], [], []
     read = [k for k in range(len(design.positions.names)) if (design.readings.position == k).any()]
-    told = [design.positions.names[k] for k in read]
-    is_named = len(read) <= MOST_NAMES and max(map(len, told), default=0) <= LETTERS
+    position_names = [design.positions.names[k] for k in read]
+    is_named = names_fit(position_names)
     for number, k in enumerate(read):
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
@@ -75,7 +73,7 @@ def volume_view(design: Design) -> Html:
         closed = np.concatenate([outline, outline[:1]])
         dash = " dashed" if number // STYLES % 2 else ""
         layers.append(Layer("lines", style + dash, closed, (len(closed),)))
-        layers.append(Layer("dots", style, balls[_some(design.readings.ball[mine], MOST_BALLS)]))
+        layers.append(Layer("dots", style, balls[_some(design.readings.ball[mine], most)]))
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
@@ -83,7 +81,7 @@ def volume_view(design: Design) -> Html:
         centre = outline.mean(axis=0)
         is_flat = design.dimension == 2
         labels.append(centre if is_flat else outline[0] + 0.12 * (outline[0] - centre))
-        names.append(told[number] if is_named else str(number + 1))
+        names.append(position_names[number] if is_named else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
         layers.append(Layer("dots", "ink", np.stack([one[1] for one in styli])))
@@ -95,9 +93,10 @@ def volume_view(design: Design) -> Html:
     )
     if not is_named:
         caption += " Positions are numbered as in the run sheet."
-    if len(design.readings.ball) and max(_counts(design)) > MOST_BALLS:
+    if len(design.readings.ball) and max(_counts(design)) > most:
         caption += " Only some of the balls are drawn."
-    return view(layers, "volume-view", words, joined([caption, turning_words(design)]))
+    told = joined([caption, turning_words(design)])
+    return SpatialPicture(layers, "volume-view", "positions", words, told)
 
 
 def turning_words(design: Design) -> Html:
@@ -108,7 +107,7 @@ def turning_words(design: Design) -> Html:
     return element("span", words, class_="turning")
 
 
-def point_view(at: Linearisation, factor: float, sigma: float = 1.0) -> Html:
+def point_view(at: Linearisation, factor: float, sigma: float = 1.0) -> SpatialPicture:
     """Ellipsoids of the corrected evaluation points, enlarged, with their expanded uncertainties
     as half axes.
     """
@@ -123,13 +122,11 @@ def point_view(at: Linearisation, factor: float, sigma: float = 1.0) -> Html:
     size = float(
         np.ptp(np.stack([design.machine.volume.lower, design.machine.volume.upper]), axis=0).max()
     )
-    what = "Corrected evaluation points"
-    return _ellipsoids(
-        layers, points, spread, given.points[~known], size, "point-view", what, factor
-    )
+    told = "point-view", "points", "Corrected evaluation points"
+    return _ellipsoids(layers, points, spread, given.points[~known], size, told, factor)
 
 
-def ball_views(at: Linearisation, factor: float, sigma: float = 1.0) -> Iterator[Html]:
+def ball_views(at: Linearisation, factor: float, sigma: float = 1.0) -> Iterator[SpatialPicture]:
     """Ellipsoids of each plate's balls in the plate's frame, likewise."""
     design = at.design
     of_balls = at.of_balls()
@@ -145,11 +142,12 @@ def ball_views(at: Linearisation, factor: float, sigma: float = 1.0) -> Iterator
                 "lines", "faint thin", np.concatenate([outline, outline[:1]]), (len(outline) + 1,)
             )
         ]
-        what = f"Balls of {design.artefacts.names[artefact]} in its own frame"
+        plate = design.artefacts.names[artefact]
+        what = f"Balls of {plate} in its own frame"
+        told = f"ball-view-{number}", f"balls of {plate}", what
         open_ = places[np.setdiff1d(members, known)]
-        name = f"ball-view-{number}"
         yield _ellipsoids(
-            layers, places[known], factor * sigma * spread[known], open_, size, name, what, factor
+            layers, places[known], factor * sigma * spread[known], open_, size, told, factor
         )
 
 
@@ -159,11 +157,13 @@ def _ellipsoids(
     spread: Array,
     undetermined: Array,
     size: float,
-    name: str,
-    what: str,
+    told: tuple[str, str, str],
     factor: float,
-) -> Html:
-    """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r)."""
+) -> SpatialPicture:
+    """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r), `told` by
+    a name, in short, and in words.
+    """
+    name, label, what = told
     variances, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
     half = np.sqrt(np.maximum(variances, 0.0))
     longest = float(half.max(initial=0.0))
@@ -182,14 +182,14 @@ def _ellipsoids(
         caption = f"{what}: all {len(undetermined)} are undetermined, and have no ellipsoid."
     elif len(undetermined):
         caption += f" {len(undetermined)} are undetermined: dots without an ellipsoid."
-    return view(layers, name, what, caption)
+    return SpatialPicture(layers, name, label, what, caption)
 
 
 def motion_view(
-    at: Linearisation, motion: Motion, name: str, words: Html, kind: str
-) -> Html | None:
+    at: Linearisation, motion: Motion, name: str, words: str, kind: str, most: int = MOST_MOVING
+) -> SpatialPicture | None:
     """A direction as an enlarged, moving picture of the machine's grid and of the balls that are
-    read; None where it moves neither.
+    read, about `most` of them; None where it moves neither.
     """
     design = at.design
     grid, sizes = _grid(design)
@@ -201,7 +201,7 @@ def motion_view(
     probe = design.evaluation.probe
     if not _largest(of_probes[probe]) > NO_MOTION:
         probe = int(np.argmax([_largest(one) > NO_MOTION for one in of_probes]))
-    readings = design.readings.select(_moving_readings(design))
+    readings = design.readings.select(_moving_readings(design, most))
     balls = locations(design, at.state, readings)
     of_grid, of_balls = of_probes[probe], moved_balls(at, motion, readings)
     largest = max(_largest(of_grid), _largest(of_balls))
@@ -224,7 +224,7 @@ def motion_view(
         what = f"{what} and the balls (orange)"
     told = f". Enlarged {times:,.0f} times: {what}, as against where they are drawn (grey)."
     caption = joined([element("strong", kind), ": ", words, told])
-    return view(layers, name, f"{kind} as a moving picture", caption)
+    return SpatialPicture(layers, name, kind.lower(), f"{kind} as a moving picture", caption)
 
 
 def _largest(moved: Array) -> float:
@@ -249,12 +249,12 @@ def _grid(design: Design) -> tuple[Array, tuple[int, ...]]:
     return lower + points * (upper - lower), (ALONG,) * len(lines)
 
 
-def _moving_readings(design: Design) -> Integers:
+def _moving_readings(design: Design, most: int) -> Integers:
     """Readings of plates whose balls are drawn: each ball of a position once, and of many some."""
     mine = design.plate_readings
     keys = np.stack([design.readings.position[mine], design.readings.ball[mine]], axis=1)
     _, first = np.unique(keys, axis=0, return_index=True)
-    return np.asarray(mine[first[:: -(-len(first) // MOST_MOVING) or 1]])
+    return np.asarray(mine[first[:: -(-len(first) // most) or 1]])
 
 
 def _outline(points: Array) -> Array:

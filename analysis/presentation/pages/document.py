@@ -43,12 +43,17 @@ def shipped(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
+def style() -> Html:
+    """The style of pages."""
+    return Html(f"<style>\n{shipped('marks.css')}{shipped('page.css')}</style>")
+
+
 def written(page: Page) -> str:
     """The page as a file that needs no other and asks no network for anything."""
     sections = [one for one in page.sections if one.body]
     links = joined(element("li", element("a", one.title, href=f"#{one.name}")) for one in sections)
     kind = "verdict" if page.is_good else "verdict bad"
-    head = element(
+    top = element(
         "header",
         element("h1", page.title),
         element("p", *page.origin, class_="note"),
@@ -64,19 +69,20 @@ def written(page: Page) -> str:
     script = shipped("view.js")
     parts = [
         element("a", "Skip to the results", class_="skip", href="#main"),
-        head,
+        top,
         element("main", body, id="main"),
         element("footer", element("p", page.foot)),
         # A script that a person wrote would have another sum, and is not run.
         Html(f"<script>{script}</script>"),
     ]
     return (
-        f'<!DOCTYPE html>\n<html lang="en">\n{_head(page.title, script)}\n'
+        f'<!DOCTYPE html>\n<html lang="en">\n{head(page.title, script)}\n'
         f"{element('body', *parts)}\n</html>\n"
     )
 
 
-def _head(title: str, script: str) -> Html:
+def head(title: str, script: str) -> Html:
+    """The head of a page that runs this script, and no other."""
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:;"
     policy += f" script-src 'sha256-{digest}'"
@@ -87,7 +93,7 @@ def _head(title: str, script: str) -> Html:
         Html(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
         element("link", rel="icon", href="data:,"),
         element("title", title),
-        Html(f"<style>\n{shipped('page.css')}</style>"),
+        style(),
     )
 
 

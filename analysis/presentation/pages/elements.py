@@ -46,7 +46,7 @@ def element(tag: str, *content: str, **attributes: str | float | bool | None) ->
         elif value is not None and value is not False:
             written.append(f'{name}="{escape(in_one_line(str(value)))}"')
     start = f"<{' '.join(written)}>"
-    if tag in ("br", "link", "meta", "input"):
+    if tag in ("br", "img", "input", "link", "meta"):
         return Html(start)
     return Html(f"{start}{joined(content)}</{tag}>")
 

@@ -21,6 +21,7 @@ from .residual_sections import (
     residual_view,
     suspects_section,
 )
+from .spatial import figure_of
 from .uncertainty_sections import (
     estimates_table,
     expansion,
@@ -97,7 +98,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
                 residual_charts(
                     found.standardised, found.position, found.probe, found.positions, found.probes
                 ),
-                residual_view(found.places, np.nan_to_num(found.values), contents.edges),
+                figure_of(residual_view(found.places, np.nan_to_num(found.values), contents.edges)),
                 residual_tables(fit),
             ]
         )

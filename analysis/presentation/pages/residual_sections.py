@@ -15,7 +15,7 @@ from ..svg import round_number
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
-from .spatial import Layer, view
+from .spatial import Layer, SpatialPicture
 
 AXES = "xyz"
 # Of the volume's size, the longest residual takes this part at most.
@@ -84,7 +84,7 @@ def residual_charts(
     )
 
 
-def residual_view(places: Array, residuals: Array, edges: Array) -> Html:
+def residual_view(places: Array, residuals: Array, edges: Array) -> SpatialPicture:
     """Residuals (m, d) at `places` (m, d) as enlarged vectors, with the edges (k, 2, d) of the
     volume.
     """
@@ -98,7 +98,8 @@ def residual_view(places: Array, residuals: Array, edges: Array) -> Html:
         Layer("dots", "s0", places),
     ]
     caption = f"Residuals as vectors from where the balls were read, enlarged {times:,.0f} times."
-    return view(layers, "residual-vectors", "Residuals as vectors in the volume", caption)
+    words = "Residuals as vectors in the volume"
+    return SpatialPicture(layers, "residual-vectors", "residuals", words, caption)
 
 
 def residual_tables(fit: QuotedData) -> Html:

@@ -15,6 +15,7 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array
 
 from ..scene import RISE, TURN, projection
+from .document import shipped
 from .elements import Html, element, joined
 
 WIDTH, HEIGHT = 480.0, 360.0
@@ -51,20 +52,26 @@ class _Eye:
         return np.asarray(np.round([0.5 * WIDTH, 0.5 * HEIGHT] + across * [1.0, -1.0], 1))
 
 
-def view(layers: Sequence[Layer], name: str, words: str, caption: str | Html) -> Html:
+@dataclass(frozen=True, eq=False)
+class SpatialPicture:
+    """Layers as a picture: the `name` is its id on a page, the `label` its short name, and `words`
+    are for those who do not see it.
+    """
+
+    layers: Sequence[Layer]
+    name: str
+    label: str
+    words: str
+    caption: str | Html
+
+
+def figure_of(picture: SpatialPicture) -> Html:
     """The picture as a figure of a page, with its controls."""
-    layers = [one for one in layers if len(one.points)]
+    layers = [one for one in picture.layers if len(one.points)]
     eye = _eye(layers)
     d = len(eye.centre)
     moving = any(one.moves is not None for one in layers)
-    svg = element(
-        "svg",
-        joined(_drawn(one, k, eye) for k, one in enumerate(layers)),
-        viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}",
-        role="img",
-        aria_label=words,
-        tabindex="0" if d == 3 else None,
-    )
+    svg = _svg(layers, eye, picture.words, tabindex="0" if d == 3 else None)
     data = {
         "centre": [round(1e3 * v, 3) for v in eye.centre.tolist()],
         "scale": eye.scale / 1e3,
@@ -78,10 +85,38 @@ def view(layers: Sequence[Layer], name: str, words: str, caption: str | Html) ->
         "figure",
         svg,
         _controls(d, moving),
-        element("figcaption", caption),
+        element("figcaption", picture.caption),
         Html(f'<script type="application/json">{stored}</script>'),
         class_="view moving" if moving else "view",
-        id=name,
+        id=picture.name,
+    )
+
+
+def still(picture: SpatialPicture) -> str:
+    """The picture as an SVG file of its own."""
+    layers = [one for one in picture.layers if len(one.points)]
+    paper = element("rect", width="100%", height="100%", style="fill: var(--paper)")
+    before = Html(f"<style>{shipped('marks.css')}</style>"), paper
+    size = {"width": f"{WIDTH:g}", "height": f"{HEIGHT:g}", "class_": "view"}
+    space = "http://www.w3.org/2000/svg"
+    return _svg(layers, _eye(layers), picture.words, *before, xmlns=space, **size)
+
+
+def _svg(
+    layers: Sequence[Layer],
+    eye: _Eye,
+    words: str,
+    *before: Html,
+    **attributes: str | None,
+) -> Html:
+    return element(
+        "svg",
+        *before,
+        joined(_drawn(one, k, eye) for k, one in enumerate(layers)),
+        viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}",
+        role="img",
+        aria_label=words,
+        **attributes,
     )
 
 

@@ -98,7 +98,8 @@ def _table(rows: Sequence[Sequence[str]], names: int) -> str:
     """Rows below a line of headings, of which the first cells are names."""
 
     def cells(row: Sequence[str], kind: str) -> str:
-        kinds = [f'{kind} class="name"' if k < names else kind for k in range(len(row))]
+        start = f'{kind} scope="col"' if kind == "th" else kind
+        kinds = [f'{start} class="name"' if k < names else start for k in range(len(row))]
         return "".join(
             f"<{one}>{escaped(cell)}</{kind}>" for one, cell in zip(kinds, row, strict=True)
         )

@@ -124,8 +124,10 @@ async function preview(action) {
 
 function choose(name) {
   selected = name;
+  const focused = focus();
   view.show(state.design, selected, { withMap: $("show-map").checked });
   places();
+  refocus(focused);
 }
 
 const micro = (value) => (value === null || value === undefined || Number.isNaN(value) ? "undetermined" : `${Number((1e6 * value).toPrecision(3))}`);
@@ -318,7 +320,7 @@ function places() {
     return make("li", { class: place.name === selected ? "chosen" : "" },
       make("input", { type: "checkbox", checked: true, title: "switch this position off", "aria-label": `read ${place.name}`, onchange: () => act({ do: "off", position: place.name }) }),
       swatch,
-      make("button", { class: "name", onclick: () => choose(place.name) }, place.name),
+      make("button", { class: "name", "aria-label": `choose ${place.name}`, onclick: () => choose(place.name) }, place.name),
       make("small", { title: "readings" }, `${place.readings}`),
     );
   }), ...state.off.map((name) => make("li", { class: "off" },

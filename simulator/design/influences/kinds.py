@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Union, get_args
 
 from pydantic import Field
 
-from ...inputs.messages import ExperimentError, Message
+from ...inputs.messages import refused
 from .drift import DriftSettings
 from .position_scale import PositionScaleSettings
 from .probing import ProbingSettings
@@ -44,7 +44,7 @@ def once_each(classes: Iterable[type[InfluenceSettings]]) -> None:
         for kind in get_args(one.model_fields["kind"].annotation):
             if kind in found:
                 text = f'{one.__name__} has the kind "{kind}", as {found[kind]} has; name another'
-                raise ExperimentError([Message(__file__, 1, 1, "INFLUENCES", text)])
+                raise refused(__file__, text, "INFLUENCES", line=1)
             found[kind] = one.__name__
 
 

@@ -94,7 +94,7 @@ def _refuse_unclear(lines: list[tuple[int, str]], file: str) -> None:
                 f'"{shorten(cell)}" does not say which uncertainty it is; call it'
                 f" {STANDARD}_{unit}, or {EXPANDED}_{unit} beside a column k"
             )
-            raise ExperimentError([place.message("", text)])
+            raise place.refused(text)
 
 
 def _factor(text: str, common: float | None) -> float | None:

@@ -100,7 +100,7 @@ def _axis(path: Path, axis: int) -> tuple[AxisTable, list[str]]:
                 f"the column {listing(unknown)} is not read; columns are {POSITION}, {BACKLASH}"
                 f" and {listing(LETTERS)}"
             )
-            raise ExperimentError([line.mark.message("", text)])
+            raise line.mark.refused(text)
         if POSITION not in line.cells:
             messages.append(line.mark.message("", f"no {POSITION}; write the position"))
             continue
@@ -167,7 +167,7 @@ def _cells(line: str, heads: Sequence[tuple[int, str]], mark: Mark) -> Iterator[
         name = [name for place, name in heads if place <= start][-1:] or [""]
         if name[0] in seen or not name[0]:
             text = f'"{shorten(cell)}" stands under no column of its own; align the columns'
-            raise ExperimentError([mark.message("", text)])
+            raise mark.refused(text)
         seen.add(name[0])
         yield name[0], cell
 

@@ -229,7 +229,7 @@ def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
         positions = block.column(block.arguments[0])[order]
         if len(positions) < 2 or (np.diff(positions) <= 0.0).any():
             text = "needs at least two positions, each once; correct its rows"
-            raise ExperimentError([block.mark.message("", text)])
+            raise block.mark.refused(text)
         values = np.column_stack(
             [
                 block.column(name)[order] if name in block.names else np.zeros(len(positions))
@@ -238,7 +238,7 @@ def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
         )
         if axis in found:
             text = f"a second table of {AXES[axis]}; put the columns of both into one"
-            raise ExperimentError([block.mark.message("", text)])
+            raise block.mark.refused(text)
         found[axis] = AxisTable(axis, positions, values)
     if sorted(found) not in ([0, 1], [0, 1, 2]):
         missing = [AXES[k] for k in range(3) if k not in found]
@@ -253,13 +253,13 @@ def _add_slope(block: _Block, name: str, slopes: Array) -> None:
     values = block.column(name)
     if block.arguments or len(values) != 1:
         text = f"{name} depends on a position; give one row of position errors"
-        raise ExperimentError([block.mark.message("", text)])
+        raise block.mark.refused(text)
     if name in SQUARENESS:
         error = SQUARENESS[name]
         slopes[error.axis, error.to] += error.sign * values[0]
     elif values[0] != 0.0:
         text = f"the position error {name} is not read; {listing(SQUARENESS)} are, leave it out"
-        raise ExperimentError([block.mark.message("", text)])
+        raise block.mark.refused(text)
 
 
 def _grid(block: _Block) -> VolumeTable:
@@ -275,12 +275,12 @@ def _grid(block: _Block) -> VolumeTable:
             f"a table of {', '.join(block.arguments)} has displacements and turns by {last} only,"
             f" which carries the tool; {listing(wrong or ['X'])} cannot be read"
         )
-        raise ExperimentError([block.mark.message("", text)])
+        raise block.mark.refused(text)
     counts = tuple(len(one) for one in nodes)
     if min(counts) < 2 or int(np.prod(counts)) != len(block.rows):
         grid = " x ".join(map(str, counts))
         text = f"{len(block.rows)} rows are no grid of {grid} points; give each point once"
-        raise ExperimentError([block.mark.message("", text)])
+        raise block.mark.refused(text)
     places = tuple(
         np.searchsorted(one, block.column(name)) for one, name in zip(nodes, "XYZ", strict=False)
     )
@@ -288,9 +288,7 @@ def _grid(block: _Block) -> VolumeTable:
     seen = np.zeros(counts, bool)
     seen[places] = True
     if not seen.all():
-        raise ExperimentError(
-            [block.mark.message("", "a point of the grid stands twice; leave one out")]
-        )
+        raise block.mark.refused("a point of the grid stands twice; leave one out")
     for name in single:
         error = AXIS_ERRORS[name]
         values[..., error.component + 3 * error.is_rotation][places] += block.column(name)

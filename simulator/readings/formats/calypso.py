@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from ...inputs.messages import ExperimentError
 from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
@@ -279,7 +278,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     table = _table(text)
     if table is None:
         told = "no headings such as id, actual, nominal, or id, type, x, y, z"
-        raise ExperimentError([text.mark(1).message("", told)])
+        raise text.mark(1).refused(told)
     for line in text.lines[: table.start] if unit is None else ():
         stated = STATED.search(line)
         unit = UNITS[(stated[1] or stated[2]).lower()] if stated else unit

@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ...inputs.messages import ExperimentError, Message
+from ...inputs.messages import refused
 from ...inputs.quantities import QuantityError, exact_number
 from ...inputs.settings import shorten
 from ...inputs.xmltree import Element, parse_xml
@@ -161,7 +161,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     root = parse_xml(content, file)
     if root.name != "QIFDocument" or not NAMESPACE.fullmatch(root.namespace):
         told = f"<{shorten(root.name)}> is no document of QIF 2 or 3"
-        raise ExperimentError([Message(file, root.mark.line, root.mark.column, "", told)])
+        raise refused(file, told, line=root.mark.line, column=root.mark.column)
     problems = ReportProblems(file)
     by_id = {one.attributes["id"]: one for one in root.walk() if "id" in one.attributes}
     document = _Document(root, problems, by_id, _units(root, problems, unit))

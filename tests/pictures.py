@@ -1,0 +1,74 @@
+"""The documentation's pictures of pages and of the studio, which need Playwright and a Chromium:
+`python -m tests.pictures docs/pictures`.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import ballplate as bp
+from ballplate.report.design_contents import page_of_design
+from PIL import Image
+
+from tests.studio import pictures as of_studio
+from tests.studio.chromium import tab
+
+# Height of each picture of a page, and the element that it begins with.
+SHOWN = {
+    "design-page": (880, "h1"),
+    "design-undetermined": (750, "#rank"),
+    "fit-page": (820, "#curves"),
+    "sweep-page": (1010, "h1"),
+}
+WIDTH = 1100
+
+
+def main(folder: Path) -> None:
+    with tempfile.TemporaryDirectory() as temporary:
+        pages = _pages(Path(temporary))
+        with tab(WIDTH, 900) as page:
+            page.emulate_media(reduced_motion="reduce")
+            for name, (height, start) in SHOWN.items():
+                page.goto(pages[name].as_uri())
+                top = page.evaluate(
+                    f"document.querySelector('{start}').getBoundingClientRect().top"
+                )
+                clip = {"x": 0, "y": max(top - 16, 0), "width": WIDTH, "height": height}
+                path = folder / f"{name}.png"
+                page.screenshot(path=str(path), clip=clip, full_page=True)
+    of_studio.main(folder)
+    for path in folder.glob("*.png"):
+        # As many colours as can be told apart, in a file that loads at once.
+        small = Image.open(path).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        small.save(path, optimize=True)
+
+
+def _pages(folder: Path) -> dict[str, Path]:
+    """Pages of the quickstart, without a certificate, of a fit, and of the shipped sweep."""
+    experiment = bp.load("designs/quickstart.yaml")
+    # Nothing tells how long the plate is, since all tips have the same offset.
+    changes: dict[str, object] = {
+        f"positions[{one.name}].probes": ["down"] for one in experiment.positions
+    }
+    changes |= {"title": "The plate without a certificate, read with one probe"}
+    loose = experiment.with_(changes, calibration=None, probes={"down": ["0 mm"] * 3})
+    fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
+    store = folder / "plates.sqlite"
+    bp.sweep("designs/sweeps/plate-size.yaml", store)
+    texts = {
+        "design-page": page_of_design(experiment, bp.run(experiment)),
+        "design-undetermined": page_of_design(loose, bp.run(loose)),
+        "fit-page": fit.page(),
+        "sweep-page": bp.sweep_report(store),
+    }
+    found = {}
+    for name, text in texts.items():
+        found[name] = folder / f"{name}.html"
+        found[name].write_text(text, encoding="utf-8")
+    return found
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

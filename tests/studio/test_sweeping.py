@@ -1,0 +1,121 @@
+"""A sweep from the studio over several axes, of the design as it is on the page."""
+
+from pathlib import Path
+
+import ballplate as bp
+import pytest
+from ballplate.designs import shipped
+from ballplate.simulator.computing.steps import unreported
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.studio.actions import ActionError
+from ballplate.studio.document import DesignDocument, changed, opened
+from ballplate.studio.jobs import JOBS, _work
+from ballplate.studio.sweeping import MOST_CELLS, swept
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> DesignDocument:
+    """A design that is not saved, with a table beside it."""
+    path = tmp_path / "my plate #1.yaml"
+    path.write_text("title: nothing of this is swept\n")
+    tables = tmp_path / "tables"
+    tables.mkdir()
+    for name, length in (("a", 0.5), ("b", 0.75)):
+        rows = [f"{k},{length * (k % 4) / 3},{length * (k // 4) / 3},0" for k in range(16)]
+        (tables / f"{name}.csv").write_text("ball,x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
+    text = Path(shipped("quickstart.yaml")).read_text()
+    return changed(opened(path), text.replace("[5, 5]", "[4, 4]"))
+
+
+def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatch):
+    steps = []
+    monkeypatch.setattr("ballplate.report.page.page", lambda *_: "the page")
+    axes = [
+        {"paths": ["machine.repeatability"], "values": ["0.1 um", "0.4 um"]},
+        {
+            "paths": ["artefacts.plate.size[0]", "artefacts.plate.size[1]"],
+            "values": ["500 mm", "750 mm"],
+        },
+    ]
+    before = sorted(one.name for one in tmp_path.iterdir())
+    found = swept(document, axes, steps.append)
+    assert sorted(one.name for one in tmp_path.iterdir()) == before
+    assert found["headline"].startswith("4 cells, 4 done") and str(steps[-1]).startswith("4 of 4")
+    saved = tmp_path / "saved.yaml"
+    saved.write_text(document.text)
+    experiment = bp.load(saved)
+    for cell in found["cells"]:
+        noise, size = cell["values"]
+        other = experiment.with_(
+            {
+                "machine.repeatability": noise,
+                "artefacts.plate.size[0]": size,
+                "artefacts.plate.size[1]": size,
+            }
+        )
+        lengths = bp.run(other).quantities["U6"]
+        assert cell["average"] == pytest.approx(lengths.average, rel=1e-12)
+        assert cell["maximum"] == pytest.approx(lengths.maximum, rel=1e-12)
+        assert cell["within"] == lengths.within_target and cell["deficiency"] == 0
+    assert len({cell["average"] for cell in found["cells"]}) == 4
+    assert found["page"] == "the page"
+
+
+@pytest.fixture
+def pageless(monkeypatch):
+    def fail(*_, **__):
+        raise ImportError("matplotlib")
+
+    monkeypatch.setattr("ballplate.report.page.page", fail)
+
+
+def test_values_may_name_files_beside_the_design(document, pageless):
+    axes = [
+        {
+            "paths": ["artefacts.plate"],
+            "values": [f"{{kind: balls, file: tables/{name}.csv}}" for name in "ab"],
+        }
+    ]
+    text = document.text.replace("pairs: corner sides", "pairs: all")
+    assert text != document.text
+    found = swept(changed(document, text), axes, unreported)
+    assert [cell["reason"] for cell in found["cells"]] == ["", ""], found
+    assert len({cell["average"] for cell in found["cells"]}) == 2 and found["page"] == ""
+
+
+def test_a_cell_that_fails_says_why(document, pageless):
+    axes = [{"paths": ["machine.repeatability"], "values": ["0.2 um", "2 furlongs"]}]
+    good, bad = swept(document, axes, unreported)["cells"]
+    assert good["reason"] == "" and "furlongs" in bad["reason"] and bad["average"] is None
+
+
+@pytest.mark.parametrize(
+    "axes, words",
+    [
+        ([], "needs a key"),
+        ([{"paths": ["machine.repeatability"], "values": []}], "its values"),
+        ([{"paths": [""], "values": ["1"]}], "a key"),
+        ([{"paths": ["a"], "values": ["1"] * (MOST_CELLS + 1)}], f"at most {MOST_CELLS}"),
+        ([{"paths": ["machine.repeatability"], "values": ["[1"]}], "no value of a file"),
+        ([{"paths": ["title", "title"], "values": ["x"]}], "title"),
+    ],
+)
+def test_what_a_sweep_lacks_is_told(document, axes, words):
+    with pytest.raises((ActionError, ExperimentError)) as told:
+        swept(document, axes, unreported)
+    assert words in str(told.value)
+
+
+def test_a_page_goes_apart_from_the_figures(document, monkeypatch):
+    """Figures are asked for again and again while others run."""
+    monkeypatch.setitem(JOBS, "sweep", lambda *_: {"cells": [], "page": "<!DOCTYPE html>"})
+
+    class Connection(list):
+        send = list.append
+
+        def close(self):
+            pass
+
+    said = Connection()
+    _work(said, "sweep", document, {})
+    assert said == [("page", "<!DOCTYPE html>"), ("done", {"cells": []})]
