@@ -38,11 +38,12 @@ def main(folder: Path) -> None:
                 clip = {"x": 0, "y": max(top - 16, 0), "width": WIDTH, "height": height}
                 path = folder / f"{name}.png"
                 page.screenshot(path=str(path), clip=clip, full_page=True)
-    of_studio.main(folder)
-    for path in folder.glob("*.png"):
+    for name in SHOWN:
         # As many colours as can be told apart, in a file that loads at once.
+        path = folder / f"{name}.png"
         small = Image.open(path).convert("RGB").quantize(256, dither=Image.Dither.NONE)
         small.save(path, optimize=True)
+    of_studio.main(folder)
 
 
 def _pages(folder: Path) -> dict[str, Path]:

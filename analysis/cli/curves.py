@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .common import (
     FITTED,
@@ -15,8 +16,13 @@ from .common import (
     print_lines,
     write_picture,
 )
-from .outputs import UsageError, add_force
+from .outputs import UsageError, Writer, add_force
 from .telling import complain
+
+if TYPE_CHECKING:
+    from ..error_maps.volumetric_results import MachineErrors
+    from ..results.error_curves_result import ErrorCurves
+    from ..results.fitted_errors_result import FittedErrorMap
 
 HELP = "tell the parametric errors of a map that a fit left behind, with their uncertainties"
 DESCRIPTION = (
@@ -66,13 +72,20 @@ def run(options: Namespace) -> int:
         found = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
     except ValueError as error:
         raise UsageError(error) from None
+    show_errors(options, found, found.plot)
+    return 0
+
+
+def show_errors(
+    options: Namespace, found: MachineErrors | FittedErrorMap | ErrorCurves, draw: Writer
+) -> None:
+    """Say what is to be known of errors, draw them, and print them in the form asked for."""
     for note in found.notes:
         complain(note)
     # Before anything is printed that nobody may read to its end.
     if options.plot is not None:
-        write_picture(options, found.plot)
+        write_picture(options, draw)
     if options.format == "json":
         print_json([found.to_dict()])
     else:
         print_lines(found.lines() if options.format == "text" else list(found.point_lines()))
-    return 0

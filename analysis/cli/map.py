@@ -15,13 +15,10 @@ from .common import (
     argument_type,
     at_most,
     count,
-    print_json,
-    print_lines,
     whole,
-    write_picture,
 )
+from .curves import show_errors
 from .outputs import UsageError, add_force
-from .telling import complain
 
 if TYPE_CHECKING:
     from ..error_maps.map_places import Line
@@ -184,16 +181,8 @@ def run(options: Namespace) -> int:
         )
     except ValueError as error:
         raise UsageError(error) from None
-    for note in found.notes:
-        complain(note)
     draw = found.plot
     if options.magnification is not None and isinstance(found, VolumetricMap | FittedErrorMap):
         draw = partial(found.plot, magnification=options.magnification)
-    # Before anything is printed that nobody may read to its end.
-    if options.plot is not None:
-        write_picture(options, draw)
-    if options.format == "json":
-        print_json([found.to_dict()])
-    else:
-        print_lines(found.lines() if options.format == "text" else list(found.point_lines()))
+    show_errors(options, found, draw)
     return 0

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 from .common import add_file, whole
 from .outputs import Needed, UsageError
 from .telling import note
+
+if TYPE_CHECKING:
+    from ..studio.session import Session
 
 STUDIO = Needed("the studio needs", ("starlette", "uvicorn"), "studio")
 
@@ -37,6 +41,15 @@ def _port(text: str) -> int:
     return found
 
 
+def unsaved(session: Session) -> str:
+    """What is to be said when the studio ends."""
+    if session.is_saved:
+        return "nothing is left to be saved"
+    if session.is_recoverable:
+        return "changes are not saved; the same command takes them up again"
+    return "changes are not saved, and could not be kept in the folder of the file"
+
+
 def run(options: Namespace) -> int:
     """Serve the page until the command is interrupted."""
     if STUDIO.is_missing:
@@ -60,6 +73,7 @@ def run(options: Namespace) -> int:
 
             open_new_tab(address)
 
+    options.interruption.kept = lambda: unsaved(session)
     try:
         serve(session, options.port, tell)
     except OSError as error:

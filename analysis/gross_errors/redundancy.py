@@ -101,7 +101,7 @@ def reliability_of(
         for symbol, groups in functions.items()
     }
     done = 0
-    for one in responses(at, None, given):
+    for one in responses(at, given):
         report(ProgressStep("observations", done, row_count(design)))
         done += len(one.rows)
         redundancy[one.rows] = 1.0 - one.hat

@@ -46,7 +46,7 @@ class Response:
         return np.where(left > NIL * self.square, left, 0.0)
 
 
-def responses(at: Linearisation, x: Array | None, given: Patterns) -> Iterator[Response]:
+def responses(at: Linearisation, given: Patterns) -> Iterator[Response]:
     """Responses of all patterns, some at a time."""
     from scipy.sparse import csr_array
 
@@ -56,7 +56,7 @@ def responses(at: Linearisation, x: Array | None, given: Patterns) -> Iterator[R
     wide = np.flatnonzero(~given.is_local)
     first_row = given.matrix.indices[np.minimum(given.matrix.indptr[:-1], given.matrix.nnz - 1)]
     common, own = np.zeros((len(wide), at.balls.common.shape[2])), csr_array((len(wide), n * d))
-    for some in hat_rows(at, x):
+    for some in hat_rows(at, None):
         hat = (some.common**2).sum(axis=1) + (some.own**2).sum(axis=1)
         private = columns_of_balls(some.own, some.ball, n)
         here = np.zeros(matrix.shape[0], bool)

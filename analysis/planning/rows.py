@@ -207,7 +207,7 @@ def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
     if not len(design.of(Lengths)):
         return {}
     by_position = design.once(length_whitening).by_position(
-        design.of(Lengths), length_derivative(design, drawn.state, None)
+        design.of(Lengths), length_derivative(design, drawn.state)
     )
     derivative = by_position.rows
     shared = (

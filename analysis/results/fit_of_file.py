@@ -8,7 +8,7 @@ from typing import Literal
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.map_files import BINARY
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.yamltree import Mapping, read_tree
 from ballplate.simulator.readings.reading_files import read_readings
 
@@ -53,5 +53,5 @@ def fit_of_file(path: Path) -> Fit:
     observed = read_readings(files, lay_out(experiment), settings=experiment.readings)
     found = fit(experiment, observed)
     if not found.converged:
-        raise ExperimentError([experiment.message((), found.complaint)])
+        raise experiment.refused((), found.complaint)
     return found

@@ -183,8 +183,9 @@ def _work(
             connection.send(("page", page))
     except ExperimentError as error:
         connection.send(("failed", "\n".join(map(str, error.messages))))
-    except (ValueError, TypeError, KeyError, ImportError, OSError) as error:
-        connection.send(("failed", f"{error}"))
+    except Exception as error:
+        # Whatever it is, a person who waits is told of it.
+        connection.send(("failed", str(error) or type(error).__name__))
     else:
         connection.send(("done", result))
     finally:

@@ -27,7 +27,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .recovery import give_up, keep, recovered
+from .recovery import give_up, keep, kept_in, recovered
 
 ENDINGS = (".yaml", ".yml")
 
@@ -108,6 +108,7 @@ class Session:
                 "kept": self._kept,
                 "files": [one.name for one in self._files()],
                 "jobs": list(JOBS),
+                "recoverable": self.is_recoverable,
                 "note": self.note,
             }
 
@@ -115,6 +116,12 @@ class Session:
     def is_saved(self) -> bool:
         with self._lock:
             return self._now.document.is_saved or not self._now.document.back
+
+    @property
+    def is_recoverable(self) -> bool:
+        """Whether nothing is lost if the studio ends now."""
+        with self._lock:
+            return self.is_saved or kept_in(self._now.document.path).exists()
 
     def act(self, action: Mapping[str, Any]) -> None:
         """Do something with the design; where it fails in any way all is as before.

@@ -29,21 +29,20 @@ BANDWIDTH = "_bandwidth"
 MOST_POINTS = 100_000
 
 
-def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
+def read_curves(path: Path) -> dict[str, Points]:
     """Read curves of one axis from a file whose first line names the columns, such as
     position_mm,EXX_um,EAX_urad.
 
-    With `bandwidths` columns such as EXX_bandwidth_um are curves too.
-
     :raises ExperimentError: everything that is wrong with the file at once.
     """
-    return read_numbered_curves(path, bandwidths)[0]
+    return read_numbered_curves(path)[0]
 
 
 def read_numbered_curves(
     path: Path, bandwidths: bool = False
 ) -> tuple[dict[str, Points], tuple[int, ...]]:
-    """The same with the number of each point's line.
+    """The same with the number of each point's line; with `bandwidths` columns such as
+    EXX_bandwidth_um are curves too.
 
     :raises ExperimentError: as `read_curves`.
     """

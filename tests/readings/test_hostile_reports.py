@@ -5,6 +5,7 @@ give centres that were written: never another one, no traceback and no waiting.
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
@@ -181,3 +182,15 @@ def test_what_is_no_text_is_refused_by_every_reader(
     captured = capsys.readouterr()
     assert str(path) in captured.err and "Traceback" not in captured.err
     assert captured.out == ""
+
+
+def test_decimal_commas_in_dmis_are_refused() -> None:
+    """Also where some co-ordinates are whole numbers, or decimals begin with no zero."""
+    whole = WRITTEN["dmis"][1]()
+    assert read("dmis", re.sub(r"(\d)\.(\d)", r"\1,\2", whole).encode()) is None
+    for numbers in ("749,5,-1,25,250,5,22", "0,00112,5,250,22", "1,5,2,5,3,5,22,5"):
+        said = f"FILNAM/'A'\nUNITS/MM,ANGDEC\nFA(S)=FEAT/SPHERE,OUTER,CART,{numbers}\nENDFIL\n"
+        assert read("dmis", said.encode()) is None, numbers
+    upright = "FILNAM/'A'\nUNITS/MM,ANGDEC\nFA(S)=FEAT/SPHERE,OUTER,CART,1,2,3,22,0,0,1\nENDFIL\n"
+    found = read("dmis", upright.encode())
+    assert found is not None and found.features[0].centre == pytest.approx((0.001, 0.002, 0.003))

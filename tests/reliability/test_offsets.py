@@ -88,7 +88,7 @@ def test_effects_of_offsets_are_those_of_two_fits(text: str, tmp_path: Path) -> 
         kind: changes_of(at, kind(mixed), given)(np.zeros(0, np.int64))
         for kind in (Coordinates, Distances)
     }
-    found = list(responses(at, None, given))
+    found = list(responses(at, given))
     tasks = design.tasks
 
     def all_of(biased: Design) -> dict[str, Real]:

@@ -7,7 +7,7 @@ import re
 import pytest
 from ballplate.presentation.pages.document import shipped
 
-STYLE = shipped("page.css")
+STYLE = shipped("marks.css") + shipped("page.css")
 SCHEMES = [
     dict(re.findall(r"--([\w-]+): (#\w{6})", block))
     for block in re.findall(r":root \{(.*?)\}", STYLE, re.DOTALL)

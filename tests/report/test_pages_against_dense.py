@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from ballplate.presentation.pages.design_views import ball_views, motion_view, point_view
 from ballplate.presentation.pages.elements import Html
+from ballplate.presentation.pages.spatial import figure_of
 from ballplate.rank.motions import null_motions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
@@ -46,8 +47,8 @@ def test_ellipsoids_are_those_of_the_dense_covariance() -> None:
     problem = dense.planned(at.design, 3, 2)
     covariance = dense.linearised(problem).covariance
     symbols = dense.quantities(problem)
-    for figure, symbol in ((point_view(at, 2.0), "U4"), (*ball_views(at, 2.0), "U1")):
-        layers, times, caption = picture(figure)
+    for view, symbol in ((point_view(at, 2.0), "U4"), (*ball_views(at, 2.0), "U1")):
+        layers, times, caption = picture(figure_of(view))
         assert "k = 2," in caption
         linear = dense.jacobian(symbols[symbol], problem.parameters)
         (drawn,) = (one for one in layers if one["kind"] == "ellipsoids")
@@ -74,11 +75,11 @@ def test_what_moves_in_a_picture_is_of_the_dense_null_space(changes: dict[str, A
     found = dense.linearised(problem)
     motions = null_motions(at)
     assert len(motions) == found.deficiency
-    figures = [motion_view(at, one, "motion", Html("words"), "Undetermined") for one in motions]
-    drawn = [one for one in figures if one is not None]
+    views = [motion_view(at, one, "motion", Html("words"), "Undetermined") for one in motions]
+    drawn = [one for one in views if one is not None]
     assert drawn
-    for figure in drawn:
-        layers, times, caption = picture(figure)
+    for view in drawn:
+        layers, times, caption = picture(figure_of(view))
         told = re.search(r"with the probe (\w+) ", caption)
         assert told is not None
         tip = experiment.probes[told[1]].offset

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from ballplate.cli.studio import unsaved
 from ballplate.designs import shipped
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.studio.jobs import JOBS
@@ -49,6 +50,7 @@ def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     assert not kept_in(design).exists()
     session.act({"do": "turn", "position": "z low"})
     text = session.state()["text"]
+    assert unsaved(session) == "changes are not saved; the same command takes them up again"
     assert kept_in(design).stat().st_mode & 0o077 == 0
     # The first session is gone without another word.
     again = Session(design)
@@ -59,6 +61,7 @@ def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     assert not kept_in(design).exists()
     again.act({"do": "redo"})
     again.act({"do": "save"})
+    assert unsaved(again) == "nothing is left to be saved"
     assert design.read_text() == text and not kept_in(design).exists()
     assert Session(design).state()["note"] == ""
 
@@ -109,7 +112,9 @@ def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, 
     monkeypatch.setattr("ballplate.studio.recovery.replace_file", fail)
     session = Session(design)
     session.act({"do": "turn", "position": "z low"})
-    assert session.state()["back"] == 1 and not kept_in(design).exists()
+    state = session.state()
+    assert state["back"] == 1 and not state["recoverable"] and not kept_in(design).exists()
+    assert "could not be kept" in unsaved(session)
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):

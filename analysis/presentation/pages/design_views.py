@@ -95,8 +95,8 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         caption += " Positions are numbered as in the run sheet."
     if len(design.readings.ball) and max(_counts(design)) > most:
         caption += " Only some of the balls are drawn."
-    told = joined([caption, turning_words(design)])
-    return SpatialPicture(layers, "volume-view", "positions", words, told)
+    whole = joined([caption, turning_words(design)])
+    return SpatialPicture(layers, "volume-view", "positions", words, whole)
 
 
 def turning_words(design: Design) -> Html:

@@ -11,6 +11,7 @@ let suggestions = [];
 let fits = null;
 let previewing = null;
 let polling = null;
+let running = []; // computations as they were when they were asked after last
 let typed = false; // the text beside the design has changes that are not applied
 let lost = null; // waits for a studio that does not answer
 let scaling = null; // asks for what carries scale, once nothing else is asked
@@ -24,7 +25,7 @@ async function ask(path, body) {
     response = await fetch(path, options);
   } catch {
     await_studio();
-    throw new Error("The studio does not answer. Start it again with the same command: changes that are not saved are kept, and are there again.");
+    throw new Error(`The studio does not answer. ${!state || state.recoverable ? "Start it again with the same command: changes that are not saved are there again." : "Changes are not saved, and could not be kept in the folder of the file: copy the text of the file before you leave this page."}`);
   }
   const text = await response.text();
   let data;
@@ -175,6 +176,7 @@ function show() {
   if (fits?.fingerprint !== state.fingerprint) fits = null;
   view.residuals(fits, fits?.scale);
   suggested();
+  computations(running);
   refocus(focused);
 }
 
@@ -420,22 +422,35 @@ async function poll() {
       tell(`residuals are drawn ${Number(fits.scale.toPrecision(2)).toLocaleString("en")} times their size`);
     }
   }
-  computations(list);
+  running = list;
+  computations(running);
   if (list.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
 }
 
 function computations(list) {
   // What was suggested is shown with the suggestions.
   const told = list.filter((job) => job.state !== "done" || !["suggest", "next"].includes(job.job));
-  $("jobs").replaceChildren(...told.map((job) => make("li", { "data-state": job.state },
-    make("strong", {}, job.job), ` ${job.state}${job.state === "running" && job.step ? `: ${job.step}` : ""} `,
+  // An item is made anew only where it has changed: nobody can press a button that is replaced all the time.
+  const there = new Map([...$("jobs").children].map((one) => [one.dataset.said, one]));
+  const items = told.map((job) => {
+    const said = JSON.stringify([state.session, job.id, job.state, job.page, job.fingerprint === state.fingerprint]);
+    const item = there.get(said) ?? computation(job, said);
+    item.querySelector(".step").textContent = job.state === "running" && job.step ? `: ${job.step}` : "";
+    return item;
+  });
+  if (items.length !== $("jobs").children.length || items.some((one, k) => one !== $("jobs").children[k])) $("jobs").replaceChildren(...items);
+}
+
+function computation(job, said) {
+  return make("li", { "data-state": job.state, "data-said": said },
+    make("strong", {}, job.job), ` ${job.state}`, make("span", { class: "step" }), " ",
     make("button", { "data-focus": `job ${job.id}`, onclick: async () => { await ask("/api/stop", { id: job.id }); poll(); } }, job.state === "running" ? "stop" : "close"),
     " ", job.page ? make("a", { href: `/pages/${job.id}`, target: "_blank", rel: "noopener", "data-page": "" }, "open its page") : null,
     job.fingerprint === state.fingerprint ? null : make("small", {}, " of an earlier design"),
     job.state === "failed" ? make("pre", {}, String(job.result)) : null,
     job.state === "done" && job.result?.lines ? make("pre", { tabindex: "0" }, [...(job.result.notes ?? []), ...job.result.lines].join("\n")) : null,
     job.state === "done" && job.job === "sweep" ? table(job.result, job.page) : null,
-  )));
+  );
 }
 
 // The last keys of paths, which tell enough where there is little room.

@@ -59,7 +59,7 @@ def read_digital(
         text = f'{path.name}: {many} called "{shorten(settings.result)}"; it has {labels}'
         problems.add((*steps, "result"), text)
         return None
-    forms = _forms(wanted, is_pair)
+    forms = _forms(wanted)
     by_result = [_matched(one, forms) for one in chosen]
     full = [k for k, found in enumerate(by_result) if len(found) == len(wanted)]
     if len(full) > 1:
@@ -151,7 +151,7 @@ def _words(text: str) -> tuple[str, ...]:
     return tuple(word for word in re.split(r"[\s_\-–—/.,:;|()\[\]]+", text.casefold()) if word)
 
 
-def _forms(wanted: Sequence[tuple[str, str]], is_pair: bool) -> dict[tuple[str, ...], int]:
+def _forms(wanted: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], int]:
     """Words that name each value, in either order; those that name several are left out."""
     forms: dict[tuple[str, ...], int] = {}
     for k, (first, second) in enumerate(wanted):

@@ -109,10 +109,10 @@ def length_name(design: Design, length: int, of_reading: bool = True) -> str:
     return f"length {design.balls.names[ball]}-{design.balls.names[other]} of {artefact}"
 
 
-def length_derivative(design: Design, state: State, x: Array | None) -> Array:
+def length_derivative(design: Design, state: State) -> Array:
     """Derivative (m, s) of lengths less those expected by all shared parameters, in metres."""
     layout = design.once(shared_layout)
-    return _length_derivative(design, layout, state, _measured(design, state, x))
+    return _length_derivative(design, layout, state, _measured(design, state, None))
 
 
 def _length_derivative(

@@ -15,7 +15,7 @@ from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
 from .columns import headings, is_number, with_point
-from .report import UNSTATED, Feature, Format, Report, ReportProblems, System
+from .report import AXES, UNSTATED, Feature, Format, Report, ReportProblems, System, centre_of
 from .text import Text, read_lines
 
 UNITS = {
@@ -75,7 +75,6 @@ AGREEMENT = Fraction(2)
 # Lines at the beginning among which the headings are.
 MOST_BEFORE = 200
 LONGEST = 300
-AXES = "XYZ"
 
 
 @dataclass(frozen=True)
@@ -134,9 +133,8 @@ class _Located:
 
     def feature(self) -> Feature:
         """The feature, lacking its centre if an axis was not told."""
-        missing = [axis for axis in AXES if axis not in self.axes]
+        centre, missing = centre_of(self.axes)
         lacks = f"no value of {' or '.join(missing)}" if missing else ""
-        centre = None if missing else (self.axes["X"], self.axes["Y"], self.axes["Z"])
         system: System = "part" if self.alignment else "unstated"
         system = "machine" if self.alignment.casefold() in OF_MACHINE else system
         return Feature(

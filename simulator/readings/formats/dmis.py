@@ -201,6 +201,10 @@ class _Reader:
                 told = "the file ends within this line; end it, or take a whole copy"
             self.problems.add(one.mark, told)
             return nowhere
+        if _has_decimal_commas(numbers) or (least == 4 and not _is_sphere(numbers)):
+            told = f"{len(numbers)} numbers where DMIS has {least}; are commas meant as decimal"
+            self.problems.add(one.mark, f"{told} points? DMIS has points: export it so")
+            return nowhere
         for text in numbers[3:least]:
             self.problems.length(text, self.unit, one.mark)
         if form.upper() == "CART":
@@ -223,6 +227,25 @@ class _Reader:
             return math.nan
         total = sum((part / 60**k for k, part in enumerate(parts)), Fraction(0))
         return float(total * ANGLES[self.angle]) * (-1.0 if text.startswith("-") else 1.0)
+
+
+def _has_decimal_commas(numbers: list[str]) -> bool:
+    """Whether a number has zeros before its digits, as decimals behind a comma have.
+
+    >>> _has_decimal_commas(["749", "99877", "-0", "00121"]), _has_decimal_commas(["0.00121", "0"])
+    (True, False)
+    """
+    return any(re.match(r"[+-]?0[0-9]", one) for one in numbers)
+
+
+def _is_sphere(numbers: list[str]) -> bool:
+    """Whether numbers are a centre and a diameter, and perhaps a direction."""
+    if len(numbers) != 7:
+        return len(numbers) == 4
+    try:
+        return abs(math.hypot(*map(float, numbers[4:])) - 1.0) < 0.01
+    except ValueError:
+        return False
 
 
 def _of_points(reader: _Reader) -> Iterator[Feature]:

@@ -16,7 +16,17 @@ from ...inputs.quantities import LENGTH_UNITS
 from ...inputs.settings import shorten
 from ...inputs.yamltree import Mark
 from .columns import is_number, with_point
-from .report import CIRCLE, SPHERE, UNSTATED, Feature, Format, Report, ReportProblems
+from .report import (
+    AXES,
+    CIRCLE,
+    SPHERE,
+    UNSTATED,
+    Feature,
+    Format,
+    Report,
+    ReportProblems,
+    centre_of,
+)
 from .text import Text, read_lines
 
 UNITS = {"MM": LENGTH_UNITS["mm"], "IN": LENGTH_UNITS["in"], "INCH": LENGTH_UNITS["in"]}
@@ -34,7 +44,6 @@ BEGINNING = re.compile(
     r"^[ \t]*(?:DIM(?:ENSION)?[ \t][^=\n]*=|AX[ \t]+(?:NOM|MEAS|\+TOL))|\bPC-?DMIS\b",
     re.MULTILINE | re.IGNORECASE,
 )
-AXES = "XYZ"
 LONGEST = 1000
 # Columns about which a row has to agree: nominal + deviation = measured, to this many units of the
 # last digit.
@@ -69,9 +78,8 @@ class _Located:
 
     def feature(self) -> Feature:
         """The feature, lacking its centre if an axis was not told."""
-        missing = [axis for axis in AXES if axis not in self.axes]
+        centre, missing = centre_of(self.axes)
         lacks = f"no row {' or '.join(missing)}" if missing else ""
-        centre = None if missing else (self.axes["X"], self.axes["Y"], self.axes["Z"])
         return Feature(
             *(self.mark, self.name, self.kind, centre),
             probe=self.probe,

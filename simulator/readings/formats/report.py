@@ -16,6 +16,7 @@ from ...machines.protocol import Array
 Place = tuple[float, float, float]
 System = Literal["machine", "part", "unstated"]
 
+AXES = "XYZ"
 SPHERE, CIRCLE, POINT = "sphere", "circle", "point"
 # Features of which the centre may be a reading, or a point on a ball.
 LOCATED = (SPHERE, CIRCLE, POINT)
@@ -70,6 +71,12 @@ class Format:
     title: str
     recognises: Callable[[str], bool]
     read: Callable[[bytes, str, Fraction | None], Report]
+
+
+def centre_of(axes: Mapping[str, float]) -> tuple[Place | None, list[str]]:
+    """The centre that co-ordinates by their axes make, None without all; and which are missing."""
+    missing = [axis for axis in AXES if axis not in axes]
+    return (None if missing else (axes["X"], axes["Y"], axes["Z"])), missing
 
 
 @dataclass
