@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .common import add_file, add_goal, add_json, number, show, single
 from .outputs import UsageError
-from .reading_options import add_readings_argument
+from .reading_options import add_readings_argument, refuse_wrong_order
 from .table_options import add_tables
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _seconds(text: str) -> float:
 
 
 def run(options: Namespace) -> int:
-    """Print the line, or one each time in a folder; 0 once the target is met, otherwise 1."""
+    """Print the answer, or one each time in a folder; 0 once the target is met, otherwise 1."""
     from dataclasses import replace
 
     from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
@@ -75,6 +75,7 @@ def run(options: Namespace) -> int:
         raise UsageError("--interval goes with --watch; leave it out")
     if options.watch is not None and not options.watch.is_dir():
         raise UsageError(f"--watch {options.watch}: no such folder")
+    refuse_wrong_order(options)
     try:
         goal = parse_goal(options.goal, options.share)
         experiment = with_options(options, single(options, planning=True))

@@ -60,6 +60,33 @@ def add_readings_argument(parser: ArgumentParser, help: str) -> None:
     readings.required = False
 
 
+def refuse_wrong_order(options: Namespace) -> None:
+    """Refuse readings before the experiment file, and what is no table of readings after it.
+
+    :raises UsageError: they are so given.
+    """
+    first = options.files[0]
+    for second in options.readings:
+        if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
+            raise UsageError(
+                "the experiment file comes first, then the readings:"
+                f" {options.command} {second} {first}"
+            )
+        refuse_other_files(second)
+
+
+def refuse_other_files(path: Path) -> None:
+    """Refuse a file that is a map, or another file of YAML, in the place of readings.
+
+    :raises UsageError: it is one.
+    """
+    if path.suffix.lower() in (".yaml", ".yml", ".npz"):
+        raise UsageError(
+            f"{path} is no table of readings; give a table or a report of a measuring program"
+            " (ballplate diff compares maps)"
+        )
+
+
 def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]:
     """The experiment that the options choose and its readings; says what is to be said of these.
 
@@ -68,13 +95,7 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
     """
     from ballplate.simulator.readings.certificate_files import read_certificate
 
-    first = options.files[0]
-    for second in options.readings:
-        if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
-            raise UsageError(
-                "the experiment file comes first, then the readings:"
-                f" {options.command} {second} {first}"
-            )
+    refuse_wrong_order(options)
     experiment = with_options(options, single(options))
     stated = len(experiment.doubts)
     if options.certificate:

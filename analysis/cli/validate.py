@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .common import add_json
 from .outputs import UsageError
-from .reading_options import add_readings, observed_readings, tables, warn_of
+from .reading_options import add_readings, observed_readings, refuse_other_files, tables, warn_of
 
 HELP = "leave out positions, plates and directions in turn and predict them; compare two campaigns"
 DESCRIPTION = (
@@ -47,6 +47,8 @@ def run(options: Namespace) -> int:
 
     if options.other_plate and not options.against:
         raise UsageError("--other-plate goes with --against only; leave it out")
+    for path in options.against:
+        refuse_other_files(path)
     experiment, observed = observed_readings(options)
     result: FitResult
     if options.against:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from random import Random
 
+import ballplate as bp
 import pytest
 from ballplate.cli import main, parser
 
@@ -90,6 +92,27 @@ def test_a_value_with_an_option_that_is_unknown(capsys: pytest.CaptureFixture[st
 def test_a_mistyped_choice(capsys: pytest.CaptureFixture[str]) -> None:
     told = complaint(capsys, "check", "x.yaml", "--format", "juint")
     assert told.endswith("argument --format: invalid choice: 'juint'; did you mean \"junit\"?")
+
+
+def test_files_in_each_others_place_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Readings before the experiment, and maps in the place of readings."""
+    design = "designs/quickstart.yaml"
+    for arguments, words in (
+        (["next", "readings.csv", design], f"first, then the readings: next {design} readings.csv"),
+        (["budget", "readings.csv", design], "the experiment file comes first"),
+        (["fit", design, "map.npz"], "map.npz is no table of readings"),
+        (["next", design, "map.yaml"], "map.yaml is no table of readings"),
+        (["validate", design, "r.csv", "--against", "map.yaml"], "map.yaml is no table"),
+        (["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"], "r.csv is no map file"),
+    ):
+        if "--after" in arguments:
+            fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+            bp.write_map(fit.to_map(), tmp_path / "map.yaml")  # type: ignore[attr-defined]
+            arguments = [str(tmp_path / one) if one == "map.yaml" else one for one in arguments]
+        assert main(arguments) == 2, arguments
+        assert words in capsys.readouterr().err
 
 
 def test_the_grammar_of_one_command_is_that_among_all() -> None:

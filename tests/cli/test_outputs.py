@@ -241,7 +241,8 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(certificate),
     ]
     assert main(arguments) == 0
-    shutil.copy(readings, folder / "again.csv")
+    again = ["-o", str(folder / "again.csv"), "--seed", "2"]
+    assert main(["simulate", str(folder / "design.yaml"), *again]) == 0
     (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
     (folder / "pairs.csv").write_text("first,second\nA,B\n", encoding="utf-8")
     fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]

@@ -122,6 +122,7 @@ VARIANTS = {
     "angles": "any angles",
 }
 WITHOUT_CERTIFICATE = ("angles", "dummy")
+AGAIN = ("small", "tables", "bar-bell")
 READINGS_OF = ("small", "tables", "splines", "bar-bell", "bryan-gauge", "dummy", "angles")
 
 
@@ -195,10 +196,12 @@ def _make_readings(folder: Path) -> None:
         folder, "plan", "pool.yaml", "--positions", "2", "--workers", "1", "-o", "planned.yaml"
     )
     _ballplate(folder, "simulate", "planned.yaml", "-o", "planned-readings.csv")
-    for name in ("map.yaml", "map.npz"):
-        _ballplate(
-            folder, "fit", "small.yaml", "small-readings.csv", "-o", name, "--date", "2026-11-22"
-        )
+    for name in AGAIN:
+        variant = ["--variant", VARIANTS[name]] if name in VARIANTS else []
+        again = ["-o", f"{name}-again.csv", "--seed", "9"]
+        _ballplate(folder, "simulate", f"{name}.yaml", *again, *variant)
+    for name, readings in (("map.yaml", "small-readings.csv"), ("map.npz", "small-again.csv")):
+        _ballplate(folder, "fit", "small.yaml", readings, "-o", name, "--date", "2026-11-22")
     points = "name,probe,x_mm,y_mm,z_mm\nA,down,50,200,100\nB,right,450,200,100\n"
     (folder / "to-correct.csv").write_text(points, encoding="utf-8")
     (folder / "lengths.csv").write_text("first,second\nA,B\n", encoding="utf-8")

@@ -66,7 +66,7 @@ RECIPES = (
     "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
     (
         "adjust bar-bell.yaml bar-bell-readings.csv --variant 'length known' --scale 'x=22 um/m'"
-        " --turn 'y+x=0.02 turns of 1 mm at 400 mm' --after bar-bell-readings.csv -o out.yaml"
+        " --turn 'y+x=0.02 turns of 1 mm at 400 mm' --after bar-bell-again.csv -o out.yaml"
     ),
     "adjust small.yaml small-readings.csv --scale 'x=2 um/m' --uncertainty 2% --json",
     "adjust map.yaml --turn 'y-x=2 arcsec' --after map.npz --force -o out.npz",
@@ -86,7 +86,7 @@ RECIPES = (
     "validate small.yaml small-readings.csv --sigma estimated",
     (
         "validate tables.yaml tables-readings.csv --certificate tables-certificate.csv --against"
-        " tables-readings.csv --other-plate --json"
+        " tables-again.csv --other-plate --json"
     ),
     "convert map.yaml --to empirical -o out.yaml",
     "convert map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
