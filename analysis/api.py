@@ -749,12 +749,12 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     design of an experiment, or of a fit.
 
     `by` splits the readings by axis, probe, position or artefact; as they are by default, they are
-    one source. Contributions add in squares.
+    one source. Contributions add in squares; the largest comes first.
 
     >>> budget(quickstart())
     <UncertaintyBudget of quickstart: readings 75 % of the variance of U6>
     >>> budget(fit(quickstart(), simulate(quickstart())), by="probe").sources[0]
-    'readings with down'
+    'calibration[0]: distances of plate'
     """
     from .results.budget import budget as budget_of
     from .results.fit import Fit

@@ -206,7 +206,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3)), ValueError, "the grid has 2 numbers"),
     (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3, "4")), TypeError, r"grid\[2\]='4'; give"),
     (lambda: bp.lengths(QUICKSTART, "1 um", probe="dwn"), ValueError, 'did you mean "down"'),
-    (lambda: bp.map(3), TypeError, "machine=3; give the path of a file"),
+    (lambda: bp.map(3), TypeError, r"machine=3; give a fit, what its to_map\(\) gives, or a path"),
     (lambda: bp.map(MACHINE, error="EXQ"), ValueError, 'states no error "EXQ"'),
     (lambda: bp.map(MACHINE, grid=(2, 2)), ValueError, "give three numbers of points"),
     (lambda: bp.map(MACHINE, points=3), ValueError, "points go with a line"),
