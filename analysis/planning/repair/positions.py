@@ -41,27 +41,27 @@ def positions(experiment: Experiment) -> Iterator[Change]:
         layout = experiment.layouts[artefact]
         makers = _plate_poses if is_plate(experiment, artefact) else _bar_poses
         for words, plane, pose in makers(experiment, artefact):
-            names = _probes_across(experiment, artefact, plane)
+            across = _probes_across(experiment, artefact, plane)
             every = np.arange(len(layout.names))
             name = _free_name(experiment, f"more {plane or ''}".strip())
-            new = Position(
-                name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),)
-            )
-            if d == len(pose[1]) and is_inside(new, layout, volume, experiment.probes):
-                told = f"read {artefact} once more {words}"
-                if d == 3 and len(experiment.probes) > 1:
-                    told += (
-                        f", with {'probe' if len(names) == 1 else 'probes'} {' and '.join(names)}"
-                    )
-                add = partial(with_added, position=new)
-                yield Change(
-                    ChangeKind.ADD_POSITION,
-                    told,
-                    float(new.count),
-                    frozenset({f"more {words}"}),
-                    add,
-                    new,
+            for names in dict.fromkeys((across, tuple(experiment.probes))):
+                new = Position(
+                    name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),)
                 )
+                if d == len(pose[1]) and is_inside(new, layout, volume, experiment.probes):
+                    told = f"read {artefact} once more {words}"
+                    if d == 3 and len(experiment.probes) > 1:
+                        probes = "probe" if len(names) == 1 else "probes"
+                        told += f", with {probes} {' and '.join(names)}"
+                    add = partial(with_added, position=new)
+                    yield Change(
+                        ChangeKind.ADD_POSITION,
+                        told,
+                        float(new.count),
+                        frozenset({f"more {words}"}),
+                        add,
+                        new,
+                    )
 
 
 def with_added(experiment: Experiment, position: Position) -> Experiment:

@@ -71,7 +71,8 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
     if isinstance(model, KinematicSettings) and not isinstance(model.basis, SplineSettings):
         keys = (
             ("position_coefficients", 2, "coefficients of positional errors"),
-            ("rotation_coefficients", 1, "coefficients of rotational errors"),
+            # Of one coefficient there would be no rotational errors at all.
+            ("rotation_coefficients", 2, "coefficients of rotational errors"),
         )
     elif isinstance(model, EmpiricalSettings) and model.terms in tuple(OF_BASIS):
         keys = (
@@ -91,5 +92,5 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
                 if value != 1
                 else words.replace("coefficients", "coefficient").replace("knots", "knot")
             )
-            told = f"ask for {value} {what} instead of {now}"
+            told = f"ask for {value} {what} instead of {now}, taking the others as zero"
             yield Change(ChangeKind.MODEL, told, float(now - value), frozenset({"model"}), apply)
