@@ -187,6 +187,41 @@ def test_a_dense_computation_agrees(file: str, variant: str) -> None:
         assert dense.spread(whole).deficiency == (0 if changes else 2)
 
 
+FLAT = """\
+title: two level positions
+machine: {volume: [700 mm, 1000 mm, 600 mm], repeatability: 0.5 um}
+error_model:
+  {kind: kinematic, arrangement: MB2, position_coefficients: 4, rotation_coefficients: 4}
+probes: {down: [0 mm, 0 mm, -120 mm], right: [80 mm, 0 mm, -60 mm], left: [-80 mm, 0 mm, -60 mm]}
+artefacts: {plate: {kind: grid, balls: [6, 5], size: [500 mm, 400 mm]}}
+positions:
+  - {name: low, plane: z, level: 50 mm, corner: {x: 100 mm, y: 50 mm}, probes: [down]}
+  - {name: high, plane: z, level: 450 mm, corner: {x: 100 mm, y: 500 mm}, quarter_turns: 1,
+     probes: [down]}
+calibration: [{kind: coordinates, balls: [r1c1, r1c6, r5c1], standard_uncertainty: 0.4 um}]
+evaluation: {points: {random: 20, seed: 1}, probe: down}
+"""
+
+
+def test_a_model_is_not_made_poorer_where_more_readings_help(tmp_path: Path) -> None:
+    path = tmp_path / "flat.yaml"
+    path.write_text(FLAT)
+    experiment = load(path)[0]
+    found = repairs(experiment)
+    assert found is not None and found.complete
+    for one in found.complete:
+        assert not any(change.kind is ChangeKind.MODEL for change in one.changes)
+        problem = dense.planned(lay_out(apply_all(one.changes, experiment)), 4, 4)
+        whole = dense.jacobian(
+            lambda step, of=problem: dense.residuals(of, step), problem.parameters
+        )  # type: ignore[misc]
+        assert dense.spread(whole).deficiency == 0
+    # Where a poorer model is offered, its words say what becomes of the rest.
+    words = [one.words for one in offers(experiment)[ChangeKind.MODEL]]
+    assert words and all(one.endswith("taking the others as zero") for one in words)
+    assert not any("ask for 1 coefficient of rotational" in one for one in words)
+
+
 def test_words_name_errors_and_positions() -> None:
     experiment = design("npl/6.1.1", "B")
     lines = repair_lines(repaired("npl/6.1.1", "B"), check(experiment).verdict)

@@ -232,10 +232,12 @@ class _Reader:
 def _has_decimal_commas(numbers: list[str]) -> bool:
     """Whether a number has zeros before its digits, as decimals behind a comma have.
 
-    >>> _has_decimal_commas(["749", "99877", "-0", "00121"]), _has_decimal_commas(["0.00121", "0"])
-    (True, False)
+    >>> _has_decimal_commas(["749", "99877", "-0", "00121"])
+    True
+    >>> _has_decimal_commas(["0.00121", "00749.998", "0"])
+    False
     """
-    return any(re.match(r"[+-]?0[0-9]", one) for one in numbers)
+    return any(re.fullmatch(r"[+-]?0[0-9]+", one) for one in numbers)
 
 
 def _is_sphere(numbers: list[str]) -> bool:
