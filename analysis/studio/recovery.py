@@ -8,9 +8,10 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ballplate.simulator.experiment.load import trees_of
 from ballplate.simulator.experiment.modules import refused_modules
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.yamltree import Mapping, parse_tree, to_python, walk
+from ballplate.simulator.inputs.yamltree import Mapping, to_python, walk
 
 from .document import DesignDocument, changed, replace_file
 
@@ -65,13 +66,19 @@ def recovered(document: DesignDocument) -> tuple[DesignDocument, str]:
         return document, f"{path.name} cannot be read: {error}; delete it"
     if text == document.text:
         return document, ""
-    folder = document.path.parent
-    if _code(text, folder) not in ([], _code(document.text, folder)):
+    given, code = _code(document.text, document.path) or [], _code(text, document.path)
+    if code is None:
+        is_known = not given and "python" not in text
+    else:
+        is_known = all(one in given for one in code)
+    if not is_known:
         return document, (
             f"unsaved changes of an earlier session are in {path.name} and were not taken up: they"
             " have an error model in Python that the file has not; look at them, and delete them"
         )
-    found = replace(changed(document, text), content=content)
+    # What nobody has read must not come to run by a change of something else, either.
+    with_modules = document.with_modules and bool(given)
+    found = replace(changed(document, text), content=content, with_modules=with_modules)
     since = "" if content == document.content else "; the file has changed since"
     return found, (
         "changes that were not saved in an earlier session are here again; undo leads to the file"
@@ -79,15 +86,17 @@ def recovered(document: DesignDocument) -> tuple[DesignDocument, str]:
     )
 
 
-def _code(text: str, folder: Path) -> list[object]:
-    """The settings by which a text has models in Python, its own or those of maps; where it is no
-    YAML, the text itself if it names any.
+def _code(text: str, file: Path) -> list[object] | None:
+    """The settings by which a text has models in Python, its own or those of maps, in any of its
+    variants; None where it is no YAML.
     """
     try:
-        root = parse_tree(text, "")
+        root, variants, _ = trees_of(text, file, [])
     except ExperimentError:
-        return [text] if "python" in text else []
-    if not refused_modules(root, folder):
-        return []
-    kinds = (to_python(node) for _, node in walk(root) if isinstance(node, Mapping))
-    return [one for one in kinds if one.get("kind") in ("python", "map")]
+        return None
+    found: list[object] = []
+    for tree in (root, *variants.values()):
+        if refused_modules(tree, file.parent):
+            kinds = (to_python(node) for _, node in walk(tree) if isinstance(node, Mapping))
+            found += [one for one in kinds if one.get("kind") in ("python", "map")]
+    return found

@@ -1,6 +1,7 @@
 """What is not saved when a studio ends, however it ends."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,6 @@ from ballplate.studio.sweeping import swept
 
 MODEL = """import numpy as np
 from ballplate.models import Parameter, Reported
-
-open({ran!r}, "w").close()
 
 
 class Axes:
@@ -33,6 +32,7 @@ class Axes:
 
 
 def build(lower, upper):
+    open({ran!r}, "w").close()
     return Axes()
 """
 SETTINGS = "{kind: python, object: 'model:build'}"
@@ -128,8 +128,12 @@ def in_python(text: str) -> str:
 
 
 @pytest.fixture
-def ran(design: Path) -> Path:
+def ran(design: Path, monkeypatch) -> Path:
     """What a model beside the design leaves when it is run."""
+    # Otherwise modules of these names are those of an earlier test.
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    for name in ("model", "own"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     found = design.with_name("ran")
     design.with_name("model.py").write_text(MODEL.format(ran=str(found)))
     return found
@@ -194,12 +198,61 @@ def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design
     assert not ran.exists()
 
 
-def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran):
+def by_variant(text: str) -> str:
+    """A text whose variant makes a model in Python of another."""
+    return in_python(text).replace("kind: python", "kind: kinematic") + (
+        "\nvariants:\n  all in one:\n    error_model.kind: python\n"
+    )
+
+
+def twice(text: str) -> str:
+    """A text that is no right YAML, although a tree can be made of it."""
+    return in_python(text).replace("kind: python", '"kind": "p\\u0079thon"') + "title: again\n"
+
+
+@pytest.mark.parametrize(
+    "change", [in_python, by_variant, twice, lambda text: in_python(text) + "title: [\n"]
+)
+def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran, change):
     session = Session(design)
     session.act({"do": "set", "path": ["title"], "value": "mine"})
     said = json.loads(kept_in(design).read_text())
-    for text in (in_python(said["text"]), in_python(said["text"]) + "title: [\n"):
-        kept_in(design).write_text(json.dumps(said | {"text": text}))
-        state = Session(design).state()
-        assert "were not taken up" in state["note"] and state["saved"]
-        assert kept_in(design).exists() and not ran.exists()
+    text = change(said["text"])
+    assert text != said["text"]
+    kept_in(design).write_text(json.dumps(said | {"text": text}))
+    state = Session(design).state()
+    assert "were not taken up" in state["note"] and state["saved"]
+    assert kept_in(design).exists() and not ran.exists()
+
+
+@pytest.mark.parametrize("change", [in_python, by_variant])
+def test_a_text_that_runs_a_model_is_one_that_would_have_been_found(design, ran, change):
+    """The test above can fail: these files run the model when they are named."""
+    design.write_text(change(design.read_text()))
+    Session(design)
+    assert ran.exists()
+
+
+def test_what_was_not_saved_does_not_exchange_the_model_in_python_of_a_file(design, ran):
+    text = in_python(design.read_text())
+    design.with_name("own.py").write_text(MODEL.format(ran=str(design.with_name("own"))))
+    design.write_text(text.replace("model:build", "own:build"))
+    session = Session(design)
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    assert design.with_name("own").exists()
+    said = json.loads(kept_in(design).read_text())
+    # The file's own model may go on.
+    assert Session(design).state()["data"]["title"] == "mine"
+    for variant in ("error_model.object: 'model:build'", f"true_machine: {SETTINGS}"):
+        other = f"{said['text']}\nvariants:\n  v:\n    {variant}\n"
+        kept_in(design).write_text(json.dumps(said | {"text": other}))
+        assert "were not taken up" in Session(design).state()["note"] and not ran.exists()
+
+
+def test_no_later_change_runs_what_came_with_a_text_that_was_not_saved(design, ran):
+    session = Session(design)
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    again = Session(design)
+    again.act({"do": "text", "text": in_python(design.read_text())})
+    assert any("Python" in one["text"] for one in again.state()["messages"])
+    assert not ran.exists()
