@@ -63,7 +63,13 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
 def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from .sweeping import swept
 
-    return swept(document, settings["axes"], report)
+    return swept(document, settings.get("axes"), report)
+
+
+def _ensure_sweep(document: DesignDocument, settings: Mapping[str, Any]) -> None:
+    from .sweeping import ensure_possible
+
+    ensure_possible(document, settings.get("axes"))
 
 
 def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
@@ -103,6 +109,9 @@ JOBS: Mapping[str, Work] = {
     "fit": _fit,
 }
 """What can run beside the studio; another is a function and its line here."""
+
+CHECKS: Mapping[str, Callable[[DesignDocument, Mapping[str, Any]], None]] = {"sweep": _ensure_sweep}
+"""What refuses the settings of a computation before it begins."""
 
 
 @dataclass
@@ -163,8 +172,12 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) ->
     """Start a computation with the document as it is now.
 
     :raises KeyError: there is no such job.
+    :raises ActionError: its settings are wrong.
+    :raises ExperimentError: the text is wrong, where this is found before the start.
     """
     JOBS[name]
+    if name in CHECKS:
+        CHECKS[name](document, settings)
     # A new interpreter: a copy of this process would have its threads' locks without the threads.
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)

@@ -175,6 +175,7 @@ class Session:
         """Start a computation, and return its number.
 
         :raises RefusedError: there is no such computation, or too many are running.
+        :raises ActionError, ExperimentError: its settings, or the text, are wrong.
         """
         with self._lock:
             if name not in JOBS:
