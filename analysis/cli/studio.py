@@ -43,10 +43,17 @@ def _port(text: str) -> int:
 
 def unsaved(session: Session) -> str:
     """What is to be said when the studio ends."""
+    from ..studio.recovery import kept_in
+
     if session.is_saved:
         return "nothing is left to be saved"
-    if session.is_recoverable:
-        return "changes are not saved; the same command takes them up again"
+    kept = session.kept()
+    if kept == kept_in(session.path):
+        return (
+            f"changes are not saved, and are in {kept.name}: the same command takes them up again"
+        )
+    if kept is not None:
+        return f"changes are not saved, and are in {kept.name}: another studio has the file"
     return "changes are not saved, and could not be kept in the folder of the file"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import multiprocessing
+import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -62,7 +63,13 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
 def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from .sweeping import swept
 
-    return swept(document, settings["axes"], report)
+    return swept(document, settings.get("axes"), report)
+
+
+def _ensure_sweep(document: DesignDocument, settings: Mapping[str, Any]) -> None:
+    from .sweeping import ensure_possible
+
+    ensure_possible(document, settings.get("axes"))
 
 
 def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
@@ -103,18 +110,23 @@ JOBS: Mapping[str, Work] = {
 }
 """What can run beside the studio; another is a function and its line here."""
 
+CHECKS: Mapping[str, Callable[[DesignDocument, Mapping[str, Any]], None]] = {"sweep": _ensure_sweep}
+"""What refuses the settings of a computation before it begins."""
+
 
 @dataclass
 class Job:
     """A computation in a process of its own, of the design with a `fingerprint`: `state` is
     running, done or failed, `step` how far it has come, `result` what came of it, or why nothing
-    did, and `page` one that it has made.
+    did, and `page` one that it has made. Its temporary files are in a `folder` that ends with it,
+    since a process that is stopped takes nothing away.
     """
 
     name: str
     fingerprint: str
     process: BaseProcess
     connection: Connection
+    folder: str
     state: str = "running"
     step: str = ""
     result: Any = None
@@ -142,6 +154,7 @@ class Job:
             self.process.kill()
             self.process.join()
         self.connection.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def to_dict(self, number: int) -> dict[str, Any]:
         return {
@@ -159,16 +172,33 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) ->
     """Start a computation with the document as it is now.
 
     :raises KeyError: there is no such job.
+    :raises ActionError: its settings are wrong.
+    :raises ExperimentError: the text is wrong, where this is found before the start.
     """
     JOBS[name]
+    if name in CHECKS:
+        CHECKS[name](document, settings)
     # A new interpreter: a copy of this process would have its threads' locks without the threads.
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    arguments = (sender, name, document, dict(settings))
-    process = context.Process(target=_work, args=arguments, daemon=True)
+    folder = tempfile.mkdtemp(prefix="ballplate-studio-")
+    arguments = (folder, sender, name, document, dict(settings))
+    process = context.Process(target=_work_in, args=arguments, daemon=True)
     process.start()
     sender.close()
-    return Job(name, document.fingerprint, process, receiver)
+    return Job(name, document.fingerprint, process, receiver, folder)
+
+
+def _work_in(
+    folder: str,
+    connection: Connection,
+    name: str,
+    document: DesignDocument,
+    settings: Mapping[str, Any],
+) -> None:
+    """Work in a process of its own, with its temporary files in a folder."""
+    tempfile.tempdir = folder
+    _work(connection, name, document, settings)
 
 
 def _work(

@@ -4,56 +4,71 @@ from __future__ import annotations
 
 import base64
 import json
+import secrets
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ballplate.simulator.experiment.load import trees_of
 from ballplate.simulator.experiment.modules import refused_modules
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.yamltree import Mapping, parse_tree, to_python, walk
+from ballplate.simulator.inputs.yamltree import Mapping, to_python, walk
 
 from .document import DesignDocument, changed, replace_file
 
 
-def kept_in(path: Path) -> Path:
-    """Where the unsaved text of a file is kept.
+def kept_in(path: Path, owner: str = "") -> Path:
+    """Where the unsaved text of a file is kept; of an owner where another has that file already.
 
     >>> kept_in(Path("designs/plate.yaml")).name
     '.plate.yaml.unsaved'
     """
-    return path.with_name(f".{path.name}.unsaved")
+    return path.with_name(f".{path.name}.unsaved{f'-{owner}' if owner else ''}")
 
 
-def keep(document: DesignDocument) -> None:
-    """Keep the text as far as it is not saved, with what the file held when it was read; where the
-    folder cannot be written nothing is kept.
+def keep(document: DesignDocument, owner: str) -> Path | None:
+    """Keep the text as far as it is not saved, with what the file held when it was read; where it
+    is kept now, None where the folder cannot be written or nothing is to be kept.
+
+    What another owner has kept stays.
     """
+    if document.is_saved or not document.back:
+        give_up(document, owner)
+        return None
+    try:
+        own = kept_in(document.path, owner)
+        is_free = not own.exists() and _owner(kept_in(document.path)) in (None, owner)
+        path = kept_in(document.path) if is_free else own
+        _write(path, document, owner)
+    except OSError:
+        return None
+    return path
+
+
+def give_up(document: DesignDocument, owner: str) -> None:
+    """Forget what an owner has kept of a document."""
     with suppress(OSError):
-        if document.is_saved or not document.back:
+        kept_in(document.path, owner).unlink(missing_ok=True)
+        if _owner(kept_in(document.path)) == owner:
             kept_in(document.path).unlink(missing_ok=True)
-            return
-        content = document.content
-        said = {
-            "content": None if content is None else base64.b64encode(content).decode(),
-            "text": document.text,
-        }
-        # For nobody else, whatever the folder's other files are.
-        replace_file(kept_in(document.path), json.dumps(said).encode(), 0o600, is_lasting=False)
 
 
-def give_up(document: DesignDocument) -> None:
-    """Forget what was kept of a document."""
-    with suppress(OSError):
-        kept_in(document.path).unlink(missing_ok=True)
-
-
-def recovered(document: DesignDocument) -> tuple[DesignDocument, str]:
-    """The document with the text that was not saved, and what is to be said of it; the text of the
-    file is a step back.
+def recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, str]:
+    """The document with the text that was not saved, which is the owner's from now on, and what is
+    to be said of it; the text of the file is a step back.
 
     Where the file has changed since, saving is refused as if it had changed under the studio. A
-    text with other models in Python than the file's is left alone, since nobody has opened it.
+    text with other models in Python than the file's is set aside, since nobody has opened it.
     """
+    found, note = _recovered(document, owner)
+    others = [one.name for one in _set_aside(document.path) if one.name not in note]
+    if others:
+        more = f"changes that were not saved are in {', '.join(others)}: look at them, and delete"
+        note = f"{note}; {more} them" if note else f"{more} them"
+    return found, note
+
+
+def _recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, str]:
     path = kept_in(document.path)
     try:
         said = json.loads(path.read_bytes())
@@ -61,17 +76,28 @@ def recovered(document: DesignDocument) -> tuple[DesignDocument, str]:
         content = None if coded is None else base64.b64decode(coded, validate=True)
     except FileNotFoundError:
         return document, ""
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        return document, f"{path.name} cannot be read: {error}; delete it"
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        aside = _put_aside(path)
+        return document, f"{path.name} cannot be read: {error}; it is now {aside.name}: delete it"
     if text == document.text:
+        with suppress(OSError):
+            path.unlink()
         return document, ""
-    folder = document.path.parent
-    if _code(text, folder) not in ([], _code(document.text, folder)):
+    given, code = _code(document.text, document.path) or [], _code(text, document.path)
+    if code is None:
+        is_known = not given and "python" not in text
+    else:
+        is_known = all(one in given for one in code)
+    if not is_known:
         return document, (
-            f"unsaved changes of an earlier session are in {path.name} and were not taken up: they"
+            f"changes that were not saved are in {_put_aside(path).name} and not taken up: they"
             " have an error model in Python that the file has not; look at them, and delete them"
         )
-    found = replace(changed(document, text), content=content)
+    # What nobody has read must not come to run by a change of something else, either.
+    with_modules = document.with_modules and bool(given)
+    found = replace(changed(document, text), content=content, with_modules=with_modules)
+    with suppress(OSError):
+        _write(path, found, owner)
     since = "" if content == document.content else "; the file has changed since"
     return found, (
         "changes that were not saved in an earlier session are here again; undo leads to the file"
@@ -79,15 +105,61 @@ def recovered(document: DesignDocument) -> tuple[DesignDocument, str]:
     )
 
 
-def _code(text: str, folder: Path) -> list[object]:
-    """The settings by which a text has models in Python, its own or those of maps; where it is no
-    YAML, the text itself if it names any.
+def _write(path: Path, document: DesignDocument, owner: str) -> None:
+    """Write what is to be kept, unless it is there.
+
+    :raises OSError: it cannot be written.
+    """
+    content = document.content
+    said = {
+        "owner": owner,
+        "content": None if content is None else base64.b64encode(content).decode(),
+        "text": document.text,
+    }
+    whole = json.dumps(said).encode()
+    if not path.exists() or path.read_bytes() != whole:
+        # For nobody else, whatever the folder's other files are.
+        replace_file(path, whole, 0o600, is_lasting=False)
+
+
+def _owner(path: Path) -> str | None:
+    """Who has kept a text there, None where there is none; what cannot be read is a stranger's."""
+    try:
+        return str(json.loads(path.read_bytes())["owner"])
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return ""
+
+
+def _put_aside(path: Path) -> Path:
+    """Rename what was kept, so that nothing is kept over it; its name then."""
+    try:
+        return path.rename(f"{path}-{secrets.token_hex(4)}")
+    except OSError:
+        return path
+
+
+def _set_aside(path: Path) -> list[Path]:
+    """What is kept of a file under other names."""
+    start = f"{kept_in(path).name}-"
+    try:
+        return sorted(one for one in path.parent.iterdir() if one.name.startswith(start))
+    except OSError:
+        return []
+
+
+def _code(text: str, file: Path) -> list[object] | None:
+    """The settings by which a text has models in Python, its own or those of maps, in any of its
+    variants; None where it is no YAML.
     """
     try:
-        root = parse_tree(text, "")
+        root, variants, _ = trees_of(text, file, [])
     except ExperimentError:
-        return [text] if "python" in text else []
-    if not refused_modules(root, folder):
-        return []
-    kinds = (to_python(node) for _, node in walk(root) if isinstance(node, Mapping))
-    return [one for one in kinds if one.get("kind") in ("python", "map")]
+        return None
+    found: list[object] = []
+    for tree in (root, *variants.values()):
+        if refused_modules(tree, file.parent):
+            kinds = (to_python(node) for _, node in walk(tree) if isinstance(node, Mapping))
+            found += [one for one in kinds if one.get("kind") in ("python", "map")]
+    return found

@@ -27,7 +27,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .recovery import give_up, keep, kept_in, recovered
+from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
 
@@ -72,7 +72,8 @@ class Session:
         document = (
             DesignDocument(path, variant, beginning, None) if is_new else opened(path, variant)
         )
-        document, self.note = recovered(document)
+        self.name = secrets.token_hex(4)
+        document, self.note = recovered(document, self.name)
         if is_new and not self.note:
             self.note = f"{path.name} is new, and begins with an example; Save writes it"
         if variant is None:
@@ -81,7 +82,6 @@ class Session:
         self._off: dict[str, dict[str, Any]] = {}
         self._jobs: dict[int, Job] = {}
         self.revision = 0
-        self.name = secrets.token_hex(4)
         self._now = self._judged(document, None)
 
     def state(self) -> dict[str, Any]:
@@ -113,6 +113,12 @@ class Session:
             }
 
     @property
+    def path(self) -> Path:
+        """The file of the design."""
+        with self._lock:
+            return self._now.document.path
+
+    @property
     def is_saved(self) -> bool:
         with self._lock:
             return self._now.document.is_saved or not self._now.document.back
@@ -121,7 +127,12 @@ class Session:
     def is_recoverable(self) -> bool:
         """Whether nothing is lost if the studio ends now."""
         with self._lock:
-            return self.is_saved or kept_in(self._now.document.path).exists()
+            return self.is_saved or self.kept() is not None
+
+    def kept(self) -> Path | None:
+        """Where what is not saved is kept; None where nothing is, or nothing can be."""
+        with self._lock:
+            return keep(self._now.document, self.name)
 
     def act(self, action: Mapping[str, Any]) -> None:
         """Do something with the design; where it fails in any way all is as before.
@@ -164,6 +175,7 @@ class Session:
         """Start a computation, and return its number.
 
         :raises RefusedError: there is no such computation, or too many are running.
+        :raises ActionError, ExperimentError: its settings, or the text, are wrong.
         """
         with self._lock:
             if name not in JOBS:
@@ -243,7 +255,7 @@ class Session:
         self._now = self._judged(document, before)
         self.revision += 1
         self.note = ""
-        keep(document)
+        keep(document, self.name)
 
     def _judged(self, document: DesignDocument, before: dict[str, Any] | None) -> _Judged:
         variants = variants_of(document) if document.variant else ()
@@ -295,7 +307,7 @@ class Session:
             ) from None
         self._now = replace(self._now, document=document)
         self.revision += 1
-        give_up(before)
+        give_up(before, self.name)
 
     def _open(self, action: Mapping[str, Any]) -> None:
         path, before = self._inside(str(action.get("name", ""))), self._now.document
@@ -303,10 +315,13 @@ class Session:
             raise RefusedError(f"{before.path.name} has changes that are not saved")
         trusted = path.resolve() == self._first
         document = opened(path, None, trusted)
-        give_up(before)
-        document, note = recovered(document)
+        # What is left on purpose is not taken up again.
+        is_left = document.path.name == before.path.name
+        document, note = (document, "") if is_left else recovered(document, self.name)
         self._become(_with_first_variant(document))
         self._kept, self._off, self.note = None, {}, note
+        if not is_left:
+            give_up(before, self.name)
 
     def _inside(self, name: str) -> Path:
         """The path of a design in the folder.

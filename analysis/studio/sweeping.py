@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import product
@@ -17,9 +18,10 @@ from typing import Any
 from ballplate.simulator.computing.steps import Report
 from ballplate.simulator.experiment.changes import changed_tree, node_of
 from ballplate.simulator.experiment.modules import refused_modules
+from ballplate.simulator.experiment.variants import node_at
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltext import flow
-from ballplate.simulator.inputs.yamltree import Mark, Node
+from ballplate.simulator.inputs.yamltree import Mark, Node, Scalar
 
 from ..presentation.formatting import finite
 from ..sweeps.bundle import Bundle, bundle_of, names_of, unpack
@@ -47,9 +49,7 @@ class _Axis:
         return " ".join(self.paths)
 
 
-def swept(
-    document: DesignDocument, said: Iterable[Mapping[str, Any]], report: Report
-) -> dict[str, Any]:
+def swept(document: DesignDocument, said: Any, report: Report) -> dict[str, Any]:
     """Compute a sweep over axes, each with `paths` and `values`: what is told of each cell, and
     the `page`, empty where what it needs is not installed.
 
@@ -57,11 +57,7 @@ def swept(
     :raises ExperimentError: the text is wrong, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
-    axes = [_axis(one) for one in said]
-    cells = math.prod(len(one.values) for one in axes)
-    if not axes or cells > MOST_CELLS:
-        some = f"{cells} combinations; at most {MOST_CELLS} are possible here"
-        raise ActionError(some if axes else "a sweep needs a key")
+    axes = _axes(said)
     tree = experiment_of(document).tree
     if not document.with_modules:
         _ensure_no_modules(document, tree, axes)
@@ -74,7 +70,7 @@ def swept(
         "headline": found.headline(),
         "axes": [list(axis.paths) for axis in axes],
         "cells": [
-            _cell(row, values)
+            _cell(row, values, f"{file.name}:")
             for row, values in zip(
                 found.rows(), product(*(one.values for one in axes)), strict=True
             )
@@ -83,8 +79,49 @@ def swept(
     }
 
 
+def ensure_possible(document: DesignDocument, said: Any) -> None:
+    """Make sure that a sweep over axes may begin, and numbers may stand where there are texts.
+
+    :raises ActionError: an axis is incomplete, there are too many cells, or a number lacks its
+        unit.
+    :raises ExperimentError: the text is wrong.
+    """
+    experiment = experiment_of(document)
+    for axis in _axes(said):
+        numbers = (one for one in map(value_of, axis.values) if type(one) in (int, float))
+        number = next(numbers, None)
+        for path in axis.paths:
+            present = node_at(experiment.tree, path)
+            if number is None or not isinstance(present, Scalar):
+                continue
+            if isinstance(present.value, str):
+                try:
+                    experiment.with_({path: number})
+                except ExperimentError as error:
+                    raise ActionError(f"{path}: {error.messages[0].text}") from None
+
+
+def _axes(said: Any) -> list[_Axis]:
+    if not isinstance(said, list) or not all(isinstance(one, Mapping) for one in said):
+        raise ActionError("a sweep needs a list of axes, each with its paths and values")
+    axes = [_axis(one) for one in said]
+    cells = math.prod(len(one.values) for one in axes)
+    if not axes or cells > MOST_CELLS:
+        some = f"{cells} combinations; at most {MOST_CELLS} are possible here"
+        raise ActionError(some if axes else "a sweep needs a key")
+    names = [axis.name for axis in axes]
+    for name in names:
+        if names.count(name) > 1:
+            raise ActionError(f"two axes are of {name}; put their values into one")
+    return axes
+
+
 def _computed(file: Path, store: Store, report: Report) -> SweepResult:
-    sweep = load_sweep(file)
+    try:
+        sweep = load_sweep(file)
+    except ExperimentError as error:
+        # Nobody has seen the file; its words begin with the axis' key.
+        raise ActionError("; ".join(one.text for one in error.messages)) from None
     bundle = bundle_of(sweep)
     entered = enter(store, sweep, bundle, beside=False)
     runner = nullcontext(local_runner(sweep, bundle, workers=1))
@@ -103,20 +140,25 @@ def _page(store: Store, with_modules: bool) -> str:
         return ""
 
 
-def _cell(row: Mapping[str, Any], values: Sequence[str]) -> dict[str, Any]:
+def _cell(row: Mapping[str, Any], values: Sequence[str], file: str) -> dict[str, Any]:
+    # A place in a file that nobody has seen.
+    reason = re.sub(rf"{re.escape(file)}\d+:\d+: ", "", str(row["reason"]))
     figures = {
         "deficiency": row.get("rank_deficiency"),
         "average": row.get("U6_average_m"),
         "maximum": row.get("U6_maximum_m"),
         "within": row.get("U6_within_target"),
     }
-    return {"values": list(values), "reason": row["reason"]} | {
+    return {"values": list(values), "reason": reason} | {
         key: finite(value) if isinstance(value, float) else None for key, value in figures.items()
     }
 
 
 def _axis(said: Mapping[str, Any]) -> _Axis:
-    paths, values = (tuple(str(one).strip() for one in said[key]) for key in ("paths", "values"))
+    lists = [said.get(key) for key in ("paths", "values")]
+    if not all(isinstance(one, list) for one in lists):
+        raise ActionError("an axis needs its paths and values, each a list")
+    paths, values = (tuple(str(one).strip() for one in some) for some in lists if some is not None)
     if not all(paths) or not paths or not values:
         raise ActionError("an axis needs a key and its values")
     return _Axis(paths, values)

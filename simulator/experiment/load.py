@@ -64,9 +64,7 @@ def load(
     source = Path(path)
     refused: list[Message] = []
     written = read_text(source) if text is None else text
-    root = with_present_keys(parse_tree(written, str(source), refused))
-    base_problems = Problems(root)
-    trees = variant_trees(root, base_problems)
+    root, trees, base_problems = trees_of(written, source, refused)
     if not with_modules:
         forbidden = {
             message
@@ -110,6 +108,19 @@ def load(
     ]
     _raise_if_any(found, refused, source)
     return tuple(experiments)
+
+
+def trees_of(
+    text: str, source: Path, refused: list[Message]
+) -> tuple[Node, dict[str, Node], Problems]:
+    """What a file with this text says, its variants by name, and what is wrong with these; what is
+    wrong with the YAML goes to ``refused``.
+
+    :raises ExperimentError: the YAML is so wrong that there is no tree.
+    """
+    root = with_present_keys(parse_tree(text, str(source), refused))
+    problems = Problems(root)
+    return root, variant_trees(root, problems), problems
 
 
 def with_pool(experiment: Experiment) -> Experiment:

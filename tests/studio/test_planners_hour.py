@@ -346,3 +346,30 @@ def test_the_page_fits_small_screens(design: Path, width: int) -> None:
             summary.click()
         assert page.evaluate(OUTSIDE) == []
         assert page.errors == []
+
+
+def test_results_of_an_earlier_design_are_marked_and_a_refused_sweep_says_where(
+    design: Path,
+) -> None:
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        page.click("#sweep")
+        page.click("#more-axes")
+        page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.size[0]")
+        page.fill("[data-axis=values] >> nth=1", "750 mm; 400")
+        page.click("#ok")
+        page.wait_for_selector("#fields fieldset:nth-of-type(2) >> text=has no unit")
+        # What was typed is there still.
+        page.fill("[data-axis=values] >> nth=1", "750 mm; 400 mm")
+        page.click("#ok")
+        page.wait_for_selector("#jobs li[data-state=done]", timeout=200_000)
+        heads = page.locator("#jobs th").all_inner_texts()
+        assert heads[:2] == ["repeatability", "size[0]"] and "U6 max. µm" in heads
+        assert page.locator("#jobs li >> text=of an earlier design").count() == 0
+        page.click("#positions button.name >> nth=0")
+        page.click("#turn")
+        page.wait_for_selector("#jobs li >> text=of an earlier design")
+        page.click("#undo")
+        until(page, "!document.querySelector('#jobs').innerText.includes('of an earlier')")
+        assert page.errors == []

@@ -1,6 +1,7 @@
 """What is not saved when a studio ends, however it ends."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,6 @@ from ballplate.studio.sweeping import swept
 
 MODEL = """import numpy as np
 from ballplate.models import Parameter, Reported
-
-open({ran!r}, "w").close()
 
 
 class Axes:
@@ -33,6 +32,7 @@ class Axes:
 
 
 def build(lower, upper):
+    open({ran!r}, "w").close()
     return Axes()
 """
 SETTINGS = "{kind: python, object: 'model:build'}"
@@ -50,7 +50,9 @@ def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     assert not kept_in(design).exists()
     session.act({"do": "turn", "position": "z low"})
     text = session.state()["text"]
-    assert unsaved(session) == "changes are not saved; the same command takes them up again"
+    assert unsaved(session) == (
+        "changes are not saved, and are in .plate.yaml.unsaved: the same command takes them up again"
+    )
     assert kept_in(design).stat().st_mode & 0o077 == 0
     # The first session is gone without another word.
     again = Session(design)
@@ -98,11 +100,89 @@ def test_changes_that_are_left_on_purpose_are_gone(design):
         assert session.state()["saved"] and not kept_in(design).exists()
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", '{"text": 1}', '{"text": "x", "content": "?"}'])
-def test_what_cannot_be_read_is_told(design, content):
-    kept_in(design).write_text(content)
-    state = Session(design).state()
+@pytest.mark.parametrize(
+    "content",
+    ["", "{", "[]", '{"text": 1}', '{"text": "x", "content": "?"}', "[" * 100_000, "\xff"],
+)
+def test_what_cannot_be_read_is_told_and_never_written_over(design, content):
+    kept_in(design).write_text(content, encoding="latin-1")
+    session = Session(design)
+    state = session.state()
     assert "cannot be read" in state["note"] and state["saved"]
+    session.act({"do": "turn", "position": "z low"})
+    session.act({"do": "undo"})
+    (aside,) = set_aside(design)
+    assert aside.name in state["note"] and aside.read_text(encoding="latin-1") == content
+    # It is told until it is deleted.
+    assert aside.name in Session(design).state()["note"]
+
+
+def set_aside(design: Path) -> list[Path]:
+    names = design.parent.iterdir()
+    return [one for one in names if one.name.startswith(f"{kept_in(design).name}-")]
+
+
+def test_two_studios_on_one_file_leave_each_other_what_is_not_saved(design):
+    first, second = Session(design), Session(design)
+    texts = []
+    for session, name in ((first, "z low"), (second, "x low")):
+        session.act({"do": "turn", "position": name})
+        texts.append(session.state()["text"])
+    assert texts[0] != texts[1]
+    assert "the same command" in unsaved(first) and "another studio" in unsaved(second)
+    (aside,) = set_aside(design)
+    for path, text in zip((kept_in(design), aside), texts, strict=True):
+        assert json.loads(path.read_text())["text"] == text
+    # A third takes up what the first has kept, which goes on to keep its own.
+    third = Session(design)
+    assert third.state()["text"] == texts[0] and aside.name in third.state()["note"]
+    third.act({"do": "undo"})
+    assert not kept_in(design).exists()
+    assert first.state()["recoverable"]
+    assert json.loads(kept_in(design).read_text())["text"] == texts[0]
+    second.act({"do": "undo"})
+    assert set_aside(design) == [] and kept_in(design).exists()
+
+
+def test_what_was_kept_before_the_folder_was_full_is_no_promise(design, monkeypatch):
+    session = Session(design)
+    session.act({"do": "turn", "position": "z low"})
+    assert session.state()["recoverable"]
+
+    def fail(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("ballplate.studio.recovery.replace_file", fail)
+    session.act({"do": "turn", "position": "x low"})
+    assert kept_in(design).exists() and not session.state()["recoverable"]
+    assert "could not be kept" in unsaved(session)
+    monkeypatch.undo()
+    assert session.state()["recoverable"]
+
+
+def test_a_file_that_cannot_be_opened_costs_nothing_of_what_is_not_saved(design, monkeypatch):
+    design.with_name("other.yaml").write_bytes(design.read_bytes())
+    session = Session(design)
+    session.act({"do": "turn", "position": "z low"})
+    text = session.state()["text"]
+
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("ballplate.studio.session.answer", fail)
+    with pytest.raises(MemoryError):
+        session.act({"do": "open", "name": "other.yaml", "discard": True})
+    assert session.state()["text"] == text
+    assert json.loads(kept_in(design).read_text())["text"] == text
+
+
+def test_after_a_refused_save_the_last_words_say_where_the_changes_are(design):
+    session = Session(design)
+    session.act({"do": "turn", "position": "z low"})
+    design.write_bytes(design.read_bytes() + b"# another hand\n")
+    with pytest.raises(RefusedError, match="has changed on disk"):
+        session.act({"do": "save"})
+    assert unsaved(session).startswith("changes are not saved, and are in .plate.yaml.unsaved")
 
 
 def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, monkeypatch):
@@ -128,8 +208,12 @@ def in_python(text: str) -> str:
 
 
 @pytest.fixture
-def ran(design: Path) -> Path:
+def ran(design: Path, monkeypatch) -> Path:
     """What a model beside the design leaves when it is run."""
+    # Otherwise modules of these names are those of an earlier test.
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    for name in ("model", "own"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     found = design.with_name("ran")
     design.with_name("model.py").write_text(MODEL.format(ran=str(found)))
     return found
@@ -194,12 +278,62 @@ def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design
     assert not ran.exists()
 
 
-def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran):
+def by_variant(text: str) -> str:
+    """A text whose variant makes a model in Python of another."""
+    return in_python(text).replace("kind: python", "kind: kinematic") + (
+        "\nvariants:\n  all in one:\n    error_model.kind: python\n"
+    )
+
+
+def twice(text: str) -> str:
+    """A text that is no right YAML, although a tree can be made of it."""
+    return in_python(text).replace("kind: python", '"kind": "p\\u0079thon"') + "title: again\n"
+
+
+@pytest.mark.parametrize(
+    "change", [in_python, by_variant, twice, lambda text: in_python(text) + "title: [\n"]
+)
+def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran, change):
     session = Session(design)
     session.act({"do": "set", "path": ["title"], "value": "mine"})
     said = json.loads(kept_in(design).read_text())
-    for text in (in_python(said["text"]), in_python(said["text"]) + "title: [\n"):
-        kept_in(design).write_text(json.dumps(said | {"text": text}))
-        state = Session(design).state()
-        assert "were not taken up" in state["note"] and state["saved"]
-        assert kept_in(design).exists() and not ran.exists()
+    text = change(said["text"])
+    assert text != said["text"]
+    kept_in(design).write_text(json.dumps(said | {"text": text}))
+    state = Session(design).state()
+    assert "not taken up" in state["note"] and state["saved"]
+    (aside,) = set_aside(design)
+    assert json.loads(aside.read_text())["text"] == text and not ran.exists()
+
+
+@pytest.mark.parametrize("change", [in_python, by_variant])
+def test_a_text_that_runs_a_model_is_one_that_would_have_been_found(design, ran, change):
+    """The test above can fail: these files run the model when they are named."""
+    design.write_text(change(design.read_text()))
+    Session(design)
+    assert ran.exists()
+
+
+def test_what_was_not_saved_does_not_exchange_the_model_in_python_of_a_file(design, ran):
+    text = in_python(design.read_text())
+    design.with_name("own.py").write_text(MODEL.format(ran=str(design.with_name("own"))))
+    design.write_text(text.replace("model:build", "own:build"))
+    session = Session(design)
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    assert design.with_name("own").exists()
+    said = json.loads(kept_in(design).read_text())
+    # The file's own model may go on.
+    assert Session(design).state()["data"]["title"] == "mine"
+    for variant in ("error_model.object: 'model:build'", f"true_machine: {SETTINGS}"):
+        other = f"{said['text']}\nvariants:\n  v:\n    {variant}\n"
+        kept_in(design).write_text(json.dumps(said | {"text": other}))
+        assert "not taken up" in Session(design).state()["note"] and not ran.exists()
+
+
+def test_no_later_change_runs_what_came_with_a_text_that_was_not_saved(design, ran):
+    session = Session(design)
+    session.act({"do": "set", "path": ["title"], "value": "mine"})
+    again = Session(design)
+    again.act({"do": "text", "text": in_python(design.read_text())})
+    assert any("Python" in one["text"] for one in again.state()["messages"])
+    assert not ran.exists()

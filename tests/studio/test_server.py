@@ -319,6 +319,24 @@ def test_a_computation_whose_process_is_killed_has_failed_and_may_be_of_an_earli
     assert job["fingerprint"] == client.post("/api/do", json={"do": "undo"}).json()["fingerprint"]
 
 
+def test_a_sweep_that_is_stopped_leaves_nothing_among_temporary_files(
+    client, session, tmp_path, monkeypatch
+):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    values = [f"{k} nm" for k in range(100, 600)]
+    axes = [{"paths": ["machine.repeatability"], "values": values}]
+    client.post("/api/start", json={"job": "sweep", "settings": {"axes": axes}})
+    deadline = time.monotonic() + 60
+    while not (found := list(folder.rglob("*.sqlite"))) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert found
+    client.post("/api/stop", json={"id": 1})
+    assert list(folder.iterdir()) == []
+
+
 def test_a_wrong_text_keeps_the_figures_with_what_is_wrong(client):
     before = client.get("/api/state").json()["design"]["quantities"]
     action = {"do": "set", "path": ["machine", "repeatability"], "value": "0.2 furlongs"}

@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.studio.actions import ActionError
 from ballplate.studio.document import DesignDocument, changed, opened
 from ballplate.studio.jobs import JOBS, _work
-from ballplate.studio.sweeping import MOST_CELLS, swept
+from ballplate.studio.sweeping import MOST_CELLS, ensure_possible, swept
 
 
 @pytest.fixture
@@ -87,6 +87,8 @@ def test_a_cell_that_fails_says_why(document, pageless):
     axes = [{"paths": ["machine.repeatability"], "values": ["0.2 um", "2 furlongs"]}]
     good, bad = swept(document, axes, unreported)["cells"]
     assert good["reason"] == "" and "furlongs" in bad["reason"] and bad["average"] is None
+    # The file of the sweep is nobody's: the key tells the place.
+    assert bad["reason"].startswith("machine.repeatability: ")
 
 
 @pytest.mark.parametrize(
@@ -98,12 +100,35 @@ def test_a_cell_that_fails_says_why(document, pageless):
         ([{"paths": ["a"], "values": ["1"] * (MOST_CELLS + 1)}], f"at most {MOST_CELLS}"),
         ([{"paths": ["machine.repeatability"], "values": ["[1"]}], "no value of a file"),
         ([{"paths": ["title", "title"], "values": ["x"]}], "title"),
+        ([{"paths": ["artefacts.plat.size"], "values": ["1"]}], "no artefacts.plat; did you mean"),
+        ([{"paths": ["title"], "values": ["x", "x"]}], 'has the value "x" twice'),
+        ([{"paths": ["title"], "values": ["x"]}] * 2, "two axes are of title"),
+        ([{"values": ["x"]}], "its paths and values"),
+        ([{"paths": 3, "values": "x"}], "its paths and values"),
+        (["x"], "list of axes"),
+        (5, "list of axes"),
+        (None, "list of axes"),
     ],
 )
 def test_what_a_sweep_lacks_is_told(document, axes, words):
     with pytest.raises((ActionError, ExperimentError)) as told:
         swept(document, axes, unreported)
     assert words in str(told.value)
+    assert "ballplate-sweep" not in str(told.value)
+
+
+def test_a_number_without_a_unit_is_refused_before_the_start(document):
+    def axes(path, *values):
+        return [{"paths": [path], "values": list(values)}]
+
+    for path in ("artefacts.plate.size[0]", "machine.repeatability"):
+        with pytest.raises(ActionError, match="400.* has no unit") as told:
+            ensure_possible(document, axes(path, "1 um", "400"))
+        assert str(told.value).startswith(f"{path}: ")
+        ensure_possible(document, axes(path, "1 um", "400 um"))
+    ensure_possible(document, axes("error_model.position_coefficients", "5", "6"))
+    with pytest.raises(ActionError, match="title: expected a text"):
+        ensure_possible(document, axes("title", "5"))
 
 
 def test_a_page_goes_apart_from_the_figures(document, monkeypatch):

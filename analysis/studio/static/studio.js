@@ -385,14 +385,18 @@ function apply(one) {
   else act({ do: "repair", edits: one.edits }, "applied");
 }
 
+// What refuses the start, or nothing.
 async function start(job, settings = {}) {
+  let refused = "";
   try {
     await ask("/api/start", { job, settings });
     tell("computing beside the studio …");
   } catch (error) {
-    tell(error.message, true);
+    refused = error.message;
+    tell(refused, true);
   }
   poll();
+  return refused;
 }
 
 const MOST_ROWS = 60; // of a sweep's cells in its table here
@@ -454,15 +458,16 @@ function computation(job, said) {
 }
 
 // The last keys of paths, which tell enough where there is little room.
-function short(axis) {
-  return axis.split(", ").map((path) => path.split(".").at(-1)).join(", ");
+function short(paths) {
+  return paths.map((path) => path.split(".").at(-1)).join(", ");
 }
 
 function table(found, hasPage) {
   const some = found.cells.slice(0, MOST_ROWS);
-  const heads = [...found.axes.map((paths) => paths.join(", ")), "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"];
+  const figured = ["rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"];
+  const heads = [...found.axes.map((paths) => make("th", { title: paths.join(", ") }, short(paths))), ...figured.map((one) => make("th", {}, one))];
   return make("div", { class: "scrolled", tabindex: "0" },
-    make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((one) => make("th", { title: one }, short(one))))),
+    make("table", {}, make("thead", {}, make("tr", {}, ...heads)),
       make("tbody", {}, ...some.map((cell) => make("tr", {}, ...cell.values.map((one) => make("td", {}, one)),
         ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : [make("td", {}, String(cell.deficiency)), make("td", {}, micro(cell.average)), make("td", {}, micro(cell.maximum)), make("td", {}, share(cell.within) || "no target")]))))),
     found.cells.length > MOST_ROWS ? make("p", {}, `${found.cells.length - MOST_ROWS} cells more are on the page`) : null,
@@ -538,10 +543,18 @@ $("sweep").onclick = async () => {
     make("label", {}, "values, separated by semicolons", make("input", { value: values, "data-axis": "values", autocomplete: "off" })));
   const rows = make("div", {}, row("machine.repeatability", "0.1 um; 0.2 um; 0.4 um"));
   const more = make("button", { type: "button", id: "more-axes", onclick: () => { rows.append(row("", "")); rows.lastElementChild.querySelector("input").focus(); } }, "Another axis");
-  if (!(await opened("Compute every combination of some values", [rows, list, more]))) return;
   const part = (one, key, mark) => one.querySelector(`[data-axis=${key}]`).value.split(mark).map((text) => text.trim()).filter(Boolean);
-  const axes = [...rows.children].map((one) => ({ paths: part(one, "paths", ","), values: part(one, "values", ";") })).filter((one) => one.paths.length);
-  start("sweep", { axes });
+  const error = make("p", { class: "field-error", role: "alert" });
+  while (await opened("Compute every combination of some values", [rows, list, more, ...(rows.contains(error) ? [] : [error])])) {
+    const axes = [...rows.children].map((one) => ({ paths: part(one, "paths", ","), values: part(one, "values", ";") })).filter((one) => one.paths.length);
+    const refused = await start("sweep", { axes });
+    if (!refused) return;
+    // Beside the axis that is meant, whose key the words begin with, or below all.
+    const meant = [...rows.children].find((one) => part(one, "paths", ",").some((path) => refused.startsWith(`${path}: `)));
+    error.textContent = refused;
+    if (meant) meant.append(error);
+    else error.remove();
+  }
 };
 document.querySelectorAll("[data-job]").forEach((button) => { button.onclick = () => start(button.dataset.job); });
 $("readings").onchange = (event) => { if (event.target.files[0]) fit(event.target.files[0]); event.target.value = ""; };
