@@ -11,6 +11,7 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.motions import cross_matrices, pose_size
 from ballplate.simulator.inputs.quantities import LengthFunction
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
@@ -178,24 +179,18 @@ class ComparedMap:
         return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
 
 
-def come_from_same_readings(first: ComparedMap, second: ComparedMap) -> bool:
-    """Whether two maps come from the same readings, or one from part of the other's."""
-    both = first.data, second.data
-    return both[0] is not None and both[1] is not None and both[0].is_one_campaign(both[1])
-
-
-def read_once(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
+def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
     """Positions whose readings two maps have in common, by their names where one is a fit, or how
     many they are.
     """
     if first.data is None or second.data is None:
         return ()
     common = first.data.common(second.data)
-    fit = second.fit or first.fit
-    if fit is None or not common:
-        return (f"{len(common)} position{'s' * (len(common) != 1)}",) if common else ()
-    prints = position_fingerprints(fit.observed)
-    return tuple(name for name, one in prints.items() if one in common)
+    for fit in filter(None, (second.fit, first.fit)):
+        prints = position_fingerprints(fit.observed)
+        if common <= set(prints.values()):
+            return tuple(name for name, one in prints.items() if one in common)
+    return (number_of(len(common), "position"),) if common else ()
 
 
 def motions(points: Array) -> Array:
