@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.maps.fitted_map import InCommon, readings_in_common
+from ballplate.simulator.maps.fitted_map import InCommon
 from ballplate.simulator.readings.same_readings import read_once_words
 
 from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
 from ..adjustments import FEW
-from .compared_maps import MOTIONS, ComparedMap, positions_in_common
+from ..validation.lack_of_fit import TOO_ALIKE, TOO_RARE
+from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
 
@@ -84,7 +85,17 @@ class MapDifference(Result):
     @cached_property
     def in_common(self) -> InCommon:
         """What both maps have of each other's readings."""
-        return readings_in_common(self.first.data, self.second.data)
+        return in_common(self.first, self.second)
+
+    @property
+    def is_too_alike(self) -> bool:
+        """Whether two that were measured differ by less than independent ones do but by a rare
+        chance.
+        """
+        test = self.comparison.test
+        if test is None or not test.statistic or len(self._measured()) < 2:
+            return False
+        return 1.0 - test.p < TOO_RARE
 
     @property
     def tests(self) -> tuple[JointTest, ...]:
@@ -118,11 +129,8 @@ class MapDifference(Result):
     def _verdict(self, test: JointTest) -> str:
         if test.p < LEVEL:
             return "a change is shown"
-        return (
-            "no change is shown"
-            if self.in_common == "none"
-            else "readings in common may hide a change"
-        )
+        is_hidden = self.in_common != "none"
+        return "readings in common may hide a change" if is_hidden else "no change is shown"
 
     def lines(self) -> list[str]:
         found, k = self.comparison, self.coverage_factor
@@ -163,6 +171,8 @@ class MapDifference(Result):
             found.append(f"warning: {SAME_READINGS}")
         elif once := positions_in_common(self.first, self.second):
             found.append(f"warning: {read_once_words(once)}")
+        elif self.is_too_alike:
+            found.append(f"warning: {TOO_ALIKE}")
         return tuple(found)
 
     def _assumption(self) -> str:
