@@ -18,7 +18,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES, rigid_motions
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array, Unit
 from ballplate.simulator.maps.corrected_points import corrected, drawn_rows
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.maps.fitted_map import FittedMap, readings_in_common
 
 from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
@@ -342,12 +342,12 @@ def adjusted_machine(
     `share` is the standard uncertainty of each change as a part of it.
 
     :raises ValueError: the error model cannot follow a change; the second map is of another volume,
-        or of the same readings.
+        or rests on readings of the first.
     """
-    if second is not None and second.has_readings_of(fitted):
+    if second is not None and readings_in_common(fitted.data, second.data) != "none":
         raise ValueError(
-            "the second campaign has the readings of the first, from before the changes; name what"
-            " was read after them"
+            "the second campaign has readings of the first, from before the changes; name what was"
+            " read after them, and nothing else"
         )
     corners, other = (np.array(one.volume.corners) for one in (fitted, second or fitted))
     if corners.shape != other.shape or not np.allclose(corners, other):

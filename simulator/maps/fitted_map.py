@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,9 @@ LEAST_SIGMA = 1e-6
 
 # Eigenvalues of correlations below this, in parts of the largest, are rounding.
 ROUNDING = 1e-13
+
+# What two campaigns have of each other's readings.
+InCommon = Literal["none", "some", "same"]
 
 # Kind of what a map leaves out that was converted from another error model.
 CONVERSION = "conversion"
@@ -55,12 +58,6 @@ class MapData:
     def common(self, other: MapData) -> frozenset[str]:
         """Fingerprints of positions whose readings both have."""
         return frozenset(self.positions) & frozenset(other.positions)
-
-    def is_one_campaign(self, other: MapData) -> bool:
-        """Whether all that one of both has read is among the readings of the other."""
-        counts = [len(set(one.positions)) for one in (self, other)]
-        found = len(self.common(other))
-        return self.sha256 == other.sha256 or 0 < found == min(counts)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -123,11 +120,6 @@ class FittedMap:
         """
         found = [one.value for one in self.left_out if one.kind == CONVERSION]
         return found[0] if found else None
-
-    def has_readings_of(self, other: FittedMap) -> bool:
-        """Whether both maps come from the same readings, or one from part of the other's."""
-        both = self.data, other.data
-        return both[0] is not None and both[1] is not None and both[0].is_one_campaign(both[1])
 
     @cached_property
     def offset_columns(self) -> Integers:
@@ -196,6 +188,17 @@ class FittedMap:
 
     def _blanked(self, rows: Array, values: Array) -> Array:
         return blank(values, rows @ self.undetermined, np.linalg.norm(rows * self.scale, axis=-1))
+
+
+def readings_in_common(first: MapData | None, second: MapData | None) -> InCommon:
+    """Whether two maps rest on the same readings: what either knows from others counts as well, so
+    that an update of a map has only some in common with it.
+    """
+    if first is None or second is None:
+        return "none"
+    if set(first.positions) == set(second.positions):
+        return "same" if first.positions or first.sha256 == second.sha256 else "none"
+    return "some" if first.common(second) or first.sha256 == second.sha256 else "none"
 
 
 def determined_only(null: Array, scale: Array) -> Array:

@@ -6,10 +6,22 @@ import hashlib
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..inputs.settings import listing
+from ..machines.protocol import Array
+from ..maps.fitted_map import InCommon
 from .observed_readings import ObservedReadings
 
+Flags = NDArray[np.bool_]
+
+# Readings no further apart than this (m) differ by rounding in the computer.
+NOTHING = 1e-12
+# Last digits are looked for down to 10 to the minus this, in metres, and values nearer than so much
+# of one to a multiple are one.
+FINEST, WHOLE = 12, 1e-3
+# Readings that were rounded by more than this part of the repeatability are compared as they stand.
+FINE = 0.51
 # Hexadecimal digits of a position's fingerprint.
 DIGITS = 16
 
@@ -41,17 +53,83 @@ def fingerprint(observed: ObservedReadings) -> str:
 
 
 def same_positions(first: ObservedReadings, second: ObservedReadings) -> tuple[str, ...]:
-    """Positions of the second campaign whose readings are to the last digit those of a position of
-    the first.
+    """Positions of the second campaign most of whose readings are those of the first."""
+    shared, chance = _same(first, second)
+    position = second.design.readings.position
+    counts = np.bincount(position)
+    found = np.bincount(position, shared[1])
+    places = np.flatnonzero(_are_most(found / np.maximum(counts, 1), chance))
+    return tuple(second.design.positions.names[k] for k in places.tolist())
+
+
+def same_readings(first: ObservedReadings, second: ObservedReadings) -> InCommon:
+    """What two campaigns have of each other's readings: the same ones if most of both are, some if
+    most of a position are.
+
+    Single readings are compared, of a ball by a probe, whatever positions are called and however
+    many are left out, up to the last digit of the table that was rounded more coarsely.
     """
-    known = set(position_fingerprints(first).values())
-    return tuple(name for name, one in position_fingerprints(second).items() if one in known)
+    shared, chance = _same(first, second)
+    if _are_most(np.array([one.mean() for one in shared]), chance).all():
+        return "same"
+    return "some" if same_positions(first, second) or same_positions(second, first) else "none"
 
 
-def is_one_campaign(first: ObservedReadings, second: ObservedReadings) -> bool:
-    """Whether all that one of two campaigns read is among the readings of the other."""
-    counts = [len(np.unique(one.design.readings.position)) for one in (first, second)]
-    return len(same_positions(first, second)) >= min(counts)
+def _are_most(share: Array, chance: float) -> Flags:
+    """Whether shares of readings are most of them: all, or nearer to all than to what chance makes
+    equal.
+
+    >>> _are_most(np.array([0.5, 0.6, 1.0]), 0.0).tolist()
+    [False, True, True]
+    """
+    return (share > 0.5 * (1.0 + chance)) | (share == 1.0)
+
+
+def _same(first: ObservedReadings, second: ObservedReadings) -> tuple[tuple[Flags, Flags], float]:
+    """Which readings of two campaigns are in the other, and the chance that one is which was read
+    anew in the same place.
+    """
+    from scipy.spatial import cKDTree
+    from scipy.special import erf
+
+    digits = [_last_digit(one.x) for one in (first, second)]
+    s = np.asarray(first.design.machine.repeatability)
+    apart = 0.5 * sum(digits) if digits[0] != digits[1] else 0.0
+    # Digits as coarse as the scatter would make readings of their own alike.
+    apart = apart if (apart <= FINE * s).all() else 0.0
+    within = apart + NOTHING
+    step = np.divide(max(digits[0] if apart == 0.0 else 2.0 * apart, NOTHING), 2.0 * s)
+    chance = float(np.prod(erf(step)))
+    named: dict[tuple[str, str], int] = {}
+    points = [_places(one, named) for one in (first, second)]
+    trees = [cKDTree(one) for one in points]
+    found = [
+        np.isfinite(tree.query(own, distance_upper_bound=within, p=np.inf)[0])
+        for tree, own in zip(trees[::-1], points, strict=True)
+    ]
+    return (found[0], found[1]), chance
+
+
+def _places(observed: ObservedReadings, named: dict[tuple[str, str], int]) -> Array:
+    """Scale readings (n, d + 1) with a number for the ball and the probe, by their names."""
+    design, readings = observed.design, observed.design.readings
+    balls, probes = design.balls.names, design.probes.names
+    both = zip(readings.ball.tolist(), readings.probe.tolist(), strict=True)
+    numbers = [named.setdefault((balls[k], probes[p]), len(named)) for k, p in both]
+    return np.column_stack([np.nan_to_num(observed.x), numbers])
+
+
+def _last_digit(x: Array) -> float:
+    """The largest power of ten, in metres, of which all scale readings are multiples.
+
+    >>> _last_digit(np.array([0.1234567, -0.25]))
+    1e-07
+    """
+    for power in range(3, FINEST):
+        parts = np.nan_to_num(x) * 10.0**power
+        if (np.abs(parts - np.rint(parts)) < WHOLE).all():
+            return float(f"1e-{power}")
+    return float(f"1e-{FINEST}")
 
 
 def read_once_words(positions: tuple[str, ...]) -> str:

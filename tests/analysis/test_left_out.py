@@ -25,6 +25,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.same_readings import same_readings
 from numpy.typing import NDArray
 
 from tests.reference import dense
@@ -239,9 +240,50 @@ def test_a_campaign_is_not_compared_with_itself() -> None:
     found = cross_validate(small(), observed, observe(design, own, mixed))
     name = design.positions.names[0]
     assert f"the same in both campaigns in {name}:" in found.cautions[0]
-    # One reading that differs by a nanometre is another.
-    mixed[np.flatnonzero(is_first)[3], 1] += 1e-9
-    assert cross_validate(small(), observed, observe(design, own, mixed)).read_once == ()
+    assert "may hide that the campaigns differ" in found.complaint
+    assert "agree" not in found.headline()
+    # A nanometre makes other readings, of which most of a position have to be.
+    changed = np.flatnonzero(is_first)
+    for count, told in ((1, (name,)), (len(changed) // 2 + 1, ())):
+        mixed[changed[:count], 1] = x[changed[:count], 1] + 1e-9
+        assert cross_validate(small(), observed, observe(design, own, mixed)).read_once == told
+
+
+@pytest.mark.parametrize("digits", [9, 8, 7])
+def test_an_edit_makes_no_second_campaign(digits: int) -> None:
+    """One reading of each position is left out, and the rest is rounded."""
+    design = lay_out(small())
+    observed, other = campaign(design, 6), campaign(design, 7)
+    own, x = observed.design.readings, observed.x
+    _, first = np.unique(own.position, return_index=True)
+    rest = np.delete(np.arange(len(x)), first)
+    for rows in (np.arange(len(x)), rest):
+        again = observe(design, own.select(rows), np.round(x[rows], digits))
+        assert same_readings(observed, again) == same_readings(again, observed) == "same"
+        with pytest.raises(ExperimentError, match="both campaigns have the same readings"):
+            cross_validate(small(), observed, again)
+    # Part of a campaign is no other one either, and one of its own stays one, however coarse.
+    half = np.flatnonzero(own.position < 3)
+    part = observe(design, own.select(half), np.round(x[half], digits))
+    assert same_readings(observed, part) == same_readings(part, observed) == "some"
+    for coarse in (digits, 6):
+        rounded = [replace(one, x=np.round(one.x, coarse)) for one in (observed, other)]
+        for one, two in (rounded, (observed, rounded[1]), (rounded[0], other)):
+            assert same_readings(one, two) == "none"
+
+
+def test_what_is_too_much_alike_is_doubted() -> None:
+    """Readings that all were moved by a tenth of their scatter are told by their likeness alone."""
+    design = lay_out(small())
+    observed = campaign(design, 6)
+    moved = 2e-8 * np.random.default_rng(5).standard_normal(observed.x.shape)
+    again = replace(observed, x=observed.x + moved)
+    found = cross_validate(small(), observed, again, "given")
+    # Their differences have a tenth of one campaign's scatter, of two 1 / sqrt(200).
+    assert found.sum_of_squares / found.dimensions == pytest.approx(1.0 / 200.0, rel=0.5)
+    assert scipy.stats.chi2.cdf(found.sum_of_squares, found.dimensions) < 1e-3
+    assert any("are as alike as these" in one for one in found.cautions)
+    assert not cross_validate(small(), observed, campaign(design, 7), "given").cautions
 
 
 def differences(count: int, common: bool = True) -> Real:

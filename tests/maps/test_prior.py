@@ -315,6 +315,6 @@ def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
     later = bp.fit(known, second).to_map()  # type: ignore[attr-defined]
     bp.write_map(later, tmp_path / "later.npz")
     found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.npz", grid=2)
-    assert found.has_one_campaign and found.is_changed is None
+    assert found.in_common == "some" and found.is_changed is None
     apart = bp.fit(plain, second).to_map()  # type: ignore[attr-defined]
     assert bp.diff(tmp_path / "map.yaml", apart, grid=2).is_changed is False

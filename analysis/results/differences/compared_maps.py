@@ -11,15 +11,20 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.motions import cross_matrices, pose_size
 from ballplate.simulator.inputs.quantities import LengthFunction
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
-from ballplate.simulator.maps.fitted_map import MapData
-from ballplate.simulator.readings.same_readings import position_fingerprints
+from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
+from ballplate.simulator.readings.same_readings import (
+    position_fingerprints,
+    same_positions,
+    same_readings,
+)
 
 from ...error_maps.volumetric_errors import Volumetric
 from ..fit import Fit
-from ..map_of_fit import data_of
+from ..map_of_fit import data_of, maps_known
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it
 # can do a motion of its frame.
@@ -178,24 +183,35 @@ class ComparedMap:
         return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
 
 
-def come_from_same_readings(first: ComparedMap, second: ComparedMap) -> bool:
-    """Whether two maps come from the same readings, or one from part of the other's."""
-    both = first.data, second.data
-    return both[0] is not None and both[1] is not None and both[0].is_one_campaign(both[1])
+def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
+    """What two maps have of each other's readings, which fits compare one by one."""
+    found = readings_in_common(first.data, second.data)
+    one, other = first.fit, second.fit
+    if found == "same" or one is None or other is None:
+        return found
+    read = same_readings(one.observed, other.observed)
+    knows_alike = maps_known(one.experiment) == maps_known(other.experiment)
+    if read == "same":
+        return "same" if knows_alike else "some"
+    return "some" if "some" in (found, read) else "none"
 
 
-def read_once(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
+def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
     """Positions whose readings two maps have in common, by their names where one is a fit, or how
     many they are.
     """
+    if first.fit is not None and second.fit is not None:
+        read = same_positions(first.fit.observed, second.fit.observed)
+        if read:
+            return read
     if first.data is None or second.data is None:
         return ()
     common = first.data.common(second.data)
-    fit = second.fit or first.fit
-    if fit is None or not common:
-        return (f"{len(common)} position{'s' * (len(common) != 1)}",) if common else ()
-    prints = position_fingerprints(fit.observed)
-    return tuple(name for name, one in prints.items() if one in common)
+    for fit in filter(None, (second.fit, first.fit)):
+        prints = position_fingerprints(fit.observed)
+        if common <= set(prints.values()):
+            return tuple(name for name, one in prints.items() if one in common)
+    return (number_of(len(common), "position"),) if common else ()
 
 
 def motions(points: Array) -> Array:

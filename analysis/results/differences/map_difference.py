@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.maps.fitted_map import InCommon
 from ballplate.simulator.readings.same_readings import read_once_words
 
 from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
 from ..adjustments import FEW
-from .compared_maps import MOTIONS, ComparedMap, come_from_same_readings, read_once
+from ..validation.lack_of_fit import TOO_ALIKE, TOO_RARE
+from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
 
@@ -35,10 +37,15 @@ INDEPENDENT = (
     " cancel in the difference, U here is too large, and a change may be missed"
 )
 
-
 SAME_READINGS = (
     "both rest on the same readings: U and E_n, which take campaigns to be independent, say nothing"
     " here, and differences are those of the evaluation alone"
+)
+
+SOME_READINGS = (
+    "both rest on some of the same readings: U here, which takes campaigns to be independent, is"
+    " too large, so that a change may be shown, but never that there is none; compare a map of what"
+    " was read anew alone"
 )
 
 
@@ -76,9 +83,19 @@ class MapDifference(Result):
         return days.days / DAYS_OF_A_YEAR if days.days else None
 
     @cached_property
-    def has_one_campaign(self) -> bool:
-        """Whether both maps come from the same readings, or one from part of the other's."""
-        return come_from_same_readings(self.first, self.second)
+    def in_common(self) -> InCommon:
+        """What both maps have of each other's readings."""
+        return in_common(self.first, self.second)
+
+    @property
+    def is_too_alike(self) -> bool:
+        """Whether two that were measured differ by less than independent ones do but by a rare
+        chance.
+        """
+        test = self.comparison.test
+        if test is None or not test.statistic or len(self._measured()) < 2:
+            return False
+        return 1.0 - test.p < TOO_RARE
 
     @property
     def tests(self) -> tuple[JointTest, ...]:
@@ -89,17 +106,31 @@ class MapDifference(Result):
 
     @property
     def is_changed(self) -> bool | None:
-        """Whether the joint test of the map shows a change; None where nothing can be tested."""
+        """Whether the joint test of the map shows a change; None where nothing can be tested, or
+        readings in common hide it.
+
+        What they have in common makes the sum of both covariances too large for the difference:
+        that of an estimate and its update has the covariance of the one less that of the other.
+        """
         test = self.comparison.test
-        return None if test is None or self.has_one_campaign else test.p < LEVEL
+        if test is None or self.in_common == "same":
+            return None
+        is_shown = test.p < LEVEL
+        return is_shown if is_shown or self.in_common == "none" else None
 
     def headline(self) -> str:
         test = self.comparison.test
-        if self.has_one_campaign:
+        if self.in_common == "same":
             return "the same readings on both sides: no change can be shown"
         if test is None:
             return "nothing that is determined in both can be tested"
-        return f"{_verdict(test)} (p = {_chance(test.p)})"
+        return f"{self._verdict(test)} (p = {_chance(test.p)})"
+
+    def _verdict(self, test: JointTest) -> str:
+        if test.p < LEVEL:
+            return "a change is shown"
+        is_hidden = self.in_common != "none"
+        return "readings in common may hide a change" if is_hidden else "no change is shown"
 
     def lines(self) -> list[str]:
         found, k = self.comparison, self.coverage_factor
@@ -114,10 +145,10 @@ class MapDifference(Result):
             "",
             *self._motion_table(),
             "",
-            *([] if self.has_one_campaign else self._tested_lines()),
+            *([] if self.in_common == "same" else self._tested_lines()),
             *self._length_table(),
         ]
-        if self.has_one_campaign:
+        if self.in_common == "same":
             return lines
         if found.functions:
             lines += ["", *self._function_table()]
@@ -136,15 +167,17 @@ class MapDifference(Result):
         for one in (self.first, self.second):
             cautions = () if one.fit is None else one.fit.cautions
             found += [f"warning: {one.label}: {caution}" for caution in cautions]
-        if self.has_one_campaign:
+        if self.in_common == "same":
             found.append(f"warning: {SAME_READINGS}")
-        elif once := read_once(self.first, self.second):
+        elif once := positions_in_common(self.first, self.second):
             found.append(f"warning: {read_once_words(once)}")
+        elif self.is_too_alike:
+            found.append(f"warning: {TOO_ALIKE}")
         return tuple(found)
 
     def _assumption(self) -> str:
-        if self.has_one_campaign:
-            return SAME_READINGS
+        if self.in_common != "none":
+            return SAME_READINGS if self.in_common == "same" else SOME_READINGS
         expected = [one for one in (self.first, self.second) if one.is_expected]
         if expected:
             one = expected[0]
@@ -200,7 +233,7 @@ class MapDifference(Result):
             lines.append(
                 f"{one.what}, one joint test: chi-squared {number(one.statistic)} of"
                 f" {one.dimensions} independent differences{scatter}, p = {_chance(one.p)}:"
-                f" {_verdict(one)}"
+                f" {self._verdict(one)}"
             )
         lines.append(
             "a single |E_n| > 1 among many figures shows nothing, since about as many as stated by"
@@ -260,7 +293,8 @@ class MapDifference(Result):
             "probe": found.probe,
             "coverage_factor": self.coverage_factor,
             "shared_values": self.shared,
-            "same_readings": self.has_one_campaign,
+            "same_readings": self.in_common == "same",
+            "readings_in_common": self.in_common,
             "years": self.years,
             "changed": self.is_changed,
             "level": LEVEL,
@@ -329,10 +363,6 @@ class MapDifference(Result):
         from .difference_plots import draw_difference
 
         return draw_difference(self.comparison, f"{self.label}: {self.headline()}", path)
-
-
-def _verdict(test: JointTest) -> str:
-    return "a change is shown" if test.p < LEVEL else "no change is shown"
 
 
 def _chance(p: float) -> str:

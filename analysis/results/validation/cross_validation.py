@@ -23,14 +23,14 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.same_readings import (
-    is_one_campaign,
     read_once_words,
     same_positions,
+    same_readings,
 )
 
 from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
-from .lack_of_fit import chance_of, chance_words
+from .lack_of_fit import TOO_ALIKE, TOO_RARE, chance_of, chance_words
 from .left_out import MOST_POINTS
 from .left_out_result import FAILED
 
@@ -46,7 +46,8 @@ class CrossValidation(FitResult):
     `sum_of_squares` of the differences, weighted with their covariance, has `dimensions`, and
     `chance` is that of one so large. `lengths` are the largest difference of a length between two
     places, and its standard uncertainty. `common` tells whether both had the same certificates,
-    and `read_once` names positions whose readings are the same in both.
+    and `read_once` names positions whose readings are the same in both;
+    `is_too_alike` tells that two independent campaigns are hardly ever so much alike.
     """
 
     label: str
@@ -63,10 +64,13 @@ class CrossValidation(FitResult):
     coverage_factor: float
     common: bool = True
     read_once: tuple[str, ...] = ()
+    is_too_alike: bool = False
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        return (read_once_words(self.read_once),) if self.read_once else ()
+        if self.read_once:
+            return (read_once_words(self.read_once),)
+        return (TOO_ALIKE,) if self.is_too_alike else ()
 
     @property
     def complaint(self) -> str:
@@ -75,11 +79,18 @@ class CrossValidation(FitResult):
                 "the two campaigns differ by more than their uncertainties explain: the machine has"
                 " changed, or the error model is too poor for both"
             )
+        if self.read_once:
+            return (
+                "readings in common may hide that the campaigns differ; compare what was read anew"
+                " alone"
+            )
         return ""
 
     def headline(self) -> str:
-        verb = "differ" if self.complaint else "agree"
-        return f"the campaigns {verb}, {1e6 * self._rms(self.differences):.3g} µm rms"
+        size = f"{1e6 * self._rms(self.differences):.3g} µm rms"
+        if self.chance >= FAILED and self.read_once:
+            return f"the campaigns have readings in common, which may hide a difference, {size}"
+        return f"the campaigns {'differ' if self.chance < FAILED else 'agree'}, {size}"
 
     @staticmethod
     def _rms(values: Array) -> float:
@@ -174,7 +185,7 @@ def cross_validate(
     :raises ExperimentError: one of them does not converge, both are the same readings, or nothing
         can be compared.
     """
-    if is_one_campaign(first, second):
+    if same_readings(first, second) == "same":
         text = "both campaigns have the same readings, which agree with themselves; name others"
         raise refused(experiment.source, text)
     given = (sigma or experiment.sigma) == "given"
@@ -207,6 +218,7 @@ def cross_validate(
     square = float((((u.T @ change)[used] / values[used]) ** 2).sum())
     freedom = min(at.degrees_of_freedom for at, _ in fits)
     shape = places.shape
+    chance = chance_of(square, dimensions, float(freedom), freedom, given)
     return CrossValidation(
         experiment.label,
         experiment.title,
@@ -216,12 +228,13 @@ def cross_validate(
         np.sqrt((root**2).sum(axis=1)).reshape(shape),
         square,
         dimensions,
-        chance_of(square, dimensions, float(freedom), freedom, given),
+        chance,
         _largest_length(places, change, root),
         (scale_1, scale_2),
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         common,
         same_positions(first, second),
+        square > 0.0 and (given or freedom > 0) and 1.0 - chance < TOO_RARE,
     )
 
 
