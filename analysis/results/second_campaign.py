@@ -47,8 +47,9 @@ class CampaignFigures:
 @dataclass(frozen=True, eq=False)
 class CampaignComparison:
     """E_n (m,) of figures, NaN where one is undetermined and where both are exactly known and the
-    same; how many were `compared`; the |E_n| that any of these exceeds at most once in a hundred;
-    and `overall`, which is above 1 at most once in twenty, where nothing has changed.
+    same; how many were `compared`; the |E_n| that any of these exceeds at most once in a hundred,
+    infinite without degrees of freedom; and `overall`, which is above 1 at most once in twenty,
+    where nothing has changed.
     """
 
     normalised_errors: Array
@@ -80,10 +81,12 @@ def compared_campaigns(
     whole = coverage_factor * np.where(exact, 1.0, size)
     errors = np.where(exact, np.copysign(np.inf, apart), apart / whole)
     errors[np.isnan(apart)] = np.nan
-    is_finite, count = np.isfinite(errors), int((~np.isnan(errors)).sum())
-    quantiles = [_student(one.degrees_of_freedom, ANY_FIGURE / max(count, 1)) for one in both]
-    widened = np.hypot(*(factor * u for factor, u in zip(quantiles, sizes, strict=True)))
-    largest = float((widened / whole)[is_finite].max(initial=1.0))
+    count = int((~np.isnan(errors)).sum())
+    largest = float("inf")
+    if all(one.degrees_of_freedom > 0.0 for one in both):
+        factors = [_student(one.degrees_of_freedom, ANY_FIGURE / max(count, 1)) for one in both]
+        widened = np.hypot(*(factor * u for factor, u in zip(factors, sizes, strict=True)))
+        largest = float((widened / whole)[np.isfinite(errors)].max(initial=1.0))
     return CampaignComparison(errors, count, largest, _overall(both, errors, size, together))
 
 
@@ -95,7 +98,8 @@ def _overall(
     together: NDArray[np.bool_],
 ) -> float:
     """The root of the weighted sum of squares of differences over its quantile; infinite where
-    figures that are wholly correlated contradict each other.
+    figures that are exactly known or wholly correlated contradict each other, NaN where there are
+    none, or a scatter without degrees of freedom.
     """
     if np.isinf(errors[together]).any():
         return float("inf")
@@ -113,6 +117,8 @@ def _overall(
     doubt = BEYOND_DOUBT * np.sqrt(SAME * values[-1]) + np.abs(dropped.T) @ (slack / size)
     if (np.abs(dropped.T @ apart) > doubt).any():
         return float("inf")
+    if not all(one.degrees_of_freedom > 0.0 for one in both):
+        return float("nan")
     whitening = (vectors[:, kept] / np.sqrt(values[kept])).T
     limits = [_fisher(int(kept.sum()), one.degrees_of_freedom) for one in both]
     columns = [
