@@ -3,11 +3,11 @@ test.
 
 Where a campaign estimates its sigma, its variance is widened by what Student's or Fisher's
 quantile, of its own degrees of freedom, has over that of known variances. With one figure this is
-the bound of S. K. Banerjee, Confidence interval for the mean difference of two normal populations
-with unknown variances, Calcutta Statistical Association Bulletin 10 (1960): no chance is larger
-than stated, whatever the true shares of both campaigns. Effective degrees of freedom from the
-estimated shares (Welch and Satterthwaite) do not keep it: a campaign of few whose sigma came out
-too small has too small a share as well.
+the interval of S. K. Banerjee, Sankhya 22 (1960), 357, for means of populations whose variances are
+not equal: no chance is larger than stated, whatever the true shares of both campaigns. With several
+it holds in simulations. Effective degrees of freedom from the estimated shares (Welch and
+Satterthwaite) do not keep it: a campaign of few whose sigma came out too small has too small a
+share as well.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def test_chances_are_no_larger_than_stated(freedom: tuple[float, float]) -> None
 def test_chances_of_many_are_no_larger_than_stated(
     share: str, freedom: tuple[float, float]
 ) -> None:
-    check(share, freedom, 10_000)
+    check(share, freedom, 3000)
 
 
 @pytest.mark.parametrize("freedom", [2.0, 7.0])
