@@ -24,18 +24,12 @@ from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
 from .adjustments import ARCSECOND, coverage_factor, few_degrees_of_freedom
 from .machine_changes import MachineChange
+from .second_campaign import ROUNDING, CampaignComparison, CampaignFigures, compared_campaigns
 
 # Points along each axis at which a change of the machine is followed, and the part of it that the
 # model may leave out.
 POINTS_ALONG = 4
 LEFT_OUT = 1e-3
-# Directions of a covariance below this part of the largest, as correlations, are those of figures
-# that say the same.
-SAME = 1e-6
-# Chance with which any of the figures compared counts as not as predicted although it is.
-ANY_FIGURE = 0.01
-# Figures below this, in metres and radians, are rounding.
-ROUNDING = 1e-13
 
 INDEPENDENT = (
     "The two campaigns are taken as independent. What both rest on alike, such as one certificate,"
@@ -186,9 +180,11 @@ class AdjustedMachine(Result):
 
     `before` and `predicted` are the figures of `lines`, `found` those of the second campaign, None
     without one; `normalised_errors` (m,) are their E_n, NaN where one is undetermined and where
-    both are exactly known and the same. `overall` compares scales and angles together, as E_n does
-    one: at most 1 in 95 % of pairs of campaigns, where nothing else has changed. `compared` counts
-    figures that have an E_n. `predicted_map` is the machine as predicted.
+    both are exactly known and the same, infinite where they are exactly known and differ.
+    `compared` counts figures that have an E_n, and `largest_by_chance` is the |E_n| that any of
+    them exceeds at most once in a hundred by chance. `overall` compares scales and angles together,
+    as E_n does one: at most 1 in at least 95 % of pairs of campaigns, where nothing else has
+    changed. `predicted_map` is the machine as predicted.
     """
 
     label: str
@@ -201,6 +197,7 @@ class AdjustedMachine(Result):
     normalised_errors: Array
     overall: float
     compared: int
+    largest_by_chance: float
     coverage_factor: float
     predicted_map: FittedMap
     remarks: tuple[str, ...] = ()
@@ -214,14 +211,6 @@ class AdjustedMachine(Result):
         return bool((one_by_one <= self.largest_by_chance).all()) and not self.overall > 1.0
 
     @property
-    def largest_by_chance(self) -> float:
-        """|E_n| that one of the figures compared exceeds once in a hundred by chance."""
-        from scipy.special import ndtri
-
-        limit = -ndtri(0.5 * ANY_FIGURE / max(self.compared, 1)) / self.coverage_factor
-        return max(1.0, float(limit))
-
-    @property
     def notes(self) -> tuple[str, ...]:
         return (*self.remarks, *([INDEPENDENT] if self.found is not None else []))
 
@@ -230,12 +219,16 @@ class AdjustedMachine(Result):
             count = len(self.changes)
             return f"{number_of(count, 'change')}, predicted"
         if not self.compared:
+            if any(self._is_exact(i) for i in range(len(self.lines_of_machine))):
+                return (
+                    "as predicted: figures that are exactly known by both campaigns, and the same"
+                )
             return "nothing is determined by both campaigns"
         return (
             f"{'as predicted' if self.is_within else 'not as predicted'}: |E_n| at most"
             f" {number(float(np.nanmax(np.abs(self.normalised_errors))), 3)} (of"
-            f" {self.compared}, above {number(self.largest_by_chance, 3)} once in a hundred),"
-            f" overall {number(self.overall, 3)} (above 1 once in twenty)"
+            f" {self.compared}, above {number(self.largest_by_chance, 3)} at most once in a"
+            f" hundred), overall {number(self.overall, 3)} (above 1 at most once in twenty)"
         )
 
     def lines(self) -> list[str]:
@@ -267,10 +260,13 @@ class AdjustedMachine(Result):
 
     def _shown_error(self, i: int) -> str:
         """E_n of a figure; there is none where both campaigns know it exactly, and the same."""
-        both = (self.predicted[i], self.found[i]) if self.found is not None else ()
         error = float(self.normalised_errors[i])
-        is_exact = all(one.standard_uncertainty <= ROUNDING for one in both)
-        return "-" if is_exact and np.isnan(error) else _shown(error)
+        return "-" if self._is_exact(i) and np.isnan(error) else _shown(error)
+
+    def _is_exact(self, i: int) -> bool:
+        """Whether a figure has no uncertainty in the prediction, nor in a second campaign."""
+        both = (self.predicted[i], *([self.found[i]] if self.found is not None else []))
+        return all(one.standard_uncertainty <= ROUNDING for one in both)
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -298,6 +294,7 @@ class AdjustedMachine(Result):
             },
             "overall": finite(self.overall),
             "compared": self.compared,
+            "largest_by_chance": finite(self.largest_by_chance),
             "within": self.is_within if self.compared else None,
             "notes": list(self.notes),
         }
@@ -358,9 +355,12 @@ def adjusted_machine(
     k = fitted.coverage_factor
     before, predicted = line_values(fitted, lines), line_values(after, lines)
     found = None if second is None else line_values(second, lines)
-    errors, overall, compared = np.full(len(lines), np.nan), float("nan"), 0
-    if found is not None:
-        errors, overall, compared = _compared(lines, predicted, found, k)
+    comparison = CampaignComparison(np.full(len(lines), np.nan), 0, 1.0, float("nan"))
+    if second is not None and found is not None:
+        together = np.array([one.kind != "diagonal" for one in lines])
+        # The changes' own uncertainty counts as part of the first campaign's, which is no smaller.
+        both = _figures(fitted, predicted), _figures(second, found)
+        comparison = compared_campaigns(*both, together, k)
     return AdjustedMachine(
         label,
         fitted.title,
@@ -369,13 +369,20 @@ def adjusted_machine(
         _listed(before),
         _listed(predicted),
         None if found is None else _listed(found),
-        errors,
-        overall,
-        compared,
+        comparison.normalised_errors,
+        comparison.overall,
+        comparison.compared,
+        comparison.largest_by_chance,
         k,
         after,
         _few(fitted, second),
     )
+
+
+def _figures(fitted: FittedMap, found: tuple[Array, Array]) -> CampaignFigures:
+    """Figures of a campaign, with the degrees of freedom of its sigma."""
+    freedom = float(fitted.degrees_of_freedom) if fitted.sigma_is_estimated else np.inf
+    return CampaignFigures(*found, freedom)
 
 
 def _listed(found: tuple[Array, Array]) -> tuple[LineValue, ...]:
@@ -395,34 +402,3 @@ def _few(*maps: FittedMap | None) -> tuple[str, ...]:
         if one is not None and one.sigma_is_estimated
     ]
     return tuple(filter(None, told))
-
-
-def _compared(
-    lines: Sequence[MachineLine],
-    predicted: tuple[Array, Array],
-    found: tuple[Array, Array],
-    k: float,
-) -> tuple[Array, float, int]:
-    """E_n of each figure; that of scales and angles together, the root of their weighted sum of
-    squares over its quantile of 95 %; and how many figures were compared.
-    """
-    from scipy.special import chdtri
-
-    apart, roots = found[0] - predicted[0], (predicted[1], found[1])
-    size = np.sqrt(sum((root**2).sum(axis=1) for root in roots))
-    # Exactly known in both: the same, or different beyond doubt.
-    exact = size <= ROUNDING
-    apart = np.where(np.abs(apart) <= ROUNDING, np.where(exact, np.nan, 0.0), apart)
-    errors = np.where(exact, np.copysign(np.inf, apart), apart / (k * np.where(exact, 1.0, size)))
-    errors[np.isnan(apart)] = np.nan
-    own = np.array([one.kind != "diagonal" for one in lines])
-    some = np.flatnonzero(own & np.isfinite(errors))
-    if not len(some):
-        return errors, float("nan"), int(np.isfinite(errors).sum())
-    covariance = sum((root[some] @ root[some].T for root in roots), np.zeros((1, 1)))
-    standard = covariance / np.outer(size[some], size[some])
-    values, vectors = np.linalg.eigh(standard)
-    kept = values > SAME * values[-1]
-    scores = (vectors.T @ (apart[some] / size[some]))[kept] / np.sqrt(values[kept])
-    limit = float(chdtri(int(kept.sum()), 0.05))
-    return errors, float(np.sqrt((scores**2).sum() / limit)), int(np.isfinite(errors).sum())

@@ -25,7 +25,9 @@ from ballplate.simulator.readings.certificate_files import with_drawn_values
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
-from scipy.stats import binom, chi2
+from scipy.stats import binom, chi2, norm
+from scipy.stats import f as fisher
+from scipy.stats import t as student
 
 from tests.certificates.campaigns import IN_PLANE, IN_SPACE
 from tests.maps.kinds import fit_of, write_files
@@ -310,6 +312,20 @@ def test_overall_is_the_weighted_sum_of_squares() -> None:
     assert found.to_dict()["overall"] == found.overall
 
 
+def test_chances_are_those_of_the_degrees_of_freedom() -> None:
+    """Ten figures, one of which exceeds its limit once in a hundred, by Student's distribution."""
+    maps = [map_of_campaign(TRUE, seed) for seed in (3, 4)]
+    change = [scale_change("x=0 ppm")]
+    stated = adjusted_machine("", maps[0], change, maps[1])
+    assert stated.largest_by_chance == pytest.approx(norm.ppf(0.9995) / 2.0, rel=1e-9)
+    few = [replace(one, sigma_is_estimated=True, degrees_of_freedom=3) for one in maps]
+    found = adjusted_machine("", few[0], change, few[1])
+    assert found.largest_by_chance == pytest.approx(student.ppf(0.9995, 3) / 2.0, rel=1e-9)
+    ratio = np.sqrt(chi2.ppf(0.95, 6) / (6.0 * fisher.ppf(0.95, 6, 3)))
+    assert found.overall == pytest.approx(ratio * stated.overall, rel=1e-9)
+    assert found.to_dict()["largest_by_chance"] == found.largest_by_chance
+
+
 def test_undetermined_figures_are_told_and_left_out() -> None:
     level = {**IN_SPACE, "error_model": {"kind": "metric"}, "positions": IN_SPACE["positions"][:2]}
     experiment = bp.experiment(level)
@@ -384,3 +400,8 @@ def test_a_machine_that_is_exactly_known_differs_or_not(tmp_path: Path) -> None:
     assert "undetermined" not in "".join(same.lines()[1:-1])
     other = adjusted_machine("", known, [scale_change("x=5 ppm")], known)
     assert np.isinf(other.normalised_errors[0]) and not other.is_within
+    # X and the four diagonals.
+    assert other.compared == 5 and np.isinf(other.overall)
+    assert other.headline().startswith("not as predicted: |E_n| at most inf")
+    assert same.is_within and same.headline().startswith("as predicted")
+    assert other.to_dict()["within"] is False
