@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from ballplate.cli import main
+from ballplate.planning import whole_pool
+from ballplate.planning.information import pool_information
 from ballplate.planning.repair.changes import ChangeKind, apply_all
-from ballplate.planning.whole_pool import pool_gap
+from ballplate.planning.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import refused
 
 from tests.reference import dense
 
@@ -45,17 +50,67 @@ def dense_deficiency(experiment: Experiment) -> int:
     return int(dense.spread(whole).deficiency)
 
 
-def test_what_the_whole_pool_leaves_open_is_that_of_a_dense_computation(tmp_path: Path) -> None:
-    experiment = load(written(tmp_path), planning=True)[0]
+def told_of(experiment: Experiment) -> tuple[PoolGap, tuple[int, ...]]:
     assert experiment.pool is not None
-    found = pool_gap(experiment, experiment.pool.candidates)
-    whole = with_chosen(experiment, experiment.pool.candidates)
-    assert found.verdict.deficiency == dense_deficiency(whole) > 0
+    candidates = experiment.pool.candidates
+    information = pool_information(experiment, candidates)
+    found = pool_gap(experiment, candidates, information)
+    assert found is not None
+    return found, spanning(information, candidates)
+
+
+# The candidates across z, and four times as many.
+MANY = (
+    "levels: {from: 100 mm, to: 500 mm, count: 6},"
+    " corners: {x: [100 mm, 200 mm], y: [50 mm, 250 mm]}"
+)
+FEW = "levels: [100 mm, 300 mm, 500 mm], corners: {x: 100 mm, y: [50 mm, 250 mm]}"
+
+
+@pytest.mark.parametrize("places", [FEW, MANY])
+def test_what_the_whole_pool_leaves_open_is_that_of_a_dense_computation(
+    tmp_path: Path, places: str
+) -> None:
+    path = written(tmp_path)
+    path.write_text(path.read_text("utf-8").replace(FEW, places), "utf-8")
+    experiment = load(path, planning=True)[0]
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    found, few = told_of(experiment)
+    whole = with_chosen(experiment, candidates)
+    some = with_chosen(experiment, [candidates[k] for k in few])
+    assert found.verdict.deficiency == dense_deficiency(whole) == dense_deficiency(some) > 0
+    assert len(few) < len(candidates) or places == FEW
     assert found.cures
+    read = {one.name for one in some.positions}
+    others = tuple(one for one in whole.positions if one.name not in read)
     for one in found.cures:
         # A cure may be a poorer error model, which the dense computation would have to be told.
         if not any(change.kind is ChangeKind.MODEL for change in one.changes):
-            assert dense_deficiency(apply_all(one.changes, whole)) == 0
+            cured = apply_all(one.changes, some)
+            assert dense_deficiency(cured) == 0
+            assert dense_deficiency(replace(cured, positions=cured.positions + others)) == 0
+
+
+def test_words_that_cannot_be_had_do_not_stop_a_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuses(*_: object, **__: object) -> NoReturn:
+        raise refused(None, "cannot stand in one design", "pool")
+
+    path = str(written(tmp_path))
+    arguments = ["plan", path, "--positions", "6", "--workers", "1"]
+    assert main(arguments) == 1
+    told = capsys.readouterr().out
+    assert "even all 8 candidates" in told and "what would determine it" in told
+    monkeypatch.setattr(whole_pool, "MOST_WORK", 1.0)
+    assert main(arguments) == 1
+    assert "were not looked for in so large a design" in capsys.readouterr().out
+    monkeypatch.setattr(whole_pool, "check", refuses)
+    assert main(arguments) == 1
+    without = capsys.readouterr().out.splitlines()
+    left = [line for line in told.splitlines() if line not in without]
+    assert [line.split(" ")[0] for line in left] == ["even", "what"]
 
 
 def test_plan_says_so_and_of_offsets_that_carry_the_scale(
