@@ -34,6 +34,9 @@ from .rows import STEP, CandidateRows, PoolDesign, always, calibration_rows, dra
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
 
+# Unit vectors with less than this outside of a space lie in it.
+SAME = 1e-6
+
 # What an item on offer may outweigh readings by: in the information of the whole pool, beside which
 # that without it must not vanish, and at all, since more than this changes no other uncertainty.
 MILDLY = 1e3
@@ -105,6 +108,15 @@ class Information:
     @property
     def deficiency(self) -> int:
         return int(self.open_.shape[1])
+
+    @property
+    def balls_open(self) -> int:
+        """Number of combinations of balls that nothing shows, motions of whole plates aside."""
+        design, open_ = self.drawn.design, self.basis.balls @ self.basis.ball_open
+        motions = _motions(design).reshape(design.balls.places.size, -1)
+        open_ = open_.reshape(len(motions), -1)
+        left = np.linalg.svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
+        return int((left > SAME).sum())
 
     @cached_property
     def shared(self) -> slice:

@@ -100,7 +100,7 @@ def pool_gap(
     which has the same observations and others. That two computations agree on how many directions
     the few leave open is the condition for telling anything.
     """
-    told = information.deficiency + information.basis.ball_open.shape[1]
+    told = information.deficiency + information.balls_open
     # Words beside a plan, which is as good without them: nothing wrong with them is a reason to
     # withhold it.
     try:
