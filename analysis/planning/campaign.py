@@ -148,10 +148,11 @@ def _campaign(
 ) -> Campaign:
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
+    known = without_drift(experiment)
     information = pool_information(
-        without_drift(experiment), whole, is_about_balls(request.criterion), completed_by, report
+        known, whole, is_about_balls(request.criterion), completed_by, report
     )
-    gap = pool_gap(experiment, pool.candidates) if information.deficiency else None
+    gap = pool_gap(known, pool.candidates, information, report) if information.deficiency else None
     try:
         wanted = criterion(information, experiment, request.criterion)
     except ExperimentError as error:
@@ -185,7 +186,9 @@ def _campaign(
     chosen = offered.together(best.chosen)
     left_open = open_directions(offered, information, best.chosen)
     # What no candidate determines may be expected; what the choice alone leaves open is not.
-    expected = left_open + (experiment.expected_rank_deficiency or 0 if gap else 0)
+    expected = left_open
+    if information.deficiency:
+        expected += experiment.expected_rank_deficiency or 0
     _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
     done = tuple(candidates[k] for k in offered.done)

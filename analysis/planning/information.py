@@ -34,6 +34,9 @@ from .rows import STEP, CandidateRows, PoolDesign, always, calibration_rows, dra
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
 
+# Unit vectors with less than this outside of a space lie in it.
+SAME = 1e-6
+
 # What an item on offer may outweigh readings by: in the information of the whole pool, beside which
 # that without it must not vanish, and at all, since more than this changes no other uncertainty.
 MILDLY = 1e3
@@ -87,8 +90,8 @@ class Information:
     what each adds. `deficiency` counts shared directions (c, deficiency), `open_` in micrometres,
     that even all candidates together leave undetermined. `frames` (candidates that calibrate
     co-ordinates) hold what each fixes of its plate's frame. `pose_ranks` states how many parameters
-    of its own pose each candidate determines, were all else known, and `has_rows` whether it
-    observes anything.
+    of its own pose each candidate determines, were all else known, `pose_open` how many it does
+    not, and `has_rows` whether it observes anything.
     """
 
     drawn: PoolDesign
@@ -99,11 +102,21 @@ class Information:
     open_: Array
     frames: Frames
     pose_ranks: tuple[int, ...] = ()
+    pose_open: tuple[int, ...] = ()
     has_rows: tuple[bool, ...] = ()
 
     @property
     def deficiency(self) -> int:
         return int(self.open_.shape[1])
+
+    @property
+    def balls_open(self) -> int:
+        """Number of combinations of balls that nothing shows, motions of whole plates aside."""
+        design, open_ = self.drawn.design, self.basis.balls @ self.basis.ball_open
+        motions = _motions(design).reshape(design.balls.places.size, -1)
+        open_ = open_.reshape(len(motions), -1)
+        left = np.linalg.svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
+        return int((left > SAME).sum())
 
     @cached_property
     def shared(self) -> slice:
@@ -227,14 +240,17 @@ def pool_information(
     of_positions = position_rows(drawn)
     own: list[Array] = []
     pose_ranks: list[int] = []
+    pose_open: list[int] = []
     for k in counted(range(len(candidates)), "candidates", len(candidates), report):
         if k in items:
             own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
             pose_ranks.append(0)
+            pose_open.append(0)
             continue
         rows = next(of_positions)
         own.append(_reduced(_in_amounts(rows, balls)))
         pose_ranks.append(_range(rows.by_pose).shape[1])
+        pose_open.append(rows.by_pose.shape[1] - pose_ranks[-1])
     if is_even:
         basis, open_ = _basis(balls, drawn.shared, [base, *own])
     else:
@@ -270,6 +286,7 @@ def pool_information(
         open_,
         frames,
         tuple(pose_ranks),
+        tuple(pose_open),
         has_rows,
     )
 

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
+import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.planning import whole_pool
+from ballplate.planning.information import pool_information
 from ballplate.planning.repair.changes import ChangeKind, apply_all
-from ballplate.planning.whole_pool import pool_gap
+from ballplate.planning.whole_pool import PoolGap, pool_gap, spanning
+from ballplate.results.study import planned_uncertainty
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import placed_only, with_chosen
+from ballplate.simulator.inputs.messages import refused
 
+from tests.planning.random_pools import random_pool
 from tests.reference import dense
 
 TEXT = """
@@ -45,17 +53,122 @@ def dense_deficiency(experiment: Experiment) -> int:
     return int(dense.spread(whole).deficiency)
 
 
-def test_what_the_whole_pool_leaves_open_is_that_of_a_dense_computation(tmp_path: Path) -> None:
-    experiment = load(written(tmp_path), planning=True)[0]
+def told_of(experiment: Experiment) -> tuple[PoolGap, tuple[int, ...]]:
     assert experiment.pool is not None
-    found = pool_gap(experiment, experiment.pool.candidates)
-    whole = with_chosen(experiment, experiment.pool.candidates)
-    assert found.verdict.deficiency == dense_deficiency(whole) > 0
+    candidates = experiment.pool.candidates
+    information = pool_information(experiment, candidates)
+    found = pool_gap(experiment, candidates, information)
+    assert found is not None
+    return found, spanning(information, candidates)
+
+
+# The candidates across z, and four times as many.
+MANY = (
+    "levels: {from: 100 mm, to: 500 mm, count: 6},"
+    " corners: {x: [100 mm, 200 mm], y: [50 mm, 250 mm]}"
+)
+FEW = "levels: [100 mm, 300 mm, 500 mm], corners: {x: 100 mm, y: [50 mm, 250 mm]}"
+
+
+@pytest.mark.parametrize("places", [FEW, MANY])
+def test_what_the_whole_pool_leaves_open_is_that_of_a_dense_computation(
+    tmp_path: Path, places: str
+) -> None:
+    path = written(tmp_path)
+    path.write_text(path.read_text("utf-8").replace(FEW, places), "utf-8")
+    experiment = load(path, planning=True)[0]
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    found, few = told_of(experiment)
+    whole = with_chosen(experiment, candidates)
+    some = with_chosen(experiment, [candidates[k] for k in few])
+    assert found.verdict.deficiency == dense_deficiency(whole) == dense_deficiency(some) > 0
+    assert len(few) < len(candidates) or places == FEW
     assert found.cures
+    read = {one.name for one in some.positions}
+    others = tuple(one for one in whole.positions if one.name not in read)
     for one in found.cures:
         # A cure may be a poorer error model, which the dense computation would have to be told.
         if not any(change.kind is ChangeKind.MODEL for change in one.changes):
-            assert dense_deficiency(apply_all(one.changes, whole)) == 0
+            cured = apply_all(one.changes, some)
+            assert dense_deficiency(cured) == 0
+            assert dense_deficiency(replace(cured, positions=cured.positions + others)) == 0
+
+
+def test_turns_that_single_positions_leave_open_are_counted(tmp_path: Path) -> None:
+    """Two balls leave the turn about the line through them open, however good everything else."""
+    path = written(tmp_path)
+    path.write_text(path.read_text("utf-8").replace(FEW, MANY), "utf-8")
+    experiment = load(path, planning=True)[0]
+    assert experiment.pool is not None
+    candidates = list(experiment.pool.candidates)
+    for k in (3, 8):
+        item = candidates[k].item
+        assert isinstance(item, Position)
+        group = item.readings[0]
+        two = replace(group, balls=group.balls[:2], ball_indices=group.ball_indices[:2])
+        candidates[k] = replace(candidates[k], item=replace(item, readings=(two,)))
+    information = pool_information(experiment, candidates)
+    found = pool_gap(experiment, candidates, information)
+    assert found is not None
+    assert {3, 8} < set(spanning(information, candidates))
+    assert found.verdict.deficiency == dense_deficiency(with_chosen(experiment, candidates)) == 4
+
+
+def test_a_few_candidates_leave_open_what_all_of_them_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Against the rank of a design with all, for pools at random and for parts of them."""
+    monkeypatch.setattr(whole_pool, "repairs", lambda *_, **__: None)
+    fewer = told = 0
+    for seed in range(60):
+        experiment = random_pool(tmp_path, seed).experiment
+        assert experiment.pool is not None
+        generator = np.random.default_rng(seed)
+        candidates = [one for one in experiment.pool.candidates if generator.random() < 0.7]
+        placed = {one.item.artefact for one in candidates if isinstance(one.item, Position)}
+        # No certificate may be about an artefact that nothing places.
+        candidates = [one for one in candidates if one.item.artefact in placed]
+        if not placed:
+            continue
+        pool = placed_only(
+            replace(
+                experiment,
+                positions=tuple(one.item for one in candidates if isinstance(one.item, Position)),
+            )
+        )
+        whole = planned_uncertainty(with_chosen(pool, candidates)).deficiency
+        information = pool_information(pool, candidates)
+        few = spanning(information, candidates)
+        some = with_chosen(pool, [candidates[k] for k in few])
+        assert planned_uncertainty(some).deficiency == whole
+        fewer += len(few) < len(candidates)
+        if information.deficiency:
+            found = pool_gap(pool, candidates, information)
+            assert found is not None and found.verdict.deficiency == whole
+            told += 1
+    assert fewer > 20 and told > 2
+
+
+def test_words_that_cannot_be_had_do_not_stop_a_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuses(*_: object, **__: object) -> NoReturn:
+        raise refused(None, "cannot stand in one design", "pool")
+
+    path = str(written(tmp_path))
+    arguments = ["plan", path, "--positions", "6", "--workers", "1"]
+    assert main(arguments) == 1
+    told = capsys.readouterr().out
+    assert "even all 8 candidates" in told and "what would determine it" in told
+    monkeypatch.setattr(whole_pool, "MOST_WORK", 1.0)
+    assert main(arguments) == 1
+    assert "were not looked for in so large a design" in capsys.readouterr().out
+    monkeypatch.setattr(whole_pool, "check", refuses)
+    assert main(arguments) == 1
+    without = capsys.readouterr().out.splitlines()
+    left = [line for line in told.splitlines() if line not in without]
+    assert [line.split(" ")[0] for line in left] == ["even", "what"]
 
 
 def test_plan_says_so_and_of_offsets_that_carry_the_scale(
