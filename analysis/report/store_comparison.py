@@ -16,7 +16,7 @@ from ..presentation.table import Block, Entry, Row, Table
 from .answer import WITHIN
 from .axis_worth import SAME
 from .measures import column_unit
-from .results import Integers, ReportedSweep, criterion, partly_open
+from .results import Integers, ReportedSweep, best_first, criterion, partly_open
 
 # Settings that are listed, those that differ most.
 LISTED = 12
@@ -96,7 +96,7 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
                 f"{(now & ~then).sum()} settings are {words} only in this store,"
                 f" {(then & ~now).sum()} only in {name}."
             )
-    order = np.argsort(-np.abs(np.log(ratio)), kind="stable")
+    order = best_first(-np.abs(np.log(ratio)))
     shown = [k for k in order.tolist() if np.isfinite(ratio[k]) and abs(ratio[k] - 1) > SAME]
     return StoreComparison(
         tuple(sentences), _table(results, rows, before, ratio, shown[:LISTED], column, name)
