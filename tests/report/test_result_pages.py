@@ -143,7 +143,11 @@ def test_ratios_have_steps_of_colour_on_either_side_of_the_target(met: str) -> N
     experiment = small()
     points = bp.lengths(experiment, "1 um", 5).to_dict()["by_point"]
     ratios = np.array([one["maximum_ratio"] for one in points])
-    limit = {"some": 1.001 * np.quantile(ratios, 0.6), "all": 2 * ratios.max(), "none": ratios.min() / 2}
+    limit = {
+        "some": 1.001 * np.quantile(ratios, 0.6),
+        "all": 2 * ratios.max(),
+        "none": ratios.min() / 2,
+    }
     target = {"target_uncertainty": f"{limit[met]:.6g} um", "coverage_factor": 1}
     changed = experiment.with_(**target)
     page = page_of_design(changed, bp.run(changed))
