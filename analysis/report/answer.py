@@ -7,14 +7,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.settings import listing, number_of
 from numpy.typing import NDArray
 
 from ..presentation.formatting import number, percent
 from ..presentation.table import Block, Entry, Row, Table
-from .axis_worth import SAME, AxisWorth, axis_worths
+from .axis_worth import AxisWorth, axis_worths
 from .measures import column_unit
-from .results import Integers, ReportedSweep, criterion, partly_open
+from .results import Integers, ReportedSweep, best_first, criterion, partly_open
 
 # Settings that the answer lists.
 LISTED = 8
@@ -50,12 +51,12 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     meets = share == 1.0
     if np.isfinite(share).any():
         sentences = _of_target(results, done, column, share, observations, value)
-        order = np.lexsort((value, observations, ~meets))
-        if not meets.any():
-            order = np.lexsort((value, -np.nan_to_num(share, nan=-1.0)))
+        order = (
+            best_first(~meets, observations, value) if meets.any() else best_first(-share, value)
+        )
     else:
         sentences = _without_target(results, done, column, value, partly)
-        order = np.lexsort((value, partly))
+        order = best_first(partly, value)
     sentences += _left_out(results, done)
     return SweepAnswer(
         _symbol(column),
@@ -84,7 +85,7 @@ def _of_target(
             _cheapest(results, done, column, np.flatnonzero(meets), observations, value),
         ]
     else:
-        best = np.lexsort((value, -np.nan_to_num(share, nan=-1.0)))[0]
+        best = best_first(-share, value)[0]
         alike = int((share == share[best]).sum()) - 1
         tied = f"; {_settings(alike)} more {_verb(alike, 'have')} as many" if alike else ""
         subject = "The only setting does not meet" if judged == 1 else f"None of the {judged}"
@@ -114,11 +115,10 @@ def _cheapest(
     if not len(known):
         return "How many observations they take is not recorded."
     fewest = known[observations[known] == observations[known].min()]
-    best = fewest[np.argmin(value[fewest])]
+    best, same = _first_of_best(value, fewest)
     name, count = _setting(results, done[best]), f"{observations[best]:.0f} observations"
     if len(fewest) == 1:
         return f"The one with the fewest observations is {name}: {count}."
-    same = int((value[fewest] <= value[best] * (1.0 + SAME)).sum()) - 1
     tied = f", as {_verb(same, 'have')} {same} more" if same else ""
     return (
         f"The fewest observations are {observations[best]:.0f}, in {len(fewest)} of these settings."
@@ -137,14 +137,19 @@ def _without_target(
         told = "U6 is not recorded, so that no setting is compared with a target uncertainty."
     if partly.all():
         return [told, f"In every setting some of {_symbol(column)} is undetermined."]
-    known = np.flatnonzero(~partly)
-    best = known[np.argmin(value[known])]
-    alike = int((value[known] <= value[best] * (1.0 + SAME)).sum()) - 1
+    best, alike = _first_of_best(value, np.flatnonzero(~partly))
     tied = f"; {_settings(alike)} more {_verb(alike, 'have')} the same" if alike else ""
     return [
         f"{told} The smallest average of {_quantity(results, column, value[best])}, is that of"
         f" {_setting(results, done[best])}{tied}."
     ]
+
+
+def _first_of_best(value: Floats, places: Integers) -> tuple[int, int]:
+    """The first of `places` that has the smallest value, and how many more have it."""
+    found = comparable(value[places])
+    best = best_first(found)[0]
+    return int(places[best]), int((found == found[best]).sum()) - 1
 
 
 def _left_out(results: ReportedSweep, done: Integers) -> list[str]:

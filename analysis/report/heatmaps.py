@@ -130,5 +130,5 @@ def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:
     low, size = scaled.min(), np.ptp(scaled)
     # Equal values but for rounding have no order to show.
     share = (scaled - low) / size if size > 1e-9 else np.zeros(len(scaled))
-    found[finite] = np.minimum((share * SHADES).astype(int), SHADES - 1)
+    found[finite] = np.minimum((SHADES * (share + 1e-9)).astype(int), SHADES - 1)
     return found

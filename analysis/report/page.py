@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 from importlib import resources
 from itertools import groupby
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,9 @@ from .verdicts import failures, flags, ranks, weak
 
 # Values of an axis that are listed.
 LISTED = 12
+
+# The name of the sweep file that the studio makes, for as long as it computes.
+MADE_IN_STUDIO = ".ballplate-sweep.yaml"
 
 
 @dataclass(frozen=True)
@@ -139,11 +143,23 @@ def _summary(results: ReportedSweep) -> str:
     return ", ".join(parts) + "."
 
 
+def _source(path: str) -> tuple[str, str]:
+    """What a sweep comes from, by the path of its file as it is stored.
+
+    >>> _source("plates/sizes.yaml"), _source("plates/.ballplate-sweep.yaml")
+    (('Sweep file', 'plates/sizes.yaml'), ('Sweep', 'made in the studio'))
+    """
+    # A file that was there for the computation only has a name that nobody can look up.
+    if PurePosixPath(path).name == MADE_IN_STUDIO:
+        return "Sweep", "made in the studio"
+    return "Sweep file", in_one_line(path)
+
+
 def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     stored = results.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     facts = [
-        ("Sweep file", in_one_line(stored["source"])),
+        _source(stored["source"]),
         ("Experiment", in_one_line(stored["base"]) + (f": {in_one_line(base)}" if base else "")),
     ]
     for axis in results.axes:

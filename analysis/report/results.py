@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import QUANTITY, exact_number
 from numpy.typing import NDArray
@@ -198,7 +199,18 @@ def ranked(results: ReportedSweep) -> Integers:
     column, name = judged
     average = np.nan_to_num(results.figure(column)[done], nan=math.inf)
     open_ = results.figure(f"{name}_undetermined")[done]
-    return np.asarray(done[np.lexsort((done, average, open_))])
+    return done[best_first(open_, average)]
+
+
+def best_first(*keys: NDArray[np.generic]) -> Integers:
+    """Order of places by the first of `keys` (m,), then by the next: smallest first and NaN last.
+    Values of the last key that are equal but for rounding stay in the order in which they are.
+
+    >>> best_first(np.array([1, 0, 0, 0]), np.array([0.1, 0.1 + 0.2, 0.3, np.nan])).tolist()
+    [1, 2, 3, 0]
+    """
+    *before, value = keys
+    return np.asarray(np.lexsort([comparable(value), *reversed(before)]))
 
 
 def cell_list(cells: Iterable[int], most: int = 12) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.machines.protocol import Array
 
 from ..presentation.formatting import number
@@ -16,13 +16,15 @@ from ..presentation.table import Block, Entry, Row, Table
 from .answer import WITHIN
 from .axis_worth import SAME
 from .measures import column_unit
-from .results import Integers, ReportedSweep, criterion, partly_open
+from .results import Integers, ReportedSweep, best_first, criterion, partly_open
 
 # Settings that are listed, those that differ most.
 LISTED = 12
 
-# Digits to which values of an axis are the same in both sweeps, in whichever unit they are written.
-DIGITS = 9
+# Digits to which values of an axis are the same in both sweeps, in whichever unit they are written;
+# values of one sweep that are alike in these are told apart by more, up to those that tell any two
+# numbers apart.
+DIGITS, ALL_DIGITS = 9, 17
 
 
 class IncomparableError(ValueError):
@@ -53,10 +55,10 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
     if judged is None or theirs is None or judged != theirs:
         raise IncomparableError(f"{name} and this store record no quantity that both are judged by")
     column, symbol = judged
-    here, there = _by_setting(results), _by_setting(other)
+    here, there = _by_setting(results, other)
     both = [key for key in here if key in there]
     sentences = [
-        f"{len(both)} settings are done in both; {len(here) - len(both)} in this store alone,"
+        f"{_settings_are(len(both))} done in both; {len(here) - len(both)} in this store alone,"
         f" {len(there) - len(both)} in {name} alone."
     ]
     told = symbol.replace("_", " ")
@@ -83,7 +85,8 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
             )
     same = int((np.abs(ratio - 1) <= SAME).sum())
     if same:
-        which = "All averages are" if same == len(both) else f"{same} averages are"
+        which = f"{number_of(same, 'average')} {'is' if same == 1 else 'are'}"
+        which = "All averages are" if same == len(both) > 1 else which
         sentences.append(f"{which} the same.")
     for words, name_of, least in (
         ("rank-deficient", "rank_deficiency", 1.0),
@@ -93,31 +96,70 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
         then = other.figure(name_of)[rows_there] >= least
         if (now != then).any():
             sentences.append(
-                f"{(now & ~then).sum()} settings are {words} only in this store,"
+                f"{_settings_are(int((now & ~then).sum()))} {words} only in this store,"
                 f" {(then & ~now).sum()} only in {name}."
             )
-    order = np.argsort(-np.abs(np.log(ratio)), kind="stable")
+    order = best_first(-np.abs(np.log(ratio)))
     shown = [k for k in order.tolist() if np.isfinite(ratio[k]) and abs(ratio[k] - 1) > SAME]
     return StoreComparison(
         tuple(sentences), _table(results, rows, before, ratio, shown[:LISTED], column, name)
     )
 
 
-def _by_setting(results: ReportedSweep) -> dict[tuple[str, ...], int]:
-    """Rows of cells that are done, by the values of the axes in the order of their names."""
-    order = np.argsort([axis.name for axis in results.axes], kind="stable")
-    keys = [_values(results.definition["axes"][i]) for i in order]
-    return {
-        tuple(key[k] for key, k in zip(keys, results.chosen[row, order].tolist(), strict=True)): row
-        for row in np.flatnonzero(results.done).tolist()
-    }
+def _settings_are(count: int) -> str:
+    """So many settings with the verb.
+
+    >>> _settings_are(1), _settings_are(2)
+    ('1 setting is', '2 settings are')
+    """
+    return f"{number_of(count, 'setting')} {'is' if count == 1 else 'are'}"
 
 
-def _values(axis: dict[str, Any]) -> list[str]:
-    """Values of a stored axis, alike for the same size in another unit; texts as they are."""
+def _by_setting(*sweeps: ReportedSweep) -> list[dict[tuple[str, ...], int]]:
+    """Rows of the cells of each sweep that are done, by the values of the axes in the order of
+    their names.
+    """
+    orders = [np.argsort([axis.name for axis in one.axes], kind="stable") for one in sweeps]
+    axes = [
+        [one.definition["axes"][i] for i in order]
+        for one, order in zip(sweeps, orders, strict=True)
+    ]
+    keys = zip(*(_values(*alike) for alike in zip(*axes, strict=True)), strict=True)
+    found = []
+    for one, order, own in zip(sweeps, orders, keys, strict=True):
+        rows = np.flatnonzero(one.done).tolist()
+        chosen = one.chosen[:, order].tolist()
+        found.append(
+            {tuple(key[k] for key, k in zip(own, chosen[row], strict=True)): row for row in rows}
+        )
+    return found
+
+
+def _values(*axes: dict[str, Any]) -> list[list[str]]:
+    """Values of an axis in several stores, alike for the same size in another unit and different
+    for any two of one store; texts as they are.
+
+    >>> inch = {"unit": "m", "values": [25.4e-3]}
+    >>> _values({"unit": "m", "values": [0.0254 + 1e-17]}, inch)
+    [['0.0254 m'], ['0.0254 m']]
+    >>> _values({"unit": "m", "values": [1.0, 1.0000000001]}, {"unit": "m", "values": [1.0]})
+    [['1 m', '1.0000000001 m'], ['1 m']]
+    """
+    found: list[list[str]] = []
+    for digits in range(DIGITS, ALL_DIGITS + 1):
+        found = [_rounded(axis, digits) for axis in axes]
+        if all(
+            len(set(one)) == len(set(_rounded(axis, ALL_DIGITS)))
+            for one, axis in zip(found, axes, strict=True)
+        ):
+            break
+    return found
+
+
+def _rounded(axis: dict[str, Any], digits: int) -> list[str]:
     if not axis["unit"]:
         return [str(label) for label in axis["labels"]]
-    return [f"{float(value) + 0.0:.{DIGITS}g} {axis['unit']}" for value in axis["values"]]
+    return [f"{float(value) + 0.0:.{digits}g} {axis['unit']}" for value in axis["values"]]
 
 
 def _table(

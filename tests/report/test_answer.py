@@ -169,6 +169,36 @@ def test_settings_are_the_same_in_whichever_unit_they_are_written(tmp_path: Path
     assert found.sentences[1] == "All averages are the same."
 
 
+def test_values_that_differ_in_late_digits_are_settings_of_their_own(tmp_path: Path) -> None:
+    """Each of three close lengths is found in the other sweep, which has them in another order and
+    rounded as by another unit, with an average of its own.
+    """
+    lengths = {-0.05: 2.0, -0.050000000001: 3.0, -0.05000000001: 5.0}
+
+    def store(name: str, values: list[float], factor: float) -> ReportedSweep:
+        labels = [f"{one * 1e3:.9f} mm" for one in values]
+        rows = (
+            done(k, {"U6_average_m": factor * 1e-6 * lengths[one], "observations": 1.0})
+            for k, one in enumerate(values)
+        )
+        written = [float(np.nextafter(one, 3.0 - 2.0 * factor)) for one in values]
+        axes = [axis("x", labels, written, "m")]
+        return read_results(made_up(tmp_path / name, name, axes, rows), 1)
+
+    here = store("a.sqlite", list(lengths), 1.0)
+    for count in (3, 2, 1):
+        there = store(f"b{count}.sqlite", list(lengths)[: -count - 1 : -1], 2.0)
+        found = compared(here, there, "b")
+        are = "1 setting is" if count == 1 else f"{count} settings are"
+        assert found.sentences == (
+            f"{are} done in both; {3 - count} in this store alone, 0 in b alone.",
+            f"The average of U6 is smaller than in b in {count} of them, by a factor of 0.500.",
+        )
+        assert len(found.settings.blocks[0].rows) == count
+    alone = compared(there, there, "b")
+    assert alone.sentences[1:] == ("1 average is the same.",)
+
+
 def random_sweep(path: Path, seed: int) -> None:
     """A store whose settings have few different figures, some of them failed, left, without a
     target, undetermined, or undetermined in part.

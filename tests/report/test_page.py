@@ -14,12 +14,16 @@ from typing import Any
 import ballplate as bp
 import pytest
 from ballplate.cli import main
+from ballplate.designs import shipped
 from ballplate.report.cells import NoExperimentError, experiments
 from ballplate.report.page import page
 from ballplate.report.results import read_results
 from ballplate.report.verdicts import ranks
 from ballplate.results.study import predict
+from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.experiment.load import load
+from ballplate.studio.document import opened
+from ballplate.studio.sweeping import swept
 from ballplate.sweeps.frame import frame
 from ballplate.sweeps.store import open_store
 from ballplate.uncertainty.error_map import error_map
@@ -143,6 +147,18 @@ def test_failed_cells_and_two_dimensions(tmp_path: Path) -> None:
     assert "failed" in found.texts["td"]
     # One level only, and one point of the machine, so that there are no tips to draw.
     assert sum("Map of standard uncertainties" in one["aria-label"] for one in found.of("svg")) == 1
+
+
+def test_the_page_of_a_sweep_made_in_the_studio_names_no_file_that_is_gone(tmp_path: Path) -> None:
+    path = tmp_path / "plates.yaml"
+    path.write_text(Path(shipped("quickstart.yaml")).read_text(encoding="utf-8"), encoding="utf-8")
+    axes = [{"paths": ["machine.repeatability"], "values": ["0.1 um", "0.2 um"]}]
+    found = swept(opened(path), axes, unreported)
+    texts = assert_accessible(found["page"]).texts
+    facts = dict(zip(texts["dt"], texts["dd"], strict=True))
+    assert facts["Sweep"] == "made in the studio"
+    assert facts["Experiment"].startswith("plates.yaml: ")
+    assert ".ballplate" not in found["page"] and "Sweep file" not in found["page"]
 
 
 def test_a_store_without_results(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import ballplate as bp
+import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.report.design_contents import page_of_design
@@ -132,6 +133,43 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
     assert ("view moving" in page) == is_deficient
     shown = {one.text for one in ResultPage(page).shown}
     assert shown.issuperset(data["run"]["undetermined"])
+
+
+@pytest.mark.parametrize("met", ["some", "all", "none"])
+def test_ratios_have_steps_of_colour_on_either_side_of_the_target(met: str) -> None:
+    """Eight equal parts of what is met, from the smallest ratio on, and eight of what is missed, up
+    to the largest.
+    """
+    experiment = small()
+    points = bp.lengths(experiment, "1 um", 5).to_dict()["by_point"]
+    ratios = np.array([one["maximum_ratio"] for one in points])
+    limit = {
+        "some": 1.001 * np.quantile(ratios, 0.6),
+        "all": 2 * ratios.max(),
+        "none": ratios.min() / 2,
+    }
+    target = {"target_uncertainty": f"{limit[met]:.6g} um", "coverage_factor": 1}
+    changed = experiment.with_(**target)
+    page = page_of_design(changed, bp.run(changed))
+    places = r'<rect class="(\w+)-(\d)"[^>]*/><text class="place"[^>]*data-value="([^"]+)"'
+    found = re.findall(places, page)
+    shown = np.array([float(value) for _, _, value in found])
+    assert len(found) == len(points) and "in either colour darker is larger" in page
+    assert {name for name, _, _ in found} == {
+        "some": {"heat", "over"},
+        "all": {"heat"},
+        "none": {"over"},
+    }[met]
+    for kind, low, high in (
+        ("heat", shown.min(), min(shown.max(), 1.0)),
+        ("over", max(shown.min(), 1.0), shown.max()),
+    ):
+        chosen = np.array([name == kind for name, _, _ in found])
+        assert (chosen == ((shown > 1.0) == (kind == "over"))).all()
+        steps = np.array([int(step) for _, step, _ in found])[chosen]
+        edges = np.linspace(low, high, 9)[1:-1]
+        assert steps.tolist() == np.searchsorted(edges, shown[chosen], side="right").tolist()
+        assert len(set(steps.tolist())) > 2 or not chosen.any()
 
 
 def test_what_a_person_wrote_is_escaped(tmp_path: Path) -> None:

@@ -57,8 +57,11 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
         ]
     if is_open:
         return element("p", *head, ".")
-    above = "Above 1 (orange) the target is missed; darker" if target else "Darker"
-    legends = note(f"{above} is larger. Some lengths from points with – are undetermined.")
+    meaning = "Darker is larger."
+    if target:
+        meaning = "Up to 1 (blue) the target is met, above 1 (orange) it is missed; in either"
+        meaning += " colour darker is larger."
+    legends = note(f"{meaning} Some lengths from points with – are undetermined.")
     return joined(
         [
             element("p", *head, "."),
@@ -86,10 +89,7 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
         value = None if lengths.data["by_point"][i]["undetermined"] else every[i]
         kind = "open"
         if value is not None:
-            # Equal values but for rounding have no order to show.
-            share = (factor * value - low) / (high - low) if high - low > 1e-9 * high else 0.0
-            kind = f"heat-{min(int(SHADES * (share + 1e-9)), SHADES - 1)}"
-            kind = "over" if of_target and factor * value > 1.0 else kind
+            kind = _shade(factor * value, low, high, 1.0 if of_target else np.inf)
         parts.append(
             Html(
                 f'<rect class="{kind}" x="{left:g}" y="{top:g}" width="{CELL:g}" height="{ROW:g}"/>'
@@ -124,6 +124,20 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
         role="img",
         aria_label=words,
     )
+
+
+def _shade(value: float, low: float, high: float, limit: float) -> str:
+    """A step of colour among values from `low` to `high`; above a limit, one of another colour.
+
+    >>> [_shade(value, 0.2, 3.0, 1.0) for value in (0.2, 1.0, 1.1, 3.0)]
+    ['heat-0', 'heat-7', 'over-0', 'over-7']
+    """
+    is_over = value > limit
+    first, last = (max(low, limit), high) if is_over else (low, min(high, limit))
+    # Equal values but for rounding have no order to show.
+    share = (value - first) / (last - first) if last - first > 1e-9 * last else 0.0
+    name = "over" if is_over else "heat"
+    return f"{name}-{min(int(SHADES * (share + 1e-9)), SHADES - 1)}"
 
 
 def _label(x: float, y: float, text: str, anchor: str) -> Html:
