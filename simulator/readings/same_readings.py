@@ -53,13 +53,16 @@ def fingerprint(observed: ObservedReadings) -> str:
 
 
 def same_positions(first: ObservedReadings, second: ObservedReadings) -> tuple[str, ...]:
-    """Positions of the second campaign most of whose readings are those of the first."""
+    """Positions of the second campaign most of whose readings are those of the first, or else of
+    the first most of whose are those of the second.
+    """
     shared, chance = _same(first, second)
-    position = second.design.readings.position
-    counts = np.bincount(position)
-    found = np.bincount(position, shared[1])
-    places = np.flatnonzero(_are_most(found / np.maximum(counts, 1), chance))
-    return tuple(second.design.positions.names[k] for k in places.tolist())
+    for one, is_shared in ((second, shared[1]), (first, shared[0])):
+        position, names = one.design.readings.position, one.design.positions.names
+        share = np.bincount(position, is_shared) / np.maximum(np.bincount(position), 1)
+        if found := tuple(names[k] for k in np.flatnonzero(_are_most(share, chance)).tolist()):
+            return found
+    return ()
 
 
 def same_readings(first: ObservedReadings, second: ObservedReadings) -> InCommon:
@@ -72,7 +75,7 @@ def same_readings(first: ObservedReadings, second: ObservedReadings) -> InCommon
     shared, chance = _same(first, second)
     if _are_most(np.array([one.mean() for one in shared]), chance).all():
         return "same"
-    return "some" if same_positions(first, second) or same_positions(second, first) else "none"
+    return "some" if same_positions(first, second) else "none"
 
 
 def _are_most(share: Array, chance: float) -> Flags:
@@ -98,8 +101,7 @@ def _same(first: ObservedReadings, second: ObservedReadings) -> tuple[tuple[Flag
     # Digits as coarse as the scatter would make readings of their own alike.
     apart = apart if (apart <= FINE * s).all() else 0.0
     within = apart + NOTHING
-    step = np.divide(max(digits[0] if apart == 0.0 else 2.0 * apart, NOTHING), 2.0 * s)
-    chance = float(np.prod(erf(step)))
+    chance = float(np.prod(erf((2.0 * apart or min(digits)) / (2.0 * s))))
     named: dict[tuple[str, str], int] = {}
     points = [_places(one, named) for one in (first, second)]
     trees = [cKDTree(one) for one in points]

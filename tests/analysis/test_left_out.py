@@ -242,6 +242,11 @@ def test_a_campaign_is_not_compared_with_itself() -> None:
     assert f"the same in both campaigns in {name}:" in found.cautions[0]
     assert "may hide that the campaigns differ" in found.complaint
     assert "agree" not in found.headline()
+    # So are the few that were read of a position, whichever campaign comes first.
+    rows = np.sort(np.concatenate([np.flatnonzero(is_first)[:4], np.flatnonzero(~is_first)]))
+    few = observe(design, own.select(rows), mixed[rows])
+    for pair in ((observed, few), (few, observed)):
+        assert cross_validate(small(), *pair).read_once == (name,)
     # A nanometre makes other readings, of which most of a position have to be.
     changed = np.flatnonzero(is_first)
     for count, told in ((1, (name,)), (len(changed) // 2 + 1, ())):
