@@ -82,7 +82,7 @@ def design_page(contents: DesignContents) -> str:
         PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
-    verdict = _verdict(run, contents.target)
+    verdict = _verdict(run, contents.target, quoted["lengths"])
     made = origin(contents.file)
     return written(Page(contents.title, made, verdict, _is_good(run), sections, FOOT))
 
@@ -104,7 +104,7 @@ def _is_good(run: QuotedData) -> bool:
     return run.data["as_expected"] and not run.data["weakly_determined"] and not missed
 
 
-def _verdict(run: QuotedData, target: str) -> Html:
+def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
     data = run.data
     count = len(data["weakly_determined"])
     weak = (
@@ -129,7 +129,24 @@ def _verdict(run: QuotedData, target: str) -> Html:
     else:
         expected = "" if data["as_expected"] else ", though the file expects a deficiency"
         first = sentence(f"Full rank{expected}: the readings determine all ", counts, f"{weak}.")
-    return joined([first, sentence(lengths_words(run, target))])
+    second = sentence(lengths_words(run, target), *_throughout(run, lengths))
+    return joined([first, second])
+
+
+def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
+    """How lengths throughout the volume compare with the target, beside those between the
+    evaluation points, which may be kinder.
+    """
+    judged = run.data["quantities"].get("U6", {}).get("within_target") is not None
+    shares = {
+        lengths.data["coverage_factor"]: "share_expanded_within",
+        1.0: "share_within",
+    }
+    share = shares.get(lengths.data["target_coverage_factor"])
+    whole = lengths.at("all")
+    if not judged or share is None or whole.data[share] is None:
+        return []
+    return [" Of the lengths throughout the volume, ", whole.share(share), " are within it."]
 
 
 def _rank(run: QuotedData, contents: DesignContents) -> Html:
