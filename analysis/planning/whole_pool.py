@@ -26,8 +26,9 @@ MOST_NAMES, MOST_CURES = 8, 2
 # Positions that stand for all of a pool.
 MOST_SPANNING = 16
 
-# Observations times parameters of a design beyond which no changes are looked for.
-MOST_WORK = 2e6
+# The search for changes takes about observations times parameters, so often as each direction is
+# looked at and this much besides; beyond the most of that, a few seconds, there is none.
+BESIDES, MOST_WORK = 20, 9e6
 
 # In units of what the whole pool knows: what is not known; and what a few candidates are to know of
 # everything, as a part of their fair share.
@@ -45,7 +46,7 @@ class PoolGap:
     verdict: Verdict
     cures: tuple[Repair, ...]
     partial: tuple[Repair, ...]
-    sought: bool = True
+    sought: bool
 
     @property
     def words(self) -> str:
@@ -64,7 +65,10 @@ class PoolGap:
         if self.verdict.as_expected:
             return "the file expects that"
         if not self.sought:
-            return "changes that would determine it were not looked for in so large a design"
+            return (
+                "changes that would determine it were not looked for in so large a design; check"
+                " --suggest looks for them in a file without a pool"
+            )
         cures = self.cures or self.partial
         if not cures:
             return "no change was found that would determine it"
@@ -78,6 +82,7 @@ class PoolGap:
             "undetermined": [str(one) for one in self.verdict.null],
             "cures": [changes_in_words(one) for one in self.cures],
             "partial_cures": [changes_in_words(one) for one in self.partial],
+            "cures_sought": self.sought,
         }
 
     def refusing(self, error: ExperimentError) -> ExperimentError:
@@ -111,8 +116,8 @@ def pool_gap(
         judged = check(design).verdict
         if judged.deficiency != told + sum(information.pose_open[k] for k in few):
             return None
-        is_sought = judged.observations * judged.parameters <= MOST_WORK
-        is_sought = is_sought and not judged.as_expected
+        size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
+        is_sought = size <= MOST_WORK and not judged.as_expected
         found = repairs(design, report=report) if is_sought else None
     except (ExperimentError, AssertionError, np.linalg.LinAlgError):
         return None
