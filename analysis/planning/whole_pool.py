@@ -30,6 +30,9 @@ MOST_SPANNING = 16
 # looked at and this much besides; beyond the most of that, a few seconds, there is none.
 BESIDES, MOST_WORK = 20, 9e6
 
+# What a design with candidates, or the search for changes of it, may fail with.
+UNTOLD = (ExperimentError, AssertionError, np.linalg.LinAlgError)
+
 # In units of what the whole pool knows: what is not known; and what a few candidates are to know of
 # everything, as a part of their fair share.
 FAINT, EVEN = 1e-9, 0.1
@@ -110,17 +113,18 @@ def pool_gap(
     # withhold it.
     try:
         few = spanning(information, candidates)
-        if not few:
-            return None
         design = with_chosen(experiment, [candidates[k] for k in few])
-        judged = check(design).verdict
-        if judged.deficiency != told + sum(information.pose_open[k] for k in few):
-            return None
-        size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
-        is_sought = size <= MOST_WORK and not judged.as_expected
-        found = repairs(design, report=report) if is_sought else None
-    except (ExperimentError, AssertionError, np.linalg.LinAlgError):
+        judged = check(design).verdict if few else None
+    except UNTOLD:
         return None
+    if judged is None or judged.deficiency != told + sum(information.pose_open[k] for k in few):
+        return None
+    size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
+    is_sought = size <= MOST_WORK and not judged.as_expected
+    try:
+        found = repairs(design, report=report) if is_sought else None
+    except UNTOLD:
+        found = None
     cures, partial = ((), ()) if found is None else (found.complete, found.partial)
     return PoolGap(len(candidates), judged, cures, partial, is_sought)
 
