@@ -26,8 +26,12 @@ MOST_NAMES, MOST_CURES = 8, 2
 # Positions that stand for all of a pool.
 MOST_SPANNING = 16
 
-# Observations times parameters of a design beyond which no changes are looked for.
-MOST_WORK = 2e6
+# The search for changes takes about observations times parameters, so often as each direction is
+# looked at and this much besides; beyond the most of that, a few seconds, there is none.
+BESIDES, MOST_WORK = 20, 9e6
+
+# What a design with candidates, or the search for changes of it, may fail with.
+UNTOLD = (ExperimentError, AssertionError, np.linalg.LinAlgError)
 
 # In units of what the whole pool knows: what is not known; and what a few candidates are to know of
 # everything, as a part of their fair share.
@@ -45,7 +49,7 @@ class PoolGap:
     verdict: Verdict
     cures: tuple[Repair, ...]
     partial: tuple[Repair, ...]
-    sought: bool = True
+    sought: bool
 
     @property
     def words(self) -> str:
@@ -64,7 +68,10 @@ class PoolGap:
         if self.verdict.as_expected:
             return "the file expects that"
         if not self.sought:
-            return "changes that would determine it were not looked for in so large a design"
+            return (
+                "changes that would determine it were not looked for in so large a design; check"
+                " --suggest looks for them in a file without a pool"
+            )
         cures = self.cures or self.partial
         if not cures:
             return "no change was found that would determine it"
@@ -78,6 +85,7 @@ class PoolGap:
             "undetermined": [str(one) for one in self.verdict.null],
             "cures": [changes_in_words(one) for one in self.cures],
             "partial_cures": [changes_in_words(one) for one in self.partial],
+            "cures_sought": self.sought,
         }
 
     def refusing(self, error: ExperimentError) -> ExperimentError:
@@ -105,17 +113,18 @@ def pool_gap(
     # withhold it.
     try:
         few = spanning(information, candidates)
-        if not few:
-            return None
         design = with_chosen(experiment, [candidates[k] for k in few])
-        judged = check(design).verdict
-        if judged.deficiency != told + sum(information.pose_open[k] for k in few):
-            return None
-        is_sought = judged.observations * judged.parameters <= MOST_WORK
-        is_sought = is_sought and not judged.as_expected
-        found = repairs(design, report=report) if is_sought else None
-    except (ExperimentError, AssertionError, np.linalg.LinAlgError):
+        judged = check(design).verdict if few else None
+    except UNTOLD:
         return None
+    if judged is None or judged.deficiency != told + sum(information.pose_open[k] for k in few):
+        return None
+    size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
+    is_sought = size <= MOST_WORK and not judged.as_expected
+    try:
+        found = repairs(design, report=report) if is_sought else None
+    except UNTOLD:
+        found = None
     cures, partial = ((), ()) if found is None else (found.complete, found.partial)
     return PoolGap(len(candidates), judged, cures, partial, is_sought)
 

@@ -161,6 +161,9 @@ def test_words_that_cannot_be_had_do_not_stop_a_plan(
     assert main(arguments) == 1
     told = capsys.readouterr().out
     assert "even all 8 candidates" in told and "what would determine it" in told
+    monkeypatch.setattr(whole_pool, "repairs", refuses)
+    assert main(arguments) == 1
+    assert "even all 8 candidates" in capsys.readouterr().out
     monkeypatch.setattr(whole_pool, "MOST_WORK", 1.0)
     assert main(arguments) == 1
     assert "were not looked for in so large a design" in capsys.readouterr().out
