@@ -196,9 +196,12 @@ def readings_in_common(first: MapData | None, second: MapData | None) -> InCommo
     """
     if first is None or second is None:
         return "none"
+    is_equal = first.sha256 == second.sha256
+    if not first.positions or not second.positions:
+        return "same" if is_equal else "none"
     if set(first.positions) == set(second.positions):
-        return "same" if first.positions or first.sha256 == second.sha256 else "none"
-    return "some" if first.common(second) or first.sha256 == second.sha256 else "none"
+        return "same"
+    return "some" if is_equal or first.common(second) else "none"
 
 
 def determined_only(null: Array, scale: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,15 @@ def test_the_same_readings_twice_are_no_agreement(
     # Maps have no single readings, but are too much alike.
     assert "as alike as these" in bp.diff(maps[0], evaluated.to_map(), grid=2).notes[-1]
     assert not any("alike" in note for note in bp.diff(*maps, grid=2).notes)
+    # So are those that say nothing of readings.
+    given = bp.load_map(maps[0])
+    silent = bp.diff(given, replace(given, data=None), grid=2)
+    assert silent.comparison.test is not None and silent.comparison.test.statistic == 0.0
+    assert "as alike as these" in silent.notes[-1]
+    # Earlier ones only tell all readings together.
+    assert given.data is not None
+    earlier = replace(given, data=replace(given.data, positions=()))
+    assert bp.diff(given, earlier, grid=2).in_common == "same"
     assert main(["adjust", maps[0], "--scale", "x=1 ppm", "--after", maps[0]]) == 2
     assert "has readings of the first" in capsys.readouterr().err
 

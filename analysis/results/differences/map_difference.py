@@ -93,7 +93,7 @@ class MapDifference(Result):
         chance.
         """
         test = self.comparison.test
-        if test is None or not test.statistic or len(self._measured()) < 2:
+        if test is None or len(self._measured()) < 2:
             return False
         return 1.0 - test.p < TOO_RARE
 
