@@ -478,7 +478,8 @@ def _basis(
     below = np.concatenate([left[:, ~kept].T @ triangle[:y, y:], triangle[y:, y:]])
     _, values, right = np.linalg.svd(below, full_matrices=True)
     values = np.concatenate([values, np.zeros(shared - len(values))])
-    known = values > EXACT * values.max(initial=0.0)
+    # Where balls take up all of them, the largest that is left is rounding, too.
+    known = values > EXACT * np.linalg.norm(triangle[:, y:])
     ball_open, open_ = by_balls[~kept].T, right[~known].T
     if even is None:
         ball_root = by_balls[kept].T / of_balls[kept]

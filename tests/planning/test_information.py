@@ -187,6 +187,27 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
     )
 
 
+def test_rounding_determines_nothing_where_balls_take_up_all(tmp_path: Path) -> None:
+    # In one position, free balls are wherever any scale and squareness want them.
+    path = tmp_path / "one.yaml"
+    path.write_text(
+        "title: one\nmachine: {volume: [600 mm, 600 mm, 600 mm], repeatability: 0.5 um}\n"
+        "error_model: {kind: metric}\nprobes: {down: [0 mm, 0 mm, 0 mm]}\n"
+        "artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}}\n"
+        "evaluation: {points: {random: 6, seed: 1}}\npositions: []\npool: {candidates: [\n"
+        "  {name: flat, artefact: plate, planes: [z], levels: [100 mm],\n"
+        "   corners: {x: 100 mm, y: 50 mm}, probes: [down]}]}\n"
+    )
+    (experiment,) = load(path, planning=True)
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    full = predict(with_chosen(experiment, candidates))
+    information = pool_information(experiment, candidates)
+    assert information.deficiency == full.verdict.deficiency == 6
+    with pytest.raises(ExperimentError, match="no selection determines any"):
+        criterion(information, experiment, "U6")
+
+
 def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
     drawn = (
         "positions: [{name: low, artefact: plate, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0"
