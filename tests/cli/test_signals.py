@@ -62,7 +62,10 @@ ENDING = {
         ),
         2.5,
     ),
-    "reliability": (("reliability", DESIGNS / "npl/6.2.7.yaml", "--csv", "all.csv"), 1.5),
+    "reliability": (
+        ("reliability", DESIGNS / "npl/6.2.7.yaml", "--variant", "7 x 7", "--csv", "all.csv"),
+        1.0,
+    ),
     "fit": (
         ("fit", DESIGNS / "certified/three-planes.yaml", DESIGNS / "certified/three-planes.csv"),
         2.0,
