@@ -181,10 +181,10 @@ class AdjustedMachine(Result):
     `before` and `predicted` are the figures of `lines`, `found` those of the second campaign, None
     without one; `normalised_errors` (m,) are their E_n, NaN where one is undetermined and where
     both are exactly known and the same, infinite where they are exactly known and differ.
-    `compared` counts figures that have an E_n, and `largest_by_chance` is the |E_n| that any of
-    them exceeds at most once in a hundred by chance. `overall` compares scales and angles together,
-    as E_n does one: at most 1 in at least 95 % of pairs of campaigns, where nothing else has
-    changed. `predicted_map` is the machine as predicted.
+    `compared` counts figures that have an E_n, and `largest_by_chance` is the size of E_n that any
+    of them exceeds at most once in a hundred by chance. `overall` compares scales and angles
+    together, as E_n does one: at most 1 in at least 95 % of pairs of campaigns, where nothing else
+    has changed. `predicted_map` is the machine as predicted.
     """
 
     label: str
