@@ -336,8 +336,7 @@ def page(
     elif isinstance(given, SweepResult):
         from .stores import sweep_report
 
-        chosen_sweep = given.store, given.number
-        text = sweep_report(*chosen_sweep, "html", run_modules, report, compare)
+        text = sweep_report(given.store, given.number, "html", run_modules, report, compare)
     else:
         from .report.design_contents import page_of_design
 

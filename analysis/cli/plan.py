@@ -169,7 +169,6 @@ def _hours(text: str) -> float:
 
 @argument_type
 def _drift(text: str) -> str:
-
     from ..planning.drift_in_orders import drift_size
 
     drift_size(text)

@@ -129,7 +129,7 @@ class Correction(Result):
     def headline(self) -> str:
         u = self.expanded_uncertainties
         open_ = int(np.isnan(u).any(axis=1).sum())
-        count = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
+        count = number_of(len(self.points), "point")
         if np.isnan(u).all():
             return f"{count}, undetermined"
         told = f", {open_} of them undetermined" if open_ else ""

@@ -53,6 +53,11 @@ class DesignDocument:
     def is_saved(self) -> bool:
         return self.content is not None and self.content == encoded(self)
 
+    @property
+    def has_changes(self) -> bool:
+        """Whether something was done to the text that the file does not hold."""
+        return bool(self.back) and not self.is_saved
+
 
 def opened(path: Path, variant: str | None = None, with_modules: bool = True) -> DesignDocument:
     """The document of a file.

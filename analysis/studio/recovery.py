@@ -32,7 +32,7 @@ def keep(document: DesignDocument, owner: str) -> Path | None:
 
     What another owner has kept stays.
     """
-    if document.is_saved or not document.back:
+    if not document.has_changes:
         give_up(document, owner)
         return None
     try:

@@ -121,7 +121,7 @@ class Session:
     @property
     def is_saved(self) -> bool:
         with self._lock:
-            return self._now.document.is_saved or not self._now.document.back
+            return not self._now.document.has_changes
 
     @property
     def is_recoverable(self) -> bool:
@@ -246,12 +246,13 @@ class Session:
         if action.get("revision", self.revision) != self.revision:
             raise RefusedError("the design has changed in another window; look again")
 
-    def _become(self, document: DesignDocument, before: dict[str, Any] | None = None) -> None:
-        """Go on with another document; `before` is shown where its text is wrong, by default the
-        answer until now.
+    def _become(self, document: DesignDocument) -> None:
+        """Go on with another document; where its text is wrong, the answer until now is shown if it
+        is of the same design.
         """
-        if before is None and document.path == self._now.document.path:
-            before = self._now.answer if document.variant == self._now.document.variant else None
+        last = self._now.document
+        is_same = (document.path, document.variant) == (last.path, last.variant)
+        before = self._now.answer if is_same else None
         self._now = self._judged(document, before)
         self.revision += 1
         self.note = ""

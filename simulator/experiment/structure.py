@@ -38,6 +38,19 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
 # Sections that files complete which they name, and which may say something else next time.
 COMPLETED_LATER = ("error_model", "true_machine", "readings")
 
+# Other files of this program, by a key that an experiment has not, and what they are for.
+OTHER_FILES = {
+    "axes": "this is a sweep of experiments; use it with ballplate sweep",
+    "arrangement": (
+        "this describes a machine; use it with ballplate map, or name it with kind: machine in an"
+        " experiment"
+    ),
+    "map": (
+        "this is a map that a fit left behind; use it with ballplate correct, map, curves or diff,"
+        " or name it as a prior or true machine with kind: map in an experiment"
+    ),
+}
+
 # Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
 # a sweep's cells, share all others.
 _VALID: WeakKeyDictionary[Node, dict[TypeAdapter[Any], Any]] = WeakKeyDictionary()
@@ -73,22 +86,9 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         text = f"expected a mapping that begins with title: …, found {describe(to_python(root))}"
         problems.add((), text)
         return Sections(values)
-    if "axes" in root.items and "machine" not in root.items:
-        problems.add((), "this is a sweep of experiments; use it with ballplate sweep")
-        return Sections(values)
-    if "arrangement" in root.items and "machine" not in root.items:
-        text = (
-            "this describes a machine; use it with ballplate map, or name it with kind: machine in"
-            " an experiment"
-        )
-        problems.add((), text)
-        return Sections(values)
-    if "map" in root.items and "machine" not in root.items:
-        text = (
-            "this is a map that a fit left behind; use it with ballplate correct, map, curves or"
-            " diff, or name it as a prior or true machine with kind: map in an experiment"
-        )
-        problems.add((), text)
+    other = next((text for key, text in OTHER_FILES.items() if key in root.items), None)
+    if other is not None and "machine" not in root.items:
+        problems.add((), other)
         return Sections(values)
     problems.add_empty()
     absent = [name for name in fields if name not in root.items]

@@ -149,3 +149,15 @@ def browser(path: str, folder: Path) -> Iterator[Browser]:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+
+def assert_quiet(tab: Browser) -> None:
+    """Nothing went wrong, and nothing was asked for but the pages."""
+    asked = [
+        one["params"]["request"]["url"]
+        for one in tab.events
+        if one["method"] == "Network.requestWillBeSent"
+    ]
+    assert asked and all(url.startswith(("file:", "data:")) for url in asked)
+    wrong = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
+    assert [one for one in tab.events if one["method"] in wrong] == []

@@ -16,7 +16,7 @@ from ballplate.report.design_contents import page_of_design
 from ballplate.simulator.inputs.yamltree import to_python
 from ballplate.sweeps.task import CellResult
 
-from tests.report.browser import Browser, browser, program
+from tests.report.browser import assert_quiet, browser, program
 from tests.report.stores import axis, done, failed, made_up
 from tests.report.test_page_in_browser import CUT, OUTSIDE
 from tests.report.test_result_pages import CHANGED, FOUR, small
@@ -144,7 +144,7 @@ def test_pages_open_alone_at_all_widths(name: str, tmp_path: Path) -> None:
                 tab.open(path)
                 assert tab.value(OUTSIDE) == [], (kind, width)
                 assert tab.value(CUT) == [], (kind, width)
-        _assert_quiet(tab)
+        assert_quiet(tab)
 
 
 def test_a_page_of_a_hundred_thousand_settings_is_light(tmp_path: Path) -> None:
@@ -184,16 +184,4 @@ def test_a_page_of_a_hundred_thousand_settings_is_light(tmp_path: Path) -> None:
         tab.open(path)
         assert tab.value("document.querySelectorAll('*').length") < 15_000
         assert "of 99899 settings meet" in tab.value("document.querySelector('.verdict').innerText")
-        _assert_quiet(tab)
-
-
-def _assert_quiet(tab: Browser) -> None:
-    """Nothing went wrong, and nothing was asked for but the pages."""
-    asked = [
-        one["params"]["request"]["url"]
-        for one in tab.events
-        if one["method"] == "Network.requestWillBeSent"
-    ]
-    assert asked and all(url.startswith(("file:", "data:")) for url in asked)
-    wrong = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
-    assert [one for one in tab.events if one["method"] in wrong] == []
+        assert_quiet(tab)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.report.browser import browser, program
+from tests.report.browser import assert_quiet, browser, program
 
 CHROMIUM = program()
 
@@ -63,11 +63,4 @@ def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
         assert (
             tab.value("getComputedStyle(document.querySelector('.scroll')).overflowX") == "visible"
         )
-        asked = [
-            one["params"]["request"]["url"]
-            for one in tab.events
-            if one["method"] == "Network.requestWillBeSent"
-        ]
-        assert asked and all(url.startswith(("file:", "data:")) for url in asked)
-        wrong = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
-        assert [one for one in tab.events if one["method"] in wrong] == []
+        assert_quiet(tab)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ballplate.report.design_contents import page_of_design
 
-from tests.report.browser import Browser, browser, program
+from tests.report.browser import Browser, assert_quiet, browser, program
 from tests.report.test_page_in_browser import CUT, OUTSIDE
 from tests.report.test_page_pictures import numbers
 from tests.report.test_result_pages import CHANGED, small
@@ -76,14 +76,7 @@ def test_pages_open_alone_and_pictures_turn(tmp_path: Path) -> None:
             click(tab, name, "data-view=oblique")
         _assert_alike(paths(tab, "volume-view"), drawn)
         _assert_still_or_moving(tab, design)
-        asked = [
-            one["params"]["request"]["url"]
-            for one in tab.events
-            if one["method"] == "Network.requestWillBeSent"
-        ]
-        assert asked and all(url.startswith(("file:", "data:")) for url in asked)
-        wrong = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
-        assert [one for one in tab.events if one["method"] in wrong] == []
+        assert_quiet(tab)
 
 
 def _assert_alike(after: list[str], before: list[str]) -> None:
