@@ -23,6 +23,7 @@ from ballplate.simulator.readings.reading_sources import Source
 
 from ..gross_errors.wording import diagnosis_words
 from ..results.adjustments import FEW
+from ..results.campaign_sigmas import with_sigmas
 from ..results.fit import Fit
 from ..results.study import PlannedUncertainty
 from ..results.study import fit as fit_observed
@@ -94,6 +95,8 @@ def next_step(
     if fit is not None:
         at = fit.functions.at
         sigma, bound = sigmas(fit)
+        if fit.campaigns is not None:
+            experiment = with_sigmas(experiment, fit.campaigns.ratios)
         judged = judge(goal, _uncertainty(at, experiment, goal, sigma))
         is_sure = (
             math.isfinite(bound) and judge(goal, _uncertainty(at, experiment, goal, bound)).is_met
@@ -136,10 +139,9 @@ def sigmas(fit: Fit) -> tuple[float, float]:
     """
     from scipy.special import chdtri
 
-    freedom = fit.degrees_of_freedom
+    freedom, squares = fit.sum_freedom, fit.sum_of_squares
     if freedom <= 0:
         return 1.0, math.inf
-    squares = fit.solution.factor.sum_of_squares
     sigma = max(1.0, math.sqrt(squares / freedom))
     if freedom >= FEW:
         return sigma, sigma

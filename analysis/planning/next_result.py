@@ -108,11 +108,11 @@ class NextStep(Result):
     def _known(self) -> list[str]:
         if self.fit is None or self.now is None:
             return [f"nothing can be estimated yet ({self.why})"]
-        freedom = self.fit.degrees_of_freedom
+        freedom = self.fit.sum_freedom
         if freedom <= 0:
             known = "sigma unknown, as nothing is read redundantly"
         else:
-            found = math.sqrt(self.fit.solution.factor.sum_of_squares / freedom)
+            found = math.sqrt(self.fit.sum_of_squares / freedom)
             known = f"sigma {number(found, 3)} of {freedom_words(freedom)}"
         shown = [f"suspected: {words}" for words in self.suspected] or ["nothing suspected"]
         lengths = self.fit.quantities.get("U6")
@@ -183,7 +183,7 @@ class NextStep(Result):
             "why_no_estimate": self.why or None,
             "sigma": None if fit is None else self.sigma,
             "sigma_bound": finite(self.bound),
-            "degrees_of_freedom": None if fit is None else fit.degrees_of_freedom,
+            "degrees_of_freedom": None if fit is None else fit.sum_freedom,
             "suspected": list(self.suspected),
             "U6_average": None if lengths is None else finite(times * lengths.average),
             "U6_maximum": None if lengths is None else finite(times * lengths.maximum),

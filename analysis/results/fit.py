@@ -46,6 +46,7 @@ from .map_of_fit import counted_twice, map_of
 from .parts import (
     adjustment_data,
     adjustment_lines,
+    map_lines,
     not_read,
     plate_data,
     plate_table,
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..presentation.pages.embedded import View
+    from .campaign_sigmas import CampaignSigmas
     from .certificates.plate_certificate import PlateCertificate
     from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
@@ -100,7 +102,8 @@ class Fit(FitResult):
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
     estimates had been stated. `experiment` is that which was fitted, from which a page of the fit
-    names its assumptions.
+    names its assumptions. `campaigns` are the sigmas of maps that are prior knowledge; where these
+    are separate, `degrees_of_freedom` are the fewest of them.
     """
 
     label: str
@@ -123,6 +126,7 @@ class Fit(FitResult):
     is_reweighted: bool = False
     experiment: Experiment | None = None
     bootstrap: Bootstrap | None = None
+    campaigns: CampaignSigmas | None = None
 
     @property
     def design(self) -> Design:
@@ -151,11 +155,11 @@ class Fit(FitResult):
             how = "those of groups as estimated below"
         summary = (
             f"{self.solution.status} after {len(record) - 1} iterations; S^2 ="
-            f" {record[-1].sum_of_squares:.6g}"
+            f" {self.sum_of_squares:.6g}"
         )
         if self.converged:
             summary += (
-                f" with {freedom_words(self.degrees_of_freedom)}; sigma = {self.sigma:.4g} times"
+                f" with {freedom_words(self.sum_freedom)}; sigma = {self.sigma:.4g} times"
                 " the stated "
             )
             summary += f"uncertainties ({how})"
@@ -164,7 +168,9 @@ class Fit(FitResult):
             [str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"]
             for k, it in enumerate(record)
         ]
-        lines += [summary, "", *aligned(rows, [True, True, True])]
+        maps = map_lines(self.experiment)
+        lines += [summary, *(maps if self.campaigns is None else self.campaigns.lines())]
+        lines += ["", *aligned(rows, [True, True, True])]
         if not self.converged:
             return lines
         lines += ["", *self._residual_table()]
@@ -209,7 +215,8 @@ class Fit(FitResult):
             **verdict_data(self.verdict),
             "status": self.solution.status,
             **picked(self, "sigma", "sigma_is_estimated", "degrees_of_freedom", "too_large"),
-            "sum_of_squares": finite(self.solution.factor.sum_of_squares),
+            "sum_of_squares": finite(self.sum_of_squares),
+            **({} if self.campaigns is None else {"campaigns": self.campaigns.to_dict()}),
             "iterations": [
                 {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)}
                 for it in self.solution.iterations
@@ -248,6 +255,18 @@ class Fit(FitResult):
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter."""
         return estimate_rows(self.estimates)
+
+    @property
+    def sum_of_squares(self) -> float:
+        """S^2 that sigma comes from, those of maps that have the same sigma included."""
+        if self.campaigns is None or not self.converged:
+            return self.solution.factor.sum_of_squares
+        return self.campaigns.sum_of_squares
+
+    @property
+    def sum_freedom(self) -> int:
+        """Degrees of freedom of `sum_of_squares`."""
+        return self.degrees_of_freedom if self.campaigns is None else self.campaigns.freedom
 
     @property
     def converged(self) -> bool:
@@ -514,7 +533,7 @@ class Fit(FitResult):
                 " prior out, or these readings"
             )
         if self.too_large:
-            times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
+            times = self.sum_of_squares / self.sum_freedom
             cure = (
                 "no single gross error explains that: try a richer error model or larger"
                 " uncertainties, and consider drifts"
@@ -568,9 +587,9 @@ class Fit(FitResult):
         """
         from scipy.special import chdtri
 
-        if not self.converged or self.degrees_of_freedom <= 0:
+        if not self.converged or self.sum_freedom <= 0:
             return False
-        return self.solution.factor.sum_of_squares > float(chdtri(self.degrees_of_freedom, 1e-3))
+        return self.sum_of_squares > float(chdtri(self.sum_freedom, 1e-3))
 
     @property
     def without_scatter(self) -> bool:

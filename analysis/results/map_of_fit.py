@@ -63,6 +63,8 @@ class MappedFit(Protocol):
     @property
     def degrees_of_freedom(self) -> int: ...
     @property
+    def sum_of_squares(self) -> float: ...
+    @property
     def estimates(self) -> tuple[ParameterEstimate, ...]: ...
     @property
     def functions(self) -> EstimatedFunctions: ...
@@ -110,6 +112,10 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,
+        # Of separate sigmas that of these readings, with the fewest degrees of freedom of all.
+        sum_of_squares=(
+            fit.sigma**2 * fit.degrees_of_freedom if fit.sigma_is_estimated else fit.sum_of_squares
+        ),
     )
 
 

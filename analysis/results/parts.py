@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.computing.rounding import printable
 from ballplate.simulator.inputs.settings import listing, number_of
@@ -24,6 +24,9 @@ from ..uncertainty.summaries import Quantity
 from ..uncertainty.tasks import TaskUncertainty, is_determined
 from .adjustments import ARCSECOND, Adjustment
 from .plates import PlateCoordinates
+
+if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
 
 # Balls of a plate that a table has room for.
 MOST_BALLS = 100
@@ -164,6 +167,14 @@ def verdict_lines(
         lines.append(f"all directions together: {_lengths_words(lengths)}")
     lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
+
+
+def map_lines(experiment: Experiment | None) -> list[str]:
+    """How maps that are prior knowledge are scaled where no sigma is estimated, as lines of
+    text.
+    """
+    campaigns = () if experiment is None else experiment.earlier_campaigns
+    return [f"prior {one.file} scaled with its sigma, {number(one.sigma)}" for one in campaigns]
 
 
 def not_read(unread: Collection[str]) -> str:

@@ -20,6 +20,7 @@ from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .parts import (
+    map_lines,
     quantities_data,
     quantity_data,
     scale_data,
@@ -99,7 +100,7 @@ class Prediction(Result):
             *verdict_lines(self.verdict, with_values=True, lengths=self.lengths),
         ]
         lines += [] if self.quantities else target_lines(self.lengths)
-        lines += scale_lines(self.scale)
+        lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
         lines += ["", *influence_table(self.influences)] if self.influences else []
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines

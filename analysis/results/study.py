@@ -118,14 +118,20 @@ def fit(
     from ..gross_errors.exact_values import diagnosis_of_all
     from ..gross_errors.leftover import too_many_entries
     from ..gross_errors.suspects import Diagnosis
+    from .campaign_sigmas import campaign_sigmas
     from .estimates import estimated_functions, parameter_estimates
     from .fit import Fit
     from .plates import plate_coordinates
     from .residuals import largest_residuals
     from .variance_components.groups import groups_of, reweighted
 
+    is_estimated = (sigma or experiment.sigma) == "estimated"
+    campaigns = campaign_sigmas(experiment, observed) if is_estimated and not reweight else None
+    if campaigns is None:
+        solution = estimate(observed.design, observed.x)
+    else:
+        observed, solution = campaigns.observed, campaigns.solution
     design = observed.design
-    solution = estimate(design, observed.x)
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
@@ -142,9 +148,13 @@ def fit(
         anew = fit(experiment, observed, "given", monomials)
         return replace(anew, variance_components=found, is_reweighted=True)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    freedom = at.degrees_of_freedom
-    estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
-    scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
+    freedom, squares = at.degrees_of_freedom, solution.factor.sum_of_squares
+    if campaigns is not None:
+        freedom, squares = campaigns.freedom, campaigns.sum_of_squares
+    estimated = is_estimated and freedom > 0
+    scale = float(np.sqrt(squares / freedom)) if estimated else 1.0
+    if campaigns is not None:
+        freedom = campaigns.degrees_of_freedom
     untested = too_many_entries(design)
     functions = estimated_functions(at, monomials)
     return Fit(
@@ -161,11 +171,16 @@ def fit(
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        Diagnosis() if untested else diagnosis_of_all(at, observed.x, freedom, estimated),
+        (
+            Diagnosis()
+            if untested
+            else diagnosis_of_all(at, observed.x, at.degrees_of_freedom, estimated)
+        ),
         untested,
         functions,
         found,
         experiment=experiment,
+        campaigns=campaigns,
     )
 
 

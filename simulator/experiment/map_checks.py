@@ -107,6 +107,7 @@ def map_of_tree(
         experiment=settings.experiment,
         program=settings.program,
         date=settings.date,
+        sum_of_squares=settings.sigma.sum_of_squares,
     )
 
 

@@ -51,6 +51,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
             "value": fitted.sigma,
             "estimated": fitted.sigma_is_estimated,
             "degrees_of_freedom": fitted.degrees_of_freedom,
+            **({} if fitted.sum_of_squares is None else {"sum_of_squares": fitted.sum_of_squares}),
         },
         "coverage_factor": fitted.coverage_factor,
         "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),

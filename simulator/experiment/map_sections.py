@@ -43,6 +43,13 @@ class MapSigmaSettings(Settings):
     degrees_of_freedom: Annotated[int, Field(ge=0)] = Field(
         description="observations less parameters that they determine"
     )
+    sum_of_squares: Annotated[float, Field(ge=0)] | None = Field(
+        None,
+        description=(
+            "weighted sum of squares of the residuals at the stated uncertainties, with as many"
+            " degrees of freedom; left out of older maps"
+        ),
+    )
 
 
 class MapParameterSettings(Settings):

@@ -24,6 +24,7 @@ from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
 from ..maps.fitted_map import MapData
+from ..maps.map_prior import EarlierCampaign, MapShare
 from .changes import changed_tree
 from .readings_section import ReadingsSettings, no_settings
 
@@ -116,7 +117,7 @@ class Prior:
     ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
     the error model's parameters, and with ``by_offset`` of offsets (d,) of probes by their names.
     ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1. ``data``: the readings of the
-    map that tells it.
+    map that tells it, and ``share`` what its standard uncertainty consists of.
     """
 
     name: str
@@ -131,6 +132,7 @@ class Prior:
     unit: Unit = "m"
     by_offset: Mapping[str, Floats] | None = None
     data: MapData | None = None
+    share: MapShare | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +266,12 @@ class Experiment:
     def dimension(self) -> int:
         """Number of co-ordinates, 2 or 3."""
         return self.machine.dimension
+
+    @property
+    def earlier_campaigns(self) -> tuple[EarlierCampaign, ...]:
+        """The campaigns of all maps that are prior knowledge."""
+        shares = (prior.share for prior in self.priors)
+        return tuple(dict.fromkeys(one.campaign for one in shares if one is not None))
 
     @property
     def certified_offsets(self) -> list[tuple[Probe, int, float, float]]:

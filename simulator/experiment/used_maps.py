@@ -18,7 +18,7 @@ from ..inputs.yamltree import mark_of, read_bytes
 from ..machines.protocol import ErrorModel, TrueMachine
 from ..machines.true_machine_settings import TrueMapSettings
 from ..maps.fitted_map import FittedMap
-from ..maps.map_prior import determined_combinations, marginal_of
+from ..maps.map_prior import MapShare, campaign_of, determined_combinations, marginal_of
 from .map_content import corner_corrections
 from .map_files import read_map
 from .model import Prior, Probe
@@ -97,21 +97,22 @@ def resolve_map_prior(
     ]
     kept = np.concatenate([kept, len(fitted.values) + np.array(shared, np.int64)])
     drift = (settings.drift_per_year or 0.0) * years
-    found = determined_combinations(marginal_of(fitted, kept), settings.inflation, drift)
-    if fitted.without_scatter or not (found[2] > 0.0).all():
+    found = determined_combinations(marginal_of(fitted, kept))
+    if fitted.without_scatter or not fitted.sigma > 0.0 or not (found[2] > 0.0).all():
         text = (
             "states no uncertainty, as that of readings without scatter does; use the map of real"
             " readings"
         )
         problems.add(of_file, text)
         return []
-    mark = mark_of(problems.root, of_file)
+    mark, campaign = mark_of(problems.root, of_file), campaign_of(fitted, settings.file)
     priors = []
     for k, (row, value, uncertainty) in enumerate(zip(*found, strict=True)):
         by_offset: dict[str, np.ndarray] = {}
         for coefficient, j in zip(row[len(fitted.values) :].tolist(), shared, strict=True):
             name, axis = free[j]
             by_offset.setdefault(name, np.zeros(fitted.dimension))[axis] = coefficient
+        share = MapShare(campaign, settings.inflation * float(uncertainty) / fitted.sigma, drift)
         largest = int(np.abs(row * fitted.scale[kept]).argmax())
         label = f"{settings.file}, combination {k + 1}, mostly"
         priors.append(
@@ -122,12 +123,13 @@ def resolve_map_prior(
                 -1,
                 row[: len(fitted.values)],
                 float(value),
-                float(uncertainty),
+                share.uncertainty(fitted.sigma),
                 mark,
                 format_path(of_file),
                 "m",
                 by_offset or None,
                 fitted.data,
+                share,
             )
         )
     return priors

@@ -73,6 +73,7 @@ class FittedMap:
     `coverage_factor` is what expanded uncertainties have. `frame` says which motion of the whole
     the model holds, `temperatures` are in degrees Celsius, and `left_out` are estimates of the fit
     that the map does not apply. `date` is that of the campaign, as 2026-11-22, where it is known.
+    `sum_of_squares` is S^2 at the stated uncertainties, None of maps that do not state it.
     """
 
     title: str
@@ -97,6 +98,7 @@ class FittedMap:
     experiment: str = ""
     program: str = ""
     date: str | None = None
+    sum_of_squares: float | None = None
 
     def __repr__(self) -> str:
         open_ = self.undetermined.shape[1]

@@ -1,16 +1,64 @@
-"""What a fitted map tells of its machine in another campaign."""
+"""What a fitted map tells of its machine in another campaign, and the sigma of its own."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..machines.protocol import Array, Integers
-from .fitted_map import FittedMap, determined_only
+from .fitted_map import LEAST_SIGMA, FittedMap, determined_only
 
 # Standard deviations below this part of the largest are rounding, and have this size.
 LEAST = 1e-9
+
+
+@dataclass(frozen=True)
+class EarlierCampaign:
+    """The campaign of a map that is prior knowledge: its `file`, and what the map states of sigma.
+
+    `sum_of_squares` is S^2 at the stated uncertainties, None where it is unknown or rounding, and
+    `is_stated` whether the map has it itself.
+    """
+
+    file: str
+    sigma: float
+    degrees_of_freedom: int
+    sum_of_squares: float | None
+    is_stated: bool
+
+    @property
+    def estimate(self) -> float:
+        """Sigma as the residuals show it; as it is stated where they do not."""
+        if self.sum_of_squares is None or not self.degrees_of_freedom:
+            return self.sigma
+        return math.sqrt(self.sum_of_squares / self.degrees_of_freedom)
+
+
+def campaign_of(fitted: FittedMap, file: str) -> EarlierCampaign:
+    """The campaign of a map; that of an older one whose sigma was estimated follows from that."""
+    squares, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
+    if squares is None and fitted.sigma_is_estimated:
+        squares = fitted.sigma**2 * freedom
+    if squares is not None and squares < LEAST_SIGMA**2 * freedom:
+        squares = None
+    return EarlierCampaign(file, fitted.sigma, freedom, squares, fitted.sum_of_squares is not None)
+
+
+@dataclass(frozen=True)
+class MapShare:
+    """The standard uncertainty of a combination of parameters that the map of a `campaign` tells:
+    at its stated uncertainties, and by which the machine has moved since, in metres.
+    """
+
+    campaign: EarlierCampaign
+    at_stated: float
+    drift: float
+
+    def uncertainty(self, sigma: float) -> float:
+        """The standard uncertainty where sigma of the campaign is that."""
+        return math.hypot(sigma * self.at_stated, self.drift)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +84,11 @@ def marginal_of(fitted: FittedMap, kept: Integers) -> MapMarginal:
     )
 
 
-def determined_combinations(
-    known: MapMarginal, inflation: float = 1.0, drift: float = 0.0
-) -> tuple[Array, Array, Array]:
+def determined_combinations(known: MapMarginal) -> tuple[Array, Array, Array]:
     """Combinations of parameters of which a map tells values that are not correlated: rows (r, m),
     the values (r,) and their standard uncertainties (r,), in metres.
 
     There is one for each direction that the map determines, across all that it does not.
-    Uncertainties are `inflation` times those of the map, and each parameter has moved by a random
-    `drift` of its effect since, in metres.
     """
     spread = known.covariance / np.outer(known.scale, known.scale)
     null = known.undetermined / known.scale[:, None]
@@ -53,5 +97,4 @@ def determined_combinations(
     variances, vectors = np.linalg.eigh(across.T @ spread @ across)
     rows = (across @ vectors).T / known.scale
     least = (LEAST**2) * float(variances.max(initial=0.0))
-    variances = inflation**2 * np.maximum(variances, least) + drift**2
-    return rows, rows @ known.estimates, np.sqrt(variances)
+    return rows, rows @ known.estimates, np.sqrt(np.maximum(variances, least))

@@ -30,6 +30,7 @@ from ballplate.simulator.readings.same_readings import (
 
 from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
+from ..campaign_sigmas import campaign_sigmas
 from .lack_of_fit import TOO_ALIKE, TOO_RARE, chance_of, chance_words
 from .left_out import MOST_POINTS
 from .left_out_result import FAILED
@@ -241,6 +242,8 @@ def cross_validate(
 def _fitted(
     experiment: Experiment, observed: ObservedReadings, given: bool
 ) -> tuple[Linearisation, float]:
+    campaigns = None if given else campaign_sigmas(experiment, observed)
+    observed = observed if campaigns is None else campaigns.observed
     solution = estimate(observed.design, observed.x)
     if solution.status != "converged":
         text = f"the estimate from one campaign's readings has {solution.status}; see ballplate fit"

@@ -38,6 +38,7 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
+from ..campaign_sigmas import campaign_sigmas
 from .lack_of_fit import chance_of
 from .left_out_result import LengthDifference, PredictedGroup, PredictedReading, Validation
 
@@ -191,6 +192,8 @@ def validate(
     :raises ExperimentError: the estimate from all readings does not converge.
     """
     given = (sigma or experiment.sigma) == "given"
+    campaigns = None if given else campaign_sigmas(experiment, observed)
+    observed = observed if campaigns is None else campaigns.observed
     design = observed.design
     solution = estimate(design, observed.x)
     if solution.status != "converged":
