@@ -26,10 +26,10 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ..presentation.formatting import finite, number, picked
 from .adjustments import freedom_words
 
-# Level of the two-sided F-test of two sigmas. A small one would leave differences undetected that
-# matter where one campaign has few degrees of freedom; at this one intervals cover what they state
-# whatever the sigmas, and a common sigma is kept four times in five where it is right.
-LEVEL = 0.2
+# Level of the two-sided F-test of two sigmas, as Bozivich, Bancroft and Hartley (1956) recommend
+# before variances are pooled: at smaller ones, more differences of a few tenths stay undetected, and
+# intervals become too short where one campaign has few degrees of freedom.
+LEVEL = 0.25
 
 NOT_STATED = "the map is older and does not state its sum of squares"
 
@@ -120,7 +120,7 @@ def campaign_sigmas(experiment: Experiment, observed: ObservedReadings) -> Campa
     joint = weighted(design, experiment, ratios)
     solution = estimate(joint, x)
     own, own_freedom = _without_maps(joint, experiment, x, solution)
-    maps = tuple(_compared(one, own, own_freedom) for one in campaigns)
+    maps = tuple(compared(one, own, own_freedom) for one in campaigns)
     pooled = [one.campaign for one in maps if one.is_common]
     squares = sum(one.sum_of_squares or 0.0 for one in pooled)
     freedom = sum(one.degrees_of_freedom for one in pooled)
@@ -193,7 +193,7 @@ def _without_maps(
     return math.sqrt(found.factor.sum_of_squares / freedom), freedom
 
 
-def _compared(campaign: EarlierCampaign, own: float, own_freedom: int) -> ScaledMap:
+def compared(campaign: EarlierCampaign, own: float, own_freedom: int) -> ScaledMap:
     """A map against the readings alone, by an F-test of both sigmas."""
     from scipy.special import fdtr, fdtrc
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,19 @@ import ballplate as bp
 import numpy as np
 import pandas
 import pytest
+from ballplate.results import campaign_sigmas
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.maps.map_prior import (
+    EarlierCampaign,
+    MapMarginal,
+    MapShare,
+    determined_combinations,
+)
 from ballplate.sweeps.fingerprint import fingerprint
+from scipy import stats
 
 from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files
 
@@ -28,6 +38,8 @@ class Campaigns:
 
     def __init__(self, kind: str, folder: Path, probes: dict[str, Any] | None = None) -> None:
         self.base = MODELS[kind][0]
+        # Stated uncertainties in parts of the true ones.
+        self.factor = 1.0
         self.folder = folder
         write_files(folder)
         truth = {"kind": "zero"} if kind == "python" else SMALL
@@ -53,14 +65,22 @@ class Campaigns:
         sections = {
             **self.base,
             **self.common,
+            "machine": self.base["machine"] | {"repeatability": f"{0.3 * self.factor} um"},
             "artefacts": {name: self.base["artefacts"]["plate"] for name in plates},
             "positions": positions,
-            "calibration": [{**CALIBRATION, "artefact": name} for name in plates],
+            "calibration": [
+                {
+                    **CALIBRATION,
+                    "artefact": name,
+                    "standard_uncertainty": f"{0.3 * self.factor} um",
+                }
+                for name in plates
+            ],
         }
         return bp.experiment({**sections, **more}, self.folder)
 
-    def map_of_first(self, date: str | None = None) -> FittedMap:
-        fit = bp.fit(self.experiment("A", self.first), self.readings[self.of_first])
+    def map_of_first(self, date: str | None = None, **more: Any) -> FittedMap:
+        fit = bp.fit(self.experiment("A", self.first, **more), self.readings[self.of_first])
         bp.write_map(fit.to_map(date), self.folder / "first.yaml")
         return fit.to_map()
 
@@ -70,8 +90,9 @@ class Campaigns:
         experiment = self.experiment("B", self.second, **more)
         return bp.fit(experiment, self.readings[~self.of_first]).to_map()
 
-    def both(self) -> FittedMap:
-        return bp.fit(self.joint, self.readings).to_map()
+    def both(self, **more: Any) -> FittedMap:
+        joint = self.experiment("AB", [*self.first, *self.second], **more)
+        return bp.fit(joint, self.readings).to_map()
 
 
 def determined(fitted: FittedMap, undetermined: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,6 +130,142 @@ def test_a_map_as_prior_equals_both_campaigns_together(kind: str, tmp_path: Path
     # The prior has told something: it is no mere copy of the second campaign.
     _, without = determined(alone, right.undetermined)
     assert np.diagonal(covariance).sum() < 0.9 * np.diagonal(without).sum()
+
+
+@pytest.mark.parametrize("factor", [1.0 / 3.0, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "kind", ["metric", "plane", pytest.param("spatial metric", marks=pytest.mark.long)]
+)
+def test_a_map_with_a_common_sigma_equals_both_campaigns_together(
+    kind: str, factor: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the stated uncertainties; what differs is of second order in readings of 0.3 um."""
+    monkeypatch.setattr(campaign_sigmas, "LEVEL", 0.0)
+    campaigns = Campaigns(kind, tmp_path)
+    campaigns.factor = factor
+    first = campaigns.map_of_first(sigma="estimated")
+    found, right = campaigns.fit_of_second({}, sigma="estimated"), campaigns.both(sigma="estimated")
+    assert abs(first.sigma - 1.0 / factor) < 0.5 / factor
+    assert found.degrees_of_freedom == right.degrees_of_freedom
+    assert found.sigma == pytest.approx(right.sigma, rel=1e-8)
+    assert found.sum_of_squares == pytest.approx(right.sum_of_squares, rel=2e-8)
+    values, covariance = determined(found, right.undetermined)
+    true_values, true_covariance = determined(right, right.undetermined)
+    spread = np.sqrt(np.diagonal(true_covariance))
+    assert (np.abs(values - true_values) < 1e-6 * spread).all()
+    assert (np.abs(covariance - true_covariance) < 1e-7 * np.outer(spread, spread)).all()
+
+
+@pytest.mark.parametrize("factor", [1.0 / 3.0, 1.0, 3.0])
+def test_combinations_of_a_map_equal_its_readings_where_all_is_linear(factor: float) -> None:
+    """Parameters, sigma and covariance by dense least squares; readings of the first campaign leave
+    one direction of the machine open.
+    """
+    generator = np.random.default_rng(4)
+    scale = np.array([1.0, 2.0, 0.5, 3.0])
+    first, second = generator.normal(size=(20, 7)), generator.normal(size=(15, 9))
+    first[:, 3] = first[:, :2].sum(axis=1)
+    sides = generator.normal(size=20) / factor, generator.normal(size=15) / factor
+    inverse = np.linalg.pinv(first)
+    residuals = sides[0] - first @ (inverse @ sides[0])
+    freedom = len(first) - np.linalg.matrix_rank(first)
+    sigma = np.sqrt(residuals @ residuals / freedom)
+    null = np.array([[1.0], [1.0], [0.0], [-1.0]])
+    known = MapMarginal(
+        (inverse @ sides[0])[:4],
+        sigma**2 * (inverse @ inverse.T)[:4, :4],
+        null / np.linalg.norm(null / scale[:, None]),
+        scale,
+    )
+    rows, values, uncertainties = determined_combinations(known)
+    campaign = EarlierCampaign("map", sigma, freedom, residuals @ residuals, True)
+    weights = [1.0 / MapShare(campaign, u / sigma, 0.0).uncertainty(1.0) for u in uncertainties]
+    with_map = np.zeros((len(rows), 9))
+    with_map[:, :4] = rows
+    stacked = np.vstack([second, np.array(weights)[:, None] * with_map])
+    side = np.concatenate([sides[1], weights * values])
+    joint = np.zeros((35, 12))
+    joint[:20, [0, 1, 2, 3, 9, 10, 11]], joint[20:, :9] = first, second
+    found, right = np.linalg.pinv(stacked), np.linalg.pinv(joint)
+    every = np.concatenate(sides)
+    assert np.allclose(found @ side, (right @ every)[:9], rtol=1e-9, atol=1e-10)
+    assert np.allclose(found @ found.T, (right @ right.T)[:9, :9], rtol=1e-9, atol=1e-11)
+    squares = residuals @ residuals + ((side - stacked @ (found @ side)) ** 2).sum()
+    assert squares == pytest.approx(((every - joint @ (right @ every)) ** 2).sum(), rel=1e-9)
+    assert freedom + len(stacked) - 9 == len(joint) - np.linalg.matrix_rank(joint)
+
+
+def test_a_map_with_another_sigma_keeps_its_own(tmp_path: Path) -> None:
+    """Two independent estimates, each with its own sigma, by the textbook."""
+    campaigns = Campaigns("spatial metric", tmp_path)
+    first = campaigns.map_of_first(sigma="estimated")
+    campaigns.factor = 3.0
+    alone = campaigns.fit_of_second(sigma="estimated")
+    second = campaigns.experiment(
+        "B",
+        campaigns.second,
+        sigma="estimated",
+        priors=[{"kind": "map", "file": "first.yaml"}],
+    )
+    fit: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
+    found = fit.to_map()
+    known, own = np.linalg.inv(first.covariance), np.linalg.inv(alone.covariance)
+    covariance = np.linalg.inv(known + own)
+    values = covariance @ (known @ first.estimates + own @ alone.estimates)
+    spread = np.sqrt(np.diagonal(covariance))
+    assert (np.abs(found.estimates - values) < 1e-5 * spread).all()
+    assert (np.abs(found.covariance - covariance) < 1e-5 * np.outer(spread, spread)).all()
+    assert found.sigma == pytest.approx(alone.sigma, rel=1e-8)
+    assert found.degrees_of_freedom == min(alone.degrees_of_freedom, first.degrees_of_freedom)
+    (told,) = [line for line in fit.lines() if line.startswith("sigma of first.yaml")]
+    ratio = (first.sigma / alone.sigma) ** 2
+    p = 2.0 * stats.f.sf(ratio, first.degrees_of_freedom, alone.degrees_of_freedom)
+    assert fit.to_dict()["campaigns"]["maps"][0]["p_value"] == pytest.approx(p)
+    assert "they differ" in told and "against a level of 0.25: the map is scaled with that" in told
+
+
+def without_sums(path: Path) -> None:
+    """A map file as it was written before it stated its sum of squares."""
+    text = re.sub(r', "sum_of_squares": [^}]*', "", path.read_text(encoding="utf-8"))
+    path.write_text(re.sub("\nchecksum: .*", "", text), encoding="utf-8")
+
+
+@pytest.mark.parametrize("sigma", ["estimated", "given"])
+def test_an_older_map_says_what_it_lacks(sigma: str, tmp_path: Path) -> None:
+    campaigns = Campaigns("metric", tmp_path)
+    campaigns.factor = 2.0
+    campaigns.map_of_first(sigma=sigma)
+    later = {"sigma": "estimated", "priors": [{"kind": "map", "file": "first.yaml"}]}
+    second = campaigns.experiment("B", campaigns.second, **later)
+    new: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
+    without_sums(tmp_path / "first.yaml")
+    second = campaigns.experiment("B", campaigns.second, **later)
+    old: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
+    lack = "the map is older and does not state its sum of squares"
+    assert lack not in "".join(new.lines()) and lack in "".join(old.lines())
+    # It follows from an estimated sigma; otherwise nothing can be tested.
+    assert (old.sigma == pytest.approx(new.sigma, rel=1e-12)) == (sigma == "estimated")
+    assert ("its residuals are unknown" in "".join(old.lines())) == (sigma == "given")
+
+
+def test_predictions_say_how_a_map_is_scaled(tmp_path: Path) -> None:
+    """By its own sigma: the readings to come are taken at their stated uncertainties."""
+    campaigns = Campaigns("spatial metric", tmp_path)
+    campaigns.factor = 3.0
+    first = campaigns.map_of_first(sigma="estimated")
+    priors = [{"kind": "map", "file": "first.yaml"}]
+    told = bp.run(campaigns.experiment("B", campaigns.second, priors=priors))
+    assert any(
+        line == f"prior first.yaml scaled with its sigma, {first.sigma:.4g}"
+        for line in told.lines()
+    )
+    at = linearise(lay_out(campaigns.experiment("B", campaigns.second)))
+    own = at.shared[at.layout.model] @ at.shared[at.layout.model].T
+    covariance = np.linalg.inv(np.linalg.inv(first.covariance) + np.linalg.inv(own))
+    at = linearise(told.design)
+    found = at.shared[at.layout.model] @ at.shared[at.layout.model].T
+    spread = np.sqrt(np.diagonal(covariance))
+    assert (np.abs(found - covariance) < 1e-5 * np.outer(spread, spread)).all()
 
 
 def test_estimated_offsets_of_probes_count_where_they_are_kept(tmp_path: Path) -> None:
