@@ -265,11 +265,12 @@ def test_intervals_cover_whatever_uncertainties_were_stated(tmp_path: Path) -> N
 
 
 def test_a_few_full_chains_cover_what_they_state(tmp_path: Path) -> None:
-    """Of lengths and distances with uncertainties stated three times too large or too small."""
+    """With uncertainties stated three times too large, scale by the map is known to a third."""
     chain = Chain(tmp_path)
-    for factors in ((1.0 / 3.0, 1.0 / 3.0), (3.0, 3.0)):
-        shares = [np.mean(chain.covered(factors, seed)) for seed in range(4)]
-        assert np.mean(shares) > 0.8
+    shares = np.array([chain.covered((1.0 / 3.0,) * 2, seed) for seed in range(10)])
+    # Distances within the plate depend on its own readings more than on the map.
+    assert shares[:, : len(LENGTHS)].mean() > 0.8
+    assert shares.mean() > 0.85
 
 
 @pytest.mark.long
