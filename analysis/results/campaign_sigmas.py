@@ -27,8 +27,8 @@ from ..presentation.formatting import finite, number, picked
 from .adjustments import freedom_words
 
 # Level of the two-sided F-test of two sigmas, as Bozivich, Bancroft and Hartley (1956) recommend
-# before variances are pooled: at smaller ones, more differences of a few tenths stay undetected, and
-# intervals become too short where one campaign has few degrees of freedom.
+# before variances are pooled: smaller ones miss more differences of a few tenths, and intervals
+# become too short where one campaign has few degrees of freedom.
 LEVEL = 0.25
 
 NOT_STATED = "the map is older and does not state its sum of squares"

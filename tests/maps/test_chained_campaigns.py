@@ -27,7 +27,7 @@ from scipy import linalg, stats
 from tests.maps.kinds import IN_PLANE
 
 # True uncertainties in parts of the stated ones.
-FACTORS = (0.3, 0.55, 1.0, 1.8, 3.0)
+FACTORS = (0.3, 0.55, 1.0, 1.35, 1.8, 3.0)
 # Coverage probability of k = 2 with many degrees of freedom, and t-factors for the same.
 NOMINAL = 2.0 * stats.norm.cdf(2.0) - 1.0
 # Scale readings at the ends of three lengths.

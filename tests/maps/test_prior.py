@@ -224,6 +224,34 @@ def test_a_map_with_another_sigma_keeps_its_own(tmp_path: Path) -> None:
     assert "they differ" in told and "against a level of 0.25: the map is scaled with that" in told
 
 
+def test_stated_uncertainties_cancel(tmp_path: Path) -> None:
+    """Where sigma is estimated, all of them may be wrong by one factor: of the campaign of the map
+    too.
+    """
+    campaigns, results = Campaigns("metric", tmp_path), []
+    for factor in (1.0, 3.0):
+        campaigns.factor = factor
+        campaigns.map_of_first(sigma="estimated")
+        second = campaigns.experiment(
+            "B",
+            campaigns.second,
+            sigma="estimated",
+            priors=[{"kind": "map", "file": "first.yaml"}],
+        )
+        readings = campaigns.readings[~campaigns.of_first]
+        fit: Any = bp.fit(second, readings)
+        predicted = bp.validate(second, readings).left_out
+        results.append(
+            [
+                *(one.standard_uncertainty for one in fit.estimates),
+                fit.quantities["U6"].average,
+                *(one.chance for one in predicted),
+                *(factor * one.sigma for one in predicted),
+            ]
+        )
+    assert results[1] == pytest.approx(results[0], rel=1e-5)
+
+
 def without_sums(path: Path) -> None:
     """A map file as it was written before it stated its sum of squares."""
     text = re.sub(r', "sum_of_squares": [^}]*', "", path.read_text(encoding="utf-8"))
