@@ -54,7 +54,9 @@ class ScaledMap:
         own = f"{number(campaign.estimate)} ({freedom_words(campaign.degrees_of_freedom)})"
         result = "is scaled with that"
         if self.is_common:
-            result = "has the common sigma"
+            result = (
+                f"has the common sigma, its S^2 of {number(campaign.sum_of_squares or 0.0)} added"
+            )
         test = self.reason
         if not test:
             verb = "agree" if self.is_common else "differ"

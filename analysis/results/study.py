@@ -30,6 +30,7 @@ from .variance_components.groupings import Grouping
 if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
+    from .campaign_sigmas import CampaignSigmas
     from .fit import Fit
     from .variance_components.components import VarianceComponents
 
@@ -127,11 +128,9 @@ def fit(
 
     is_estimated = (sigma or experiment.sigma) == "estimated"
     campaigns = campaign_sigmas(experiment, observed) if is_estimated and not reweight else None
-    if campaigns is None:
-        solution = estimate(observed.design, observed.x)
-    else:
-        observed, solution = campaigns.observed, campaigns.solution
+    observed = observed if campaigns is None else campaigns.observed
     design = observed.design
+    solution = estimate(design, observed.x) if campaigns is None else campaigns.solution
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
@@ -148,13 +147,8 @@ def fit(
         anew = fit(experiment, observed, "given", monomials)
         return replace(anew, variance_components=found, is_reweighted=True)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    freedom, squares = at.degrees_of_freedom, solution.factor.sum_of_squares
-    if campaigns is not None:
-        freedom, squares = campaigns.freedom, campaigns.sum_of_squares
-    estimated = is_estimated and freedom > 0
-    scale = float(np.sqrt(squares / freedom)) if estimated else 1.0
-    if campaigns is not None:
-        freedom = campaigns.degrees_of_freedom
+    own = at.degrees_of_freedom
+    scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
     untested = too_many_entries(design)
     functions = estimated_functions(at, monomials)
     return Fit(
@@ -171,17 +165,25 @@ def fit(
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        (
-            Diagnosis()
-            if untested
-            else diagnosis_of_all(at, observed.x, at.degrees_of_freedom, estimated)
-        ),
+        Diagnosis() if untested else diagnosis_of_all(at, observed.x, own, estimated),
         untested,
         functions,
         found,
         experiment=experiment,
         campaigns=campaigns,
     )
+
+
+def _sigma(
+    at: Linearisation, campaigns: CampaignSigmas | None, is_estimated: bool
+) -> tuple[float, bool, int]:
+    """Sigma, whether it is estimated, and the degrees of freedom of uncertainties."""
+    squares, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
+    if campaigns is not None:
+        squares, freedom = campaigns.sum_of_squares, campaigns.freedom
+    estimated = is_estimated and freedom > 0
+    sigma = float(np.sqrt(squares / freedom)) if estimated else 1.0
+    return sigma, estimated, freedom if campaigns is None else campaigns.degrees_of_freedom
 
 
 def _variance_components(
