@@ -139,7 +139,9 @@ def test_a_map_as_prior_equals_both_campaigns_together(kind: str, tmp_path: Path
 def test_a_map_with_a_common_sigma_equals_both_campaigns_together(
     kind: str, factor: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever the stated uncertainties; what differs is of second order in readings of 0.3 um."""
+    """Whatever the stated uncertainties, but for what is of second order: errors of a micrometre in
+    half a metre.
+    """
     monkeypatch.setattr(campaign_sigmas, "LEVEL", 0.0)
     campaigns = Campaigns(kind, tmp_path)
     campaigns.factor = factor
@@ -153,7 +155,7 @@ def test_a_map_with_a_common_sigma_equals_both_campaigns_together(
     true_values, true_covariance = determined(right, right.undetermined)
     spread = np.sqrt(np.diagonal(true_covariance))
     assert (np.abs(values - true_values) < 1e-6 * spread).all()
-    assert (np.abs(covariance - true_covariance) < 1e-7 * np.outer(spread, spread)).all()
+    assert (np.abs(covariance - true_covariance) < 1e-6 * np.outer(spread, spread)).all()
 
 
 @pytest.mark.parametrize("factor", [1.0 / 3.0, 1.0, 3.0])
