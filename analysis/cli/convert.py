@@ -51,6 +51,8 @@ def run(options: Namespace) -> int:
     if options.output:
         write(options, {options.output: lambda path: write_map(found.map, path)})
     show(options, found)
+    for note in found.notes:
+        complain(note)
     if not found.is_exact:
         complain("the new error model cannot follow the old one exactly; see the residuals")
     return 0 if found.is_exact else 1

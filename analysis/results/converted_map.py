@@ -9,6 +9,7 @@ import numpy as np
 from ballplate.simulator.experiment.stated_models import stated_model
 from ballplate.simulator.maps.corrected_points import corrected_with_root
 from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.map_conversion import MapConversion, converted
 
 from ..presentation.formatting import aligned, amount_of, as_data, number, to_uncertainty
@@ -68,6 +69,11 @@ class ConvertedMap(Result):
         x, p = self.conversion.places, self.conversion.offsets
         return float(np.abs(self.old.model.error(x, self.old.values, p) - p).max())
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        caution = self.old.known_lack_of_fit.caution
+        return (f"warning: {caution}",) if caution else ()
+
     def headline(self) -> str:
         kind = self.map.settings["kind"]
         if self.is_exact:
@@ -81,6 +87,7 @@ class ConvertedMap(Result):
         old, new, k = self.old, self.map, self.old.coverage_factor
         lines = [
             f"{self.label}: {self.title}",
+            verdict_line(old.lack_of_fit),
             (
                 f"from {old.settings['kind']}, {len(old.values)} parameters, to"
                 f" {new.settings['kind']}, {len(new.values)} parameters"
@@ -124,6 +131,7 @@ class ConvertedMap(Result):
                 "map": self.label,
                 "title": self.title,
                 "error_model": dict(self.map.settings),
+                "lack_of_fit": verdict_data(self.old.lack_of_fit),
                 "exact": self.is_exact,
                 "residual": {"largest": self.residual[0], "rms": self.residual[1], "unit": "m"},
                 "lengths": {

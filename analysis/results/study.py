@@ -17,6 +17,7 @@ from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.maps.fit_verdict import LackOfFit
 
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
@@ -140,7 +141,10 @@ def fit(
         groups = groups_of(design, components or "axis")
         observed = replace(observed, design=reweighted(design, groups, np.array(found.weighting)))
         anew = fit(experiment, observed, "given", monomials)
-        return replace(anew, variance_components=found, is_reweighted=True)
+        before = LackOfFit(solution.factor.sum_of_squares, at.degrees_of_freedom)
+        return replace(
+            anew, variance_components=found, is_reweighted=True, before_reweighting=before
+        )
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     freedom = at.degrees_of_freedom
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0

@@ -42,7 +42,8 @@ class TabledMachine:
     """Errors of a machine in a volume from `lower` to `upper` (d,): a `model` with parameters `a`.
 
     `zero` (d,) is where its errors are zero, and `offsets` (k, d) are those of its probes, all in
-    metres; `bends` are positions of each axis where errors bend.
+    metres; `bends` are positions of each axis where errors bend, and `verdict` that on the fit of a
+    map.
     """
 
     title: str
@@ -53,6 +54,7 @@ class TabledMachine:
     zero: Array
     offsets: Array
     bends: tuple[Array, ...] = ()
+    verdict: str = ""
 
     @property
     def dimension(self) -> int:
