@@ -11,8 +11,8 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
+from ballplate.simulator.maps.fitted_map import FittedMap
 
 from ..presentation.formatting import aligned, csv_lines, number, picked, to_uncertainty
 from .fitted_errors import FittedErrors, FittedLengths

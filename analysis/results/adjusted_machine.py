@@ -409,7 +409,5 @@ def _doubts(*maps: FittedMap | None) -> tuple[str, ...]:
         told.append(one.known_lack_of_fit.caution.replace("the map", which, 1))
         if one.sigma_is_estimated:
             remedy = f"a factor of {coverage_factor(one.degrees_of_freedom):.3g} would give 95 %"
-            told.append(
-                few_degrees_of_freedom(one.degrees_of_freedom, f"sigma of {which}", remedy)
-            )
+            told.append(few_degrees_of_freedom(one.degrees_of_freedom, f"sigma of {which}", remedy))
     return tuple(filter(None, told))

@@ -14,8 +14,8 @@ from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.maps.fit_verdict import LackOfFit
+from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
@@ -100,8 +100,8 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated, except a lack of fit `before_reweighting` that is beyond the limit. `experiment` is that which was fitted, from which a page of the fit
-    names its assumptions.
+    estimates had been stated, except a lack of fit `before_reweighting` that is beyond the limit.
+    `experiment` is that which was fitted, from which a page of the fit names its assumptions.
     """
 
     label: str

@@ -18,8 +18,8 @@ from ballplate.simulator.design.objects import Probes
 from ballplate.simulator.experiment.model_files import absolute
 from ballplate.simulator.inputs.days import parse_day
 from ballplate.simulator.inputs.yamltree import to_python, written
-from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
 from ballplate.simulator.maps.fit_verdict import LackOfFit
+from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.same_readings import fingerprint, position_fingerprints
 

@@ -77,6 +77,7 @@ def map_of_campaign(true: Real, seed: int) -> FittedMap:
         sigma=1.0,
         sigma_is_estimated=False,
         degrees_of_freedom=freedom,
+        lack_of_fit=None,
         estimates=(),
         functions=estimated_functions(at, False),
     )

@@ -15,8 +15,8 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
-from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
 from ballplate.simulator.maps.fit_verdict import LackOfFit
+from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
 from ballplate.simulator.readings.same_readings import (
     position_fingerprints,
     same_positions,
@@ -90,8 +90,8 @@ class ComparedMap:
     none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
     maps of the same model have them in common, as otherwise their spaces of errors would differ by
     what is of second order. `fit` has the balls of plates, and `data` are the readings that the map
-    comes from with their `lack_of_fit`, where they are known. `is_expected`: nothing was measured, and
-    the map is exact but for what is stated, of which `stated` is the standard uncertainty of
+    comes from with their `lack_of_fit`, where they are known. `is_expected`: nothing was measured,
+    and the map is exact but for what is stated, of which `stated` is the standard uncertainty of
     lengths.
     """
 

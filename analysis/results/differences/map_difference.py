@@ -172,9 +172,9 @@ class MapDifference(Result):
         ]
         for one in (self.first, self.second):
             lack = one.lack_of_fit
-            cautions = (lack.caution if lack else "",)
+            cautions = [lack.caution if lack else ""]
             if one.fit is not None:
-                cautions = (*one.fit.cautions, one.fit.complaint)
+                cautions = [*one.fit.cautions, one.fit.complaint]
             found += [f"warning: {one.label}: {caution}" for caution in cautions if caution]
         if self.in_common == "same":
             found.append(f"warning: {SAME_READINGS}")
