@@ -200,13 +200,14 @@ class MadeCompensation(CompensationTable):
             rows.append(["rotations, which the format has no room for", _at_most(made.left_out)])
         rows.append(["all of it", _at_most(made.written)])
         zero = ", ".join(format_length(value) for value in made.zero.tolist())
+        tips = listing(f"({', '.join(f'{1e3 * v + 0.0:.6g}' for v in p)}) mm" for p in made.offsets)
         return [
             self.title,
             *([self.verdict] if self.verdict else []),
             *self.table_lines(),
             "",
             f"errors are zero at {zero}; largest differences from the machine elsewhere in the"
-            f" volume, of {made.places} places:",
+            f" volume, of {made.places} places with probe offsets {tips}:",
             *aligned(rows, [False, True]),
             NOT_LOADED,
         ]
@@ -222,6 +223,7 @@ class MadeCompensation(CompensationTable):
                 "rotations_left_out": made.left_out,
                 "all": made.written,
                 "places": made.places,
+                "probe_offsets": made.offsets.tolist(),
             },
         }
 

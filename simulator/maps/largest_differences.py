@@ -18,6 +18,8 @@ from ..machines.protocol import Array
 POINTS_ALONG, ENDS_ALONG = {2: 41, 3: 15}, {2: 15, 3: 7}
 # Places at random with each probe, for root mean squares.
 RANDOM = 400
+# Parts of the volume from whose best place a search starts.
+STARTS = 10
 # Steps of a search are halved so often, and taken at most so often before that.
 HALVINGS, STEPS = 12, 20
 
@@ -108,12 +110,13 @@ def _at_random(volume: Volume, count: int) -> Array:
 
 
 def _best_of_parts(values: Array, halves: Array) -> Array:
-    """Indices of the largest of the values (n,) in each part of the volume, by the `halves` (n, m)
-    of the axes.
+    """Indices of the largest of the values (n,) in the best parts of the volume, by the `halves`
+    (n, m) of the axes.
     """
     part = halves @ (1 << np.arange(halves.shape[1]))
-    order = np.lexsort((-values, part))
-    return order[np.unique(part[order], return_index=True)[1]]
+    order = np.argsort(-values, kind="stable")
+    first = np.sort(np.unique(part[order], return_index=True)[1])
+    return np.asarray(order[first[:STARTS]])
 
 
 def _climbed(
