@@ -73,6 +73,14 @@ if TYPE_CHECKING:
     from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
 
+
+def lack_of_fit(solution: Solution, freedom: int, diagnosis: Diagnosis, untested: str) -> LackOfFit:
+    """The lack of fit of a solution; residuals that are `untested` may have a pattern."""
+    has_pattern = bool(diagnosis or untested)
+    squares, suspected = solution.factor.sum_of_squares, len(diagnosis.suspects)
+    return LackOfFit(squares, freedom, suspected, has_pattern)
+
+
 REWEIGHTED = (
     "(everything below is as if these estimates had been stated, but for those of fewer than 10"
     " degrees of freedom that are not larger than stated)"
@@ -577,8 +585,7 @@ class Fit(FitResult):
         before = self.before_reweighting
         if before is not None and before.is_beyond_limit:
             return before
-        squares, suspects = self.solution.factor.sum_of_squares, self.diagnosis.suspects
-        return LackOfFit(squares, self.degrees_of_freedom, len(suspects))
+        return lack_of_fit(self.solution, self.degrees_of_freedom, self.diagnosis, self.untested)
 
     @property
     def without_scatter(self) -> bool:

@@ -17,7 +17,6 @@ from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.maps.fit_verdict import LackOfFit
 
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
@@ -120,7 +119,7 @@ def fit(
     from ..gross_errors.leftover import too_many_entries
     from ..gross_errors.suspects import Diagnosis
     from .estimates import estimated_functions, parameter_estimates
-    from .fit import Fit
+    from .fit import Fit, lack_of_fit
     from .plates import plate_coordinates
     from .residuals import largest_residuals
     from .variance_components.groups import groups_of, reweighted
@@ -134,6 +133,11 @@ def fit(
             *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
         )
     at = linearised_fit(design, solution)
+    freedom = at.degrees_of_freedom
+    estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
+    untested, diagnosis = too_many_entries(design), Diagnosis()
+    if not untested:
+        diagnosis = diagnosis_of_all(at, observed.x, freedom, estimated)
     found = None
     if components is not None:
         found = _variance_components(experiment, at, observed.x, components)
@@ -141,15 +145,12 @@ def fit(
         groups = groups_of(design, components or "axis")
         observed = replace(observed, design=reweighted(design, groups, np.array(found.weighting)))
         anew = fit(experiment, observed, "given", monomials)
-        before = LackOfFit(solution.factor.sum_of_squares, at.degrees_of_freedom)
+        before = lack_of_fit(solution, freedom, diagnosis, untested)
         return replace(
             anew, variance_components=found, is_reweighted=True, before_reweighting=before
         )
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    freedom = at.degrees_of_freedom
-    estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
-    untested = too_many_entries(design)
     functions = estimated_functions(at, monomials)
     return Fit(
         experiment.label,
@@ -165,7 +166,7 @@ def fit(
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        Diagnosis() if untested else diagnosis_of_all(at, observed.x, freedom, estimated),
+        diagnosis,
         untested,
         functions,
         found,

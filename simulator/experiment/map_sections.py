@@ -83,6 +83,9 @@ class LackOfFitSettings(Settings):
     suspected: Annotated[int, Field(ge=0)] = Field(
         0, description="gross errors that the fit suspected among the readings"
     )
+    has_pattern: bool = Field(
+        True, description="whether residuals have a pattern that scatter does not explain"
+    )
 
 
 class MapSettings(Settings):

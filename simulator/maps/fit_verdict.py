@@ -9,21 +9,24 @@ from typing import Any
 # Level of the chi-square test above which a fit has a warning.
 SIGNIFICANCE = 1e-3
 
-# Root mean square of weighted residuals above which a fit has failed, far above what is significant
-# with any degrees of freedom. Stated uncertainties are often wrong by a factor of two or three,
-# which sigma absorbs; by ten, something in the file, the readings or the model is wrong.
-LIMIT = 10.0
+# Root mean squares of weighted residuals above which a fit has failed, far above what is
+# significant with any degrees of freedom. Sigma absorbs uncertainties that are stated wrong, by ten
+# and more where nobody knew them, as long as residuals look like scatter; with a pattern that
+# scatter does not explain, something in the file, the readings or the model is wrong.
+LIMIT, LIMIT_OF_SCATTER = 10.0, 100.0
 
 
 @dataclass(frozen=True)
 class LackOfFit:
     """The weighted sum of squares S^2 of a fit's residuals, at the uncertainties stated, with its
-    degrees of freedom, and how many gross errors are suspected among the readings.
+    degrees of freedom, how many gross errors are suspected among the readings, and whether the
+    residuals have a pattern that scatter does not explain, which they have where nobody looked.
     """
 
     sum_of_squares: float
     degrees_of_freedom: int
     suspected: int = 0
+    has_pattern: bool = True
 
     @property
     def times(self) -> float:
@@ -41,9 +44,14 @@ class LackOfFit:
         return freedom > 0 and self.sum_of_squares > float(chdtri(freedom, SIGNIFICANCE))
 
     @property
+    def limit(self) -> float:
+        """Of the root mean square of weighted residuals."""
+        return LIMIT if self.has_pattern else LIMIT_OF_SCATTER
+
+    @property
     def is_beyond_limit(self) -> bool:
         """Whether residuals are so large that no result of the fit can be relied on."""
-        return self.times > LIMIT**2
+        return self.times > self.limit**2
 
     @property
     def complaint(self) -> str:
@@ -52,8 +60,9 @@ class LackOfFit:
             return ""
         return (
             f"lack of fit is beyond the limit: residuals are {math.sqrt(self.times):.3g} times as"
-            f" large as the stated uncertainties make them (limit {LIMIT:g}); find the cause before"
-            " you use any result"
+            f" large as the stated uncertainties make them (limit {self.limit:g}"
+            f" {'with' if self.has_pattern else 'without'} a pattern); find the cause before using"
+            " any result"
         )
 
     @property
