@@ -11,8 +11,8 @@ from .outputs import add_force, add_output, write
 HELP = "convert the map of a fit to another error model, with its covariance"
 DESCRIPTION = (
     "Convert a map that fit -o has written to another error model of the same volume: the nearest"
-    " corrections by least squares, their covariance, and what the new model cannot follow. The"
-    " exit status is 0 if it follows the old one exactly, otherwise 1."
+    " corrections by least squares, their covariance, and what the new model cannot follow in the"
+    " whole volume. The exit status is 0 if it follows the old one exactly, otherwise 1."
 )
 
 

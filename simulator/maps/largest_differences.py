@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.objects import Volume
+from ..design.objects import Flags, Volume
 from ..geometry.grids import even_grid
 from ..machines.protocol import Array
 
@@ -98,8 +98,8 @@ def largest_of_lengths(
         lengths = [np.linalg.norm(one[i] - one[j], axis=1) for one in (old(x, p), new(x, p))]
         ends = np.concatenate([x[i], x[j]], axis=1)
         best = _best_of_parts(np.abs(lengths[1] - lengths[0]), ends > middle)
-        ends_of_volume = (np.tile(one, 2) for one in volume.corners)
-        largest = max(largest, _climbed(at, ends[best], *ends_of_volume, step))
+        lower, upper = (np.tile(one, 2) for one in volume.corners)
+        largest = max(largest, _climbed(at, ends[best], lower, upper, step))
     rms = float(np.sqrt(np.mean(squares)))
     return LargestDifference(largest, rms, len(offsets) * (len(i) + RANDOM))
 
@@ -109,7 +109,7 @@ def _at_random(volume: Volume, count: int) -> Array:
     return generator.uniform(volume.lower, volume.upper, (count, len(volume.lower)))
 
 
-def _best_of_parts(values: Array, halves: Array) -> Array:
+def _best_of_parts(values: Array, halves: Flags) -> Array:
     """Indices of the largest of the values (n,) in the best parts of the volume, by the `halves`
     (n, m) of the axes.
     """
