@@ -14,6 +14,7 @@ from typing import Any
 
 import ballplate as bp
 import numpy as np
+import pandas
 import pytest
 import yaml
 from ballplate.cli import main
@@ -110,6 +111,17 @@ def test_no_setting_of_sigma_hides_it() -> None:
         lack = result.to_map().lack_of_fit
         assert lack is not None and lack.is_beyond_limit
     assert not fit("significant", components="probe", reweight=True).complaint
+
+
+def test_a_reversal_has_the_verdict_of_multiple_redundancy() -> None:
+    """Real readings, stated to a microinch, twelve times what they scatter; and a slip of 10 mil."""
+    folder = bp.quickstart().source.parent / "hocken_borchardt"
+    experiment = bp.load(folder / "real.yaml", "with scale")
+    readings = pandas.read_csv(folder / "real-readings.csv")
+    for slip, words in ((0.0, ""), (0.01, "beyond the limit")):
+        readings.loc[3, "x_in"] += slip
+        found = bp.fit(experiment, readings, estimator="reversal")
+        assert words in found.complaint and bool(words) == bool(found.complaint)
 
 
 def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
