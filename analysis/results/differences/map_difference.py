@@ -171,11 +171,7 @@ class MapDifference(Result):
             if one.degrees_of_freedom < FEW
         ]
         for one in (self.first, self.second):
-            lack = one.lack_of_fit
-            cautions = [lack.caution if lack else ""]
-            if one.fit is not None:
-                cautions = [*one.fit.cautions, one.fit.complaint]
-            found += [f"warning: {one.label}: {caution}" for caution in cautions if caution]
+            found += [f"warning: {one.label}: {caution}" for caution in one.cautions if caution]
         if self.in_common == "same":
             found.append(f"warning: {SAME_READINGS}")
         elif once := positions_in_common(self.first, self.second):
