@@ -1170,12 +1170,15 @@ def compensation(
     sense: TableSense | None = None,
     volumetric: bool = False,
     without_rotations: bool = False,
+    allow_lack_of_fit: bool = False,
 ) -> MadeCompensation:
     """A compensation table of a machine file or of a map, in the format csv, isg or heidenhain.
 
     `pitch` is the distance of positions, one for all axes or one for each, and `origin` where
     errors are zero: texts with units, or metres. `sense` is corrections or errors of indication.
     `files(stem)` of the result are the texts of its files.
+
+    A map whose fit has a lack of fit beyond the limit is refused without `allow_lack_of_fit`.
 
     >>> compensation("designs/park/machines/npl-like.yaml", "isg", "50 mm")
     <MadeCompensation of npl-like: isg, 19, 24, 9 positions>
@@ -1186,9 +1189,9 @@ def compensation(
     ensure_one_of(get_args(TableSense), sense=sense)
     given = _machine("machine", machine)
     if isinstance(given, Path):
-        label, (source, remarks) = given.stem, tabled_machine(given)
+        label, (source, remarks) = given.stem, tabled_machine(given, allow_lack_of_fit)
     else:
-        label, (source, remarks) = given.title, of_map(given, given.title)
+        label, (source, remarks) = given.title, of_map(given, given.title, allow_lack_of_fit)
     lengths = _metres("pitch", pitch), _metres("origin", origin)
     flags = volumetric, without_rotations
     return made_compensation(source, label, format, *lengths, sense, *flags, remarks)

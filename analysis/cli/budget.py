@@ -17,7 +17,7 @@ DESCRIPTION = (
     " quantities. Sources are independent, so that their contributions add in squares. Without"
     " readings it is the budget of the design; with readings that of their fit, whose sigma"
     " multiplies all contributions. The exit status is 0 if the estimate"
-    " converged and the rank is as expected, otherwise 1."
+    " converged, the rank is as expected and no lack of fit is beyond the limit, otherwise 1."
 )
 
 

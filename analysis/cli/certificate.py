@@ -18,8 +18,8 @@ DESCRIPTION = (
     " full covariance, and distances with U: as a page (.html), as tables that calibration items"
     " read (.csv, with the covariance in a second file), as a digital calibration certificate"
     " (.xml) or as an archive of the GUM Tree Calculator (.json). Lengths that nothing calibrated"
-    " determines are refused. The exit status is 0 if the estimate converged and the rank is as"
-    " expected, otherwise 1."
+    " determines are refused. The exit status is 0 if the estimate converged, the rank is as"
+    " expected and no lack of fit is beyond the limit, otherwise 1."
 )
 
 

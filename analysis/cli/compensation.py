@@ -79,6 +79,11 @@ def add_options(parser: ArgumentParser) -> None:
         help="leave out rotations, for which heidenhain tables have no room",
     )
     parser.add_argument(
+        "--allow-lack-of-fit",
+        action="store_true",
+        help="make a table even of a map whose fit has a lack of fit beyond the limit",
+    )
+    parser.add_argument(
         "--arrangement",
         metavar="NAME",
         help=(
@@ -141,7 +146,7 @@ def _made(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:
 
     if len(options.files) > 1:
         raise UsageError("a table is made of one machine; name one file, or read with --read")
-    machine, remarks = tabled_machine(options.files[0])
+    machine, remarks = tabled_machine(options.files[0], options.allow_lack_of_fit)
     made = made_compensation(
         machine,
         options.files[0].stem,
@@ -168,7 +173,8 @@ def _read(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:
 def _misused(options: Namespace) -> list[str]:
     """What is wrong with options that do not go together."""
     found = []
-    others = ("pitch", "volumetric", "without_rotations") if options.read else ("arrangement",)
+    written = "pitch", "volumetric", "without_rotations", "allow_lack_of_fit"
+    others = written if options.read else ("arrangement",)
     for name in others:
         if getattr(options, name):
             whose = "tables that are written" if options.read else "tables that are read"

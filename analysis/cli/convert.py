@@ -11,8 +11,8 @@ from .outputs import add_force, add_output, write
 HELP = "convert the map of a fit to another error model, with its covariance"
 DESCRIPTION = (
     "Convert a map that fit -o has written to another error model of the same volume: the nearest"
-    " corrections by least squares, their covariance, and what the new model cannot follow. The"
-    " exit status is 0 if it follows the old one exactly, otherwise 1."
+    " corrections by least squares, their covariance, and what the new model cannot follow in the"
+    " whole volume. The exit status is 0 if it follows the old one exactly, otherwise 1."
 )
 
 
@@ -51,6 +51,8 @@ def run(options: Namespace) -> int:
     if options.output:
         write(options, {options.output: lambda path: write_map(found.map, path)})
     show(options, found)
+    for note in found.notes:
+        complain(note)
     if not found.is_exact:
         complain("the new error model cannot follow the old one exactly; see the residuals")
     return 0 if found.is_exact else 1

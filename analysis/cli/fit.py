@@ -41,7 +41,8 @@ HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
     "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"
     " ball, probe, x_mm, y_mm, z_mm (or another unit), or tables that measuring programs write. The"
-    " exit status is 0 if the estimate converged and the rank is as expected, otherwise 1."
+    " exit status is 0 if the estimate converged, the rank is as expected and no lack of fit is"
+    " beyond the limit, otherwise 1."
 )
 
 

@@ -46,6 +46,7 @@ from ballplate.simulator.machines.curves import Points
 from ballplate.simulator.machines.description import true_volumetric
 from ballplate.simulator.machines.error_names import AXIS_ERRORS
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fit_verdict import verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
 
 from ..presentation.formatting import aligned, as_data
@@ -174,9 +175,12 @@ def _volume_lines(table: VolumeTable) -> list[str]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MadeCompensation(CompensationTable):
-    """A table made of a machine, and how far it is from the machine at most: `made`."""
+    """A table made of a machine, how far it is from the machine at most, `made`, and the `verdict`
+    on the fit of a map.
+    """
 
     made: MadeTable
+    verdict: str
 
     def files(self, stem: str) -> dict[str, str]:
         """The texts of the table's files by their names, which begin with `stem`."""
@@ -196,12 +200,14 @@ class MadeCompensation(CompensationTable):
             rows.append(["rotations, which the format has no room for", _at_most(made.left_out)])
         rows.append(["all of it", _at_most(made.written)])
         zero = ", ".join(format_length(value) for value in made.zero.tolist())
+        tips = listing(f"({', '.join(f'{1e3 * v + 0.0:.6g}' for v in p)}) mm" for p in made.offsets)
         return [
             self.title,
+            *([self.verdict] if self.verdict else []),
             *self.table_lines(),
             "",
             f"errors are zero at {zero}; largest differences from the machine elsewhere in the"
-            f" volume, of {made.places} places:",
+            f" volume, of {made.places} places with probe offsets {tips}:",
             *aligned(rows, [False, True]),
             NOT_LOADED,
         ]
@@ -209,6 +215,7 @@ class MadeCompensation(CompensationTable):
     def to_dict(self) -> dict[str, Any]:
         made = self.made
         return super().to_dict() | {
+            **({"fit": self.verdict} if self.verdict else {}),
             "zero_at": made.zero.tolist(),
             "largest_differences": {
                 "interpolation": made.interpolation,
@@ -216,6 +223,7 @@ class MadeCompensation(CompensationTable):
                 "rotations_left_out": made.left_out,
                 "all": made.written,
                 "places": made.places,
+                "probe_offsets": made.offsets.tolist(),
             },
         }
 
@@ -253,13 +261,16 @@ def _at_most(value: float) -> str:
     return f"{math.ceil(micrometres / step - 1e-9) * step:.2g} µm"
 
 
-def tabled_machine(path: Path) -> tuple[TabledMachine, tuple[str, ...]]:
+def tabled_machine(
+    path: Path, allow_lack_of_fit: bool = False
+) -> tuple[TabledMachine, tuple[str, ...]]:
     """The machine of a machine file or of a map, and what is to be said of it.
 
-    :raises ExperimentError: the file is wrong, or what it says of corrections is undetermined.
+    :raises ExperimentError: the file is wrong, what it says of corrections is undetermined, or the
+        lack of fit is beyond the limit and not allowed.
     """
     if _is_map(path):
-        return of_map(read_map(path), path)
+        return of_map(read_map(path), path, allow_lack_of_fit)
     doubts: list[Message] = []
     machine = load_machine(path, doubts)
     truth = true_volumetric(machine)
@@ -288,14 +299,32 @@ def _is_map(path: Path) -> bool:
     return re.search("^covariance:", read_text(path), re.MULTILINE) is not None
 
 
-def of_map(fitted: FittedMap, source: object) -> tuple[TabledMachine, tuple[str, ...]]:
-    """The machine of a fitted map, and what of it is undetermined with other probes than its own.
+def of_map(
+    fitted: FittedMap, source: object, allow_lack_of_fit: bool = False
+) -> tuple[TabledMachine, tuple[str, ...]]:
+    """The machine of a fitted map, the caution of its fit, and what of it is undetermined with
+    other probes than its own.
 
-    :raises ExperimentError: corrections with its own probes are undetermined.
+    :raises ExperimentError: corrections with its own probes are undetermined, or the lack of fit is
+        beyond the limit and not allowed.
     """
+    lack = fitted.known_lack_of_fit
+    if lack.is_beyond_limit and not allow_lack_of_fit:
+        text = f"{lack.complaint}; only --allow-lack-of-fit (allow_lack_of_fit=True) makes a table"
+        raise refused(source, f"{text} of this map")
     lower, upper = fitted.volume.lower, fitted.volume.upper
     offsets = fitted.probes.offsets
-    machine = TabledMachine(fitted.title, fitted.model, fitted.values, lower, upper, lower, offsets)
+    machine = TabledMachine(
+        fitted.title,
+        fitted.model,
+        fitted.values,
+        lower,
+        upper,
+        lower,
+        offsets,
+        verdict=verdict_line(fitted.lack_of_fit),
+    )
+    remarks = (lack.caution,) if lack.caution else ()
     if _open_with(fitted, np.concatenate([np.zeros((1, len(lower))), offsets])):
         names = _open_functions(fitted)
         raise refused(
@@ -306,8 +335,8 @@ def of_map(fitted: FittedMap, source: object) -> tuple[TabledMachine, tuple[str,
     if _open_with(fitted, OFFSET * np.eye(len(lower))):
         named = listing(_open_functions(fitted))
         text = f"{named} are undetermined: the table is right for tools like the map's probes only"
-        return machine, (text,)
-    return machine, ()
+        return machine, (*remarks, text)
+    return machine, remarks
 
 
 def _open_with(fitted: FittedMap, offsets: Array) -> bool:
@@ -386,7 +415,9 @@ def made_compensation(
         reasons += error.reasons
     if reasons or meant is None:
         raise CannotMakeError(*reasons)
-    return MadeCompensation(label, machine.title, made, meant, table.table, remarks, table)
+    return MadeCompensation(
+        label, machine.title, made, meant, table.table, remarks, table, machine.verdict
+    )
 
 
 def read_compensation_files(

@@ -11,6 +11,7 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
 
 from ..presentation.formatting import aligned, csv_lines, number, picked, to_uncertainty
@@ -32,6 +33,7 @@ def head_lines(label: str, fitted: FittedMap, probe: int | None = None) -> list[
         lines.append(f"probe {name}, offset ({', '.join(f'{v + 0.0:.6g}' for v in offset)}) mm")
     if fitted.frame:
         lines.append(f"frame: {fitted.frame}")
+    lines.append(verdict_line(fitted.lack_of_fit))
     return [*lines, f"U: expanded uncertainty, k = {fitted.coverage_factor:g}"]
 
 
@@ -43,6 +45,7 @@ def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[st
         "convention": CONVENTION,
         "frame": fitted.frame or None,
         **picked(fitted, "coverage_factor", "sigma", "sigma_is_estimated", "degrees_of_freedom"),
+        "lack_of_fit": verdict_data(fitted.lack_of_fit),
     }
     if probe is not None:
         found["probe"] = {

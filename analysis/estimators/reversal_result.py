@@ -118,9 +118,9 @@ class ReversalFit(FitResult):
     def complaint(self) -> str:
         if not self.full.converged:
             return f"the estimate by multiple redundancy has {self.full.solution.status}"
-        return self.full.verdict.complaint or (
-            self._neglected() if self.found.bias > USELESS else ""
-        )
+        rank, neglected = self.full.verdict.complaint, self.found.bias > USELESS
+        reason = rank or (self._neglected() if neglected else "")
+        return "; ".join(filter(None, [reason, self.full.lack_of_fit.complaint]))
 
     def headline(self) -> str:
         values = (f"{one.name} {1e6 * one.value:.4g} {SHOWN[one.unit]}" for one in self.estimates)

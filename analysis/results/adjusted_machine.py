@@ -18,6 +18,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES, rigid_motions
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array, Unit
 from ballplate.simulator.maps.corrected_points import corrected, drawn_rows
+from ballplate.simulator.maps.fit_verdict import verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap, readings_in_common
 
 from ..presentation.formatting import aligned, finite, number
@@ -31,6 +32,7 @@ from .second_campaign import ROUNDING, CampaignComparison, CampaignFigures, comp
 POINTS_ALONG = 4
 LEFT_OUT = 1e-3
 
+CAMPAIGNS = "the first campaign", "the second campaign"
 INDEPENDENT = (
     "The two campaigns are taken as independent. What both rest on alike, such as one certificate,"
     " has no part in their difference and makes E_n too small."
@@ -201,6 +203,7 @@ class AdjustedMachine(Result):
     coverage_factor: float
     predicted_map: FittedMap
     remarks: tuple[str, ...] = ()
+    verdicts: tuple[str, ...] = ()
 
     @property
     def is_within(self) -> bool:
@@ -256,7 +259,8 @@ class AdjustedMachine(Result):
             " diagonals of the volume, + upwards and - downwards along x, y, z: true length less"
             " reading)"
         ]
-        return [*(one.words for one in self.changes), "", *table, *said, "", self.headline()]
+        changes = [one.words for one in self.changes]
+        return [*changes, *self.verdicts, "", *table, *said, "", self.headline()]
 
     def _shown_error(self, i: int) -> str:
         """E_n of a figure; there is none where both campaigns know it exactly, and the same."""
@@ -296,6 +300,7 @@ class AdjustedMachine(Result):
             "compared": self.compared,
             "largest_by_chance": finite(self.largest_by_chance),
             "within": self.is_within if self.compared else None,
+            "lack_of_fit": list(self.verdicts),
             "notes": list(self.notes),
         }
 
@@ -375,7 +380,12 @@ def adjusted_machine(
         comparison.largest_by_chance,
         k,
         after,
-        _few(fitted, second),
+        _doubts(fitted, second),
+        tuple(
+            verdict_line(one.lack_of_fit, which)
+            for which, one in zip(CAMPAIGNS, (fitted, second), strict=True)
+            if one is not None
+        ),
     )
 
 
@@ -391,14 +401,13 @@ def _listed(found: tuple[Array, Array]) -> tuple[LineValue, ...]:
     return tuple(LineValue(*one) for one in zip(values.tolist(), u.tolist(), strict=True))
 
 
-def _few(*maps: FittedMap | None) -> tuple[str, ...]:
-    told = [
-        few_degrees_of_freedom(
-            one.degrees_of_freedom,
-            f"sigma of {which} campaign",
-            f"a factor of {coverage_factor(one.degrees_of_freedom):.3g} would give 95 %",
-        )
-        for which, one in zip(("the first", "the second"), maps, strict=False)
-        if one is not None and one.sigma_is_estimated
-    ]
+def _doubts(*maps: FittedMap | None) -> tuple[str, ...]:
+    told = []
+    for which, one in zip(CAMPAIGNS, maps, strict=True):
+        if one is None:
+            continue
+        told.append(one.known_lack_of_fit.caution.replace("the map", which, 1))
+        if one.sigma_is_estimated:
+            remedy = f"a factor of {coverage_factor(one.degrees_of_freedom):.3g} would give 95 %"
+            told.append(few_degrees_of_freedom(one.degrees_of_freedom, f"sigma of {which}", remedy))
     return tuple(filter(None, told))

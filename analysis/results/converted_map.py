@@ -6,16 +6,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.stated_models import stated_model
 from ballplate.simulator.maps.corrected_points import corrected_with_root
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
+from ballplate.simulator.maps.largest_differences import (
+    Differences,
+    LargestDifference,
+    largest_at_points,
+    largest_of_lengths,
+)
 from ballplate.simulator.maps.map_conversion import MapConversion, converted
 
 from ..presentation.formatting import aligned, amount_of, as_data, number, to_uncertainty
 from ..presentation.result import Result
 from .map_of_fit import FRAMES
 
-# Points between which lengths by both maps are compared.
+# Points between which lengths have the uncertainty that is stated beside their difference.
 POINTS = 60
 
 # Residuals in metres below which the new model can do all that the old one did.
@@ -26,15 +34,16 @@ EXACT = 1e-12
 class ConvertedMap(Result):
     """A map in another error model: its parameters with their uncertainties, and the residuals.
 
-    `lengths` are the largest and root mean square differences of lengths by both maps, and
-    `length_uncertainty` the root mean square of the standard ones that the old map gives, None
-    where these are undetermined; all in metres.
+    `points_searched` and `lengths_searched` have the largest differences of corrected points and of
+    lengths by both maps, and `length_uncertainty` the root mean square of the standard ones that
+    the old map gives, None where these are undetermined; all in metres.
     """
 
     label: str
     old: FittedMap
     conversion: MapConversion
-    lengths: tuple[float, float]
+    points_searched: LargestDifference
+    lengths_searched: LargestDifference
     length_uncertainty: float | None
 
     @property
@@ -54,8 +63,12 @@ class ConvertedMap(Result):
     @property
     def residual(self) -> tuple[float, float]:
         """Largest and root mean square residual of a corrected point, in metres."""
-        size = np.linalg.norm(self.conversion.residuals, axis=1)
-        return float(size.max()), float(np.sqrt((size**2).mean()))
+        return self.points_searched.largest, self.points_searched.rms
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Largest and root mean square difference of a length by both maps, in metres."""
+        return self.lengths_searched.largest, self.lengths_searched.rms
 
     @property
     def is_exact(self) -> bool:
@@ -67,6 +80,11 @@ class ConvertedMap(Result):
         """The largest error there is."""
         x, p = self.conversion.places, self.conversion.offsets
         return float(np.abs(self.old.model.error(x, self.old.values, p) - p).max())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        caution = self.old.known_lack_of_fit.caution
+        return (f"warning: {caution}",) if caution else ()
 
     def headline(self) -> str:
         kind = self.map.settings["kind"]
@@ -81,6 +99,7 @@ class ConvertedMap(Result):
         old, new, k = self.old, self.map, self.old.coverage_factor
         lines = [
             f"{self.label}: {self.title}",
+            verdict_line(old.lack_of_fit),
             (
                 f"from {old.settings['kind']}, {len(old.values)} parameters, to"
                 f" {new.settings['kind']}, {len(new.values)} parameters"
@@ -90,10 +109,12 @@ class ConvertedMap(Result):
             lines.append("the new error model does all that the old one did")
         else:
             largest, rms = (number(1e6 * one, 3) for one in self.residual)
+            places = self.points_searched.places
             lines.append(
                 "the new error model cannot follow the old one exactly: corrected points differ by"
-                f" {largest} µm at most and {rms} µm rms, throughout the volume with the probes of"
-                " the map and tips along each axis; uncertainties do not contain that"
+                f" {largest} µm at most and {rms} µm rms, by a search from {places}"
+                " points on a grid with corners and edges and at random, with the probes of the map"
+                " and tips along each axis; uncertainties do not contain that"
             )
         largest, rms = (number(1e6 * one, 3) for one in self.lengths)
         beside = (
@@ -102,7 +123,11 @@ class ConvertedMap(Result):
             else f"U (k = {k:g}) of these lengths is {number(1e6 * k * self.length_uncertainty, 3)}"
             " µm rms"
         )
-        lines.append(f"lengths differ by {largest} µm at most and {rms} µm rms; {beside}")
+        lines.append(
+            f"lengths differ by {largest} µm at most and {rms} µm rms, by a search from"
+            f" {self.lengths_searched.places} pairs of points, with one of the map's probes each;"
+            f" {beside}"
+        )
         if np.abs(self.conversion.motion).max() > EXACT:
             d = old.dimension
             shift, turn = (np.abs(one).max() for one in np.split(self.conversion.motion, [d]))
@@ -124,11 +149,11 @@ class ConvertedMap(Result):
                 "map": self.label,
                 "title": self.title,
                 "error_model": dict(self.map.settings),
+                "lack_of_fit": verdict_data(self.old.lack_of_fit),
                 "exact": self.is_exact,
-                "residual": {"largest": self.residual[0], "rms": self.residual[1], "unit": "m"},
+                "residual": {**vars(self.points_searched), "unit": "m"},
                 "lengths": {
-                    "largest": self.lengths[0],
-                    "rms": self.lengths[1],
+                    **vars(self.lengths_searched),
                     "standard_uncertainty": self.length_uncertainty,
                     "unit": "m",
                 },
@@ -155,6 +180,12 @@ class ConvertedMap(Result):
         ]
 
 
+def _corrections(fitted: FittedMap) -> Differences:
+    """Corrected points of a map by scale readings and probe offsets."""
+    return lambda x, p: np.asarray(x + fitted.model.error(x, fitted.values, p))
+
+
+@single_threaded
 def convert(fitted: FittedMap, to: str, label: str) -> ConvertedMap:
     """A map in the error model that a text states, see `stated_model`.
 
@@ -164,19 +195,20 @@ def convert(fitted: FittedMap, to: str, label: str) -> ConvertedMap:
     found = converted(fitted, target.model, target.settings, FRAMES[target.kind])
     generator = np.random.default_rng(np.random.SeedSequence(1))
     points = fitted.volume.lower + fitted.volume.size * generator.random((POINTS, fitted.dimension))
-    (old, root), (new, _) = (corrected_with_root(one, points) for one in (fitted, found.converted))
+    old, root = corrected_with_root(fitted, points)
     first, second = np.triu_indices(POINTS, 1)
-    apart = np.linalg.norm(new[first] - new[second], axis=1) - np.linalg.norm(
-        old[first] - old[second], axis=1
-    )
     unit = old[first] - old[second]
     unit /= np.linalg.norm(unit, axis=1)[:, None]
     u = np.linalg.norm(np.einsum("md,mdr->mr", unit, root[first] - root[second]), axis=1)
     known = bool(np.isfinite(u).all())
+    probes = np.unique(fitted.probes.offsets, axis=0)
     return ConvertedMap(
         label,
         fitted,
         found,
-        (float(np.abs(apart).max()), float(np.sqrt((apart**2).mean()))),
+        largest_at_points(found.differences, fitted.volume, found.tips),
+        largest_of_lengths(
+            _corrections(fitted), _corrections(found.converted), fitted.volume, probes
+        ),
         float(np.sqrt((u**2).mean())) if known else None,
     )

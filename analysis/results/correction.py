@@ -19,6 +19,7 @@ from ballplate.simulator.maps.corrected_points import (
     corrected_with_root,
     tips,
 )
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap
 from ballplate.simulator.maps.mapped_lengths import mapped_lengths
 from ballplate.simulator.readings.point_files import GivenPoints
@@ -145,7 +146,7 @@ class Correction(Result):
         """What a user of the points has to know: extrapolation, few degrees of freedom, what is not
         applied.
         """
-        fitted, found = self.fitted, []
+        fitted, found = self.fitted, [self.fitted.known_lack_of_fit.caution]
         outside = np.flatnonzero(self.outside)
         if len(outside):
             words = listing((self.given.name(int(i)) for i in outside), 3)
@@ -177,6 +178,7 @@ class Correction(Result):
             f"{fitted.title}: {self.headline()}",
             f"map{of}: sigma {fitted.sigma:.4g} ({how}), {freedom_words(fitted.degrees_of_freedom)}"
             f"; U = {k:g} u, {scatter} the scatter of the readings that are corrected",
+            verdict_line(fitted.lack_of_fit),
             "a correction is added to what the scales say with the stated offset of the probe; the"
             " error of indication has the opposite sign",
             *self._temperature_lines(),
@@ -282,6 +284,7 @@ class Correction(Result):
         fitted, u = self.fitted, self.standard_uncertainties
         return {
             **picked(fitted, "title", "sigma", "sigma_is_estimated", "degrees_of_freedom"),
+            "lack_of_fit": verdict_data(fitted.lack_of_fit),
             "coverage_factor": self.coverage_factor,
             "with_repeatability": bool(self.scatter),
             "points": [

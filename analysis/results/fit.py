@@ -14,6 +14,7 @@ from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
@@ -74,6 +75,12 @@ if TYPE_CHECKING:
     from .validation.bootstrap import Bootstrap
     from .variance_components.components import VarianceComponents
 
+
+def lack_of_fit(squares: float, freedom: int, diagnosis: Diagnosis, untested: str) -> LackOfFit:
+    """The lack of fit of a sum of squares; residuals that are `untested` may have a pattern."""
+    return LackOfFit(squares, freedom, len(diagnosis.suspects), bool(diagnosis or untested))
+
+
 REWEIGHTED = (
     "(everything below is as if these estimates had been stated, but for those of fewer than 10"
     " degrees of freedom that are not larger than stated)"
@@ -101,9 +108,10 @@ class Fit(FitResult):
     none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated. `experiment` is that which was fitted, from which a page of the fit
-    names its assumptions. `campaigns` are the sigmas of maps that are prior knowledge; where these
-    are separate, `degrees_of_freedom` are the fewest of them.
+    estimates had been stated, except a lack of fit `before_reweighting` that is beyond the limit.
+    `experiment` is that which was fitted, from which a page of the fit names its assumptions.
+    `campaigns` are the sigmas of maps that are prior knowledge; where these are separate,
+    `degrees_of_freedom` are the fewest of them.
     """
 
     label: str
@@ -127,6 +135,7 @@ class Fit(FitResult):
     experiment: Experiment | None = None
     bootstrap: Bootstrap | None = None
     campaigns: CampaignSigmas | None = None
+    before_reweighting: LackOfFit | None = None
 
     @property
     def design(self) -> Design:
@@ -533,7 +542,6 @@ class Fit(FitResult):
                 " prior out, or these readings"
             )
         if self.too_large:
-            times = self.sum_of_squares / self.sum_freedom
             cure = (
                 "no single gross error explains that: try a richer error model or larger"
                 " uncertainties, and consider drifts"
@@ -542,6 +550,7 @@ class Fit(FitResult):
                 cure += "; several values that are stated as exact may be wrong, too"
             if self.diagnosis.suspects or self.diagnosis.scatter:
                 cure = "see what is suspected"
+            times = self.lack_of_fit.times
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
         if self.without_scatter:
             found.append(
@@ -569,10 +578,11 @@ class Fit(FitResult):
     @property
     def complaint(self) -> str:
         if self.converged:
-            if self.verdict.complaint and self.unread:
+            rank = self.verdict.complaint
+            if rank and self.unread:
                 # The file need not expect what is no fault of the plan.
-                return f"{rank_words(self.verdict)}; {not_read(self.unread)}"
-            return self.verdict.complaint
+                rank = f"{rank_words(self.verdict)}; {not_read(self.unread)}"
+            return "; ".join(filter(None, [rank, self.lack_of_fit.complaint]))
         exact = ", and for wrong values among those that are stated as exact"
         return (
             f"the estimate has {self.solution.status}; no results are reported: see the record of"
@@ -582,14 +592,18 @@ class Fit(FitResult):
 
     @property
     def too_large(self) -> bool:
-        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in
-        a thousand.
-        """
-        from scipy.special import chdtri
+        """Whether S^2 is significantly larger than the stated uncertainties explain."""
+        return self.converged and self.lack_of_fit.is_significant
 
-        if not self.converged or self.sum_freedom <= 0:
-            return False
-        return self.sum_of_squares > float(chdtri(self.sum_freedom, 1e-3))
+    @property
+    def lack_of_fit(self) -> LackOfFit:
+        """S^2 against its degrees of freedom; what is beyond the limit stays so when variances are
+        estimated from the same residuals.
+        """
+        before = self.before_reweighting
+        if before is not None and before.is_beyond_limit:
+            return before
+        return lack_of_fit(self.sum_of_squares, self.sum_freedom, self.diagnosis, self.untested)
 
     @property
     def without_scatter(self) -> bool:

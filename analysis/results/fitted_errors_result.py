@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
     """What is to be known of all uncertainties of a map."""
-    found = []
+    found = [fitted.known_lack_of_fit.caution]
     if fitted.sigma_is_estimated:
         remedy = "with few, take a larger coverage factor"
         found.append(few_degrees_of_freedom(fitted.degrees_of_freedom, "sigma", remedy))

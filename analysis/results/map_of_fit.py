@@ -18,6 +18,7 @@ from ballplate.simulator.design.objects import Probes
 from ballplate.simulator.experiment.model_files import absolute
 from ballplate.simulator.inputs.days import parse_day
 from ballplate.simulator.inputs.yamltree import to_python, written
+from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.same_readings import fingerprint, position_fingerprints
@@ -65,6 +66,8 @@ class MappedFit(Protocol):
     @property
     def sum_of_squares(self) -> float: ...
     @property
+    def lack_of_fit(self) -> LackOfFit: ...
+    @property
     def estimates(self) -> tuple[ParameterEstimate, ...]: ...
     @property
     def functions(self) -> EstimatedFunctions: ...
@@ -109,6 +112,7 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         temperatures=_temperatures(fit.observed, experiment),
         left_out=tuple(_left_out(one) for one in fit.estimates if one.kind == "influence"),
         data=data_of(fit.observed, experiment),
+        lack_of_fit=fit.lack_of_fit,
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,

@@ -121,7 +121,7 @@ def fit(
     from ..gross_errors.suspects import Diagnosis
     from .campaign_sigmas import campaign_sigmas
     from .estimates import estimated_functions, parameter_estimates
-    from .fit import Fit
+    from .fit import Fit, lack_of_fit
     from .plates import plate_coordinates
     from .residuals import largest_residuals
     from .variance_components.groups import groups_of, reweighted
@@ -138,6 +138,11 @@ def fit(
             *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
         )
     at = linearised_fit(design, solution)
+    own = at.degrees_of_freedom
+    scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
+    untested, diagnosis = too_many_entries(design), Diagnosis()
+    if not untested:
+        diagnosis = diagnosis_of_all(at, observed.x, own, estimated)
     found = None
     if components is not None:
         found = _variance_components(experiment, at, observed.x, components)
@@ -145,11 +150,14 @@ def fit(
         groups = groups_of(design, components or "axis")
         observed = replace(observed, design=reweighted(design, groups, np.array(found.weighting)))
         anew = fit(experiment, observed, "given", monomials)
-        return replace(anew, variance_components=found, is_reweighted=True)
+        squares = solution.factor.sum_of_squares
+        return replace(
+            anew,
+            variance_components=found,
+            is_reweighted=True,
+            before_reweighting=lack_of_fit(squares, own, diagnosis, untested),
+        )
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
-    own = at.degrees_of_freedom
-    scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
-    untested = too_many_entries(design)
     functions = estimated_functions(at, monomials)
     return Fit(
         experiment.label,
@@ -165,7 +173,7 @@ def fit(
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        Diagnosis() if untested else diagnosis_of_all(at, observed.x, own, estimated),
+        diagnosis,
         untested,
         functions,
         found,

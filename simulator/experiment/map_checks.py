@@ -24,6 +24,7 @@ from ..machines.settings import (
     build_error_model,
     kind_of,
 )
+from ..maps.fit_verdict import LackOfFit
 from ..maps.fitted_map import FittedMap, LeftOut, MapData
 from .machine_file import load_machine
 from .map_content import AXES, checksum_of, corner_corrections
@@ -80,7 +81,7 @@ def map_of_tree(
         _check_unchanged(settings, root, model, values, volume, covariance, undetermined, problems)
     if problems.messages:
         return None
-    data = settings.data
+    data, lack = settings.data, settings.lack_of_fit
     return FittedMap(
         title=settings.title,
         model=model,
@@ -104,6 +105,7 @@ def map_of_tree(
             for one in settings.left_out
         ),
         data=None if data is None else MapData(**data.model_dump()),
+        lack_of_fit=None if lack is None else LackOfFit(**lack.model_dump()),
         experiment=settings.experiment,
         program=settings.program,
         date=settings.date,

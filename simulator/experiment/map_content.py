@@ -56,6 +56,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "coverage_factor": fitted.coverage_factor,
         "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),
         "data": None if fitted.data is None else to_list(_data(fitted.data)),
+        "lack_of_fit": None if fitted.lack_of_fit is None else dict(vars(fitted.lack_of_fit)),
         "left_out": [
             {key: value for key, value in vars(one).items() if value is not None}
             for one in fitted.left_out

@@ -80,6 +80,21 @@ class MapDataSettings(Settings):
     )
 
 
+class LackOfFitSettings(Settings):
+    """The residuals of the fit that a map comes from, at the uncertainties stated."""
+
+    sum_of_squares: Annotated[float, Field(ge=0)] = Field(description="weighted sum of squares S^2")
+    degrees_of_freedom: Annotated[int, Field(ge=0)] = Field(
+        description="observations less parameters that they determine"
+    )
+    suspected: Annotated[int, Field(ge=0)] = Field(
+        0, description="gross errors that the fit suspected among the readings"
+    )
+    has_pattern: bool = Field(
+        True, description="whether residuals have a pattern that scatter does not explain"
+    )
+
+
 class MapSettings(Settings):
     """A map file, which fit writes."""
 
@@ -112,6 +127,9 @@ class MapSettings(Settings):
         None, description="temperatures in degrees Celsius: reference, scales, artefact"
     )
     data: MapDataSettings | None = Field(None, description="the readings that the map comes from")
+    lack_of_fit: LackOfFitSettings | None = Field(
+        None, description="residuals of the fit; left out: not stated, as in maps of old"
+    )
     left_out: tuple[LeftOutSettings, ...] = Field(
         (), description="estimates of the fit that the map does not apply"
     )

@@ -137,10 +137,13 @@ def resolve_map_prior(
 
 def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
     try:
-        return read_map(references.folder / file)
+        fitted = read_map(references.folder / file)
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None
+    if caution := fitted.known_lack_of_fit.caution:
+        references.problems.doubt(steps, caution)
+    return fitted
 
 
 def _years(

@@ -13,6 +13,7 @@ from ..computing.rounding import TOUCHED, blank
 from ..design.objects import Probes, Volume
 from ..geometry.motions import AXIS_NAMES
 from ..machines.protocol import Array, ErrorModel, Integers, Parameter, Unit
+from .fit_verdict import LackOfFit
 
 # An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
 LEAST_SIGMA = 1e-6
@@ -73,7 +74,8 @@ class FittedMap:
     `coverage_factor` is what expanded uncertainties have. `frame` says which motion of the whole
     the model holds, `temperatures` are in degrees Celsius, and `left_out` are estimates of the fit
     that the map does not apply. `date` is that of the campaign, as 2026-11-22, where it is known.
-    `sum_of_squares` is S^2 at the stated uncertainties, None of maps that do not state it.
+    `sum_of_squares` is S^2 at the stated uncertainties and `lack_of_fit` that of the fit, None of
+    maps that do not state them.
     """
 
     title: str
@@ -95,6 +97,7 @@ class FittedMap:
     temperatures: Mapping[str, float] | None = None
     left_out: tuple[LeftOut, ...] = ()
     data: MapData | None = None
+    lack_of_fit: LackOfFit | None = None
     experiment: str = ""
     program: str = ""
     date: str | None = None
@@ -114,6 +117,16 @@ class FittedMap:
     def without_scatter(self) -> bool:
         """Whether sigma, and with it the covariance, is zero but for rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    @property
+    def known_lack_of_fit(self) -> LackOfFit:
+        """What warnings rest on: of a map that does not state its lack of fit, what an estimated
+        sigma says of it.
+        """
+        if self.lack_of_fit is not None:
+            return self.lack_of_fit
+        freedom = self.degrees_of_freedom if self.sigma_is_estimated else 0
+        return LackOfFit(self.sigma**2 * freedom, freedom)
 
     @property
     def conversion_residual(self) -> float | None:

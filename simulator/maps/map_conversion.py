@@ -27,16 +27,29 @@ OWN_MOTION, NOTHING = 1e-9, 1e-12
 class MapConversion:
     """A map in another error model, the nearest to it by least squares.
 
-    At `places` (n, d), scale readings with probe offsets (n, d), `residuals` (n, d) are what the
-    corrections of the new map exceed those of the old one by, in metres, after a rigid `motion`
-    (d shifts and turns) between the frames of the two models, which changes no length.
+    It was fitted at `places` (n, d), scale readings with probe offsets (n, d). Between the frames
+    of the two models lies a rigid `motion` (d shifts and turns), which changes no length. `tips`
+    (k, d) are the offsets of the map's probes and one along each axis.
     """
 
+    old: FittedMap
     converted: FittedMap
     places: Array
     offsets: Array
-    residuals: Array
     motion: Array
+    tips: Array
+
+    def differences(self, x: Array, p: Array) -> Array:
+        """What corrections (n, d) of the new map exceed those of the old one by at scale readings
+        (n, d) with probe offsets (n, d), in metres, after the motion.
+        """
+        old, new = self.old, self.converted
+        arm = x + p - (self.places + self.offsets).mean(axis=0)
+        shift, turn = np.split(self.motion, [old.dimension])
+        moved = shift + rotation_sensitivity(arm) @ turn
+        return np.asarray(
+            new.model.error(x, new.values, p) - old.model.error(x, old.values, p) + moved
+        )
 
 
 @single_threaded
@@ -50,7 +63,7 @@ def converted(
     linear in those of the old one, and so the covariance and the undetermined directions follow;
     what the new model cannot do is no part of them.
     """
-    x, p = _places(fitted, model)
+    x, p, tips = _places(fitted, model)
     zero, d = np.zeros(len(model.parameters)), fitted.dimension
     own = model.jacobian(x, zero, p).reshape(x.size, -1)
     wanted = (fitted.model.error(x, fitted.values, p) - p).ravel()
@@ -74,8 +87,6 @@ def converted(
     values, matrix = by_both[:, 0], by_both[:, 1:]
     motion = np.zeros(motions.shape[1])
     motion[used] = moved[:, 0]
-    found = model.error(x, values, p) - p
-    residuals = found.ravel() + motions @ motion - wanted
     offsets = len(fitted.scale) - len(fitted.values)
     whole = np.zeros((len(values) + offsets, len(fitted.scale)))
     whole[: len(values), : len(fitted.values)] = matrix
@@ -91,11 +102,13 @@ def converted(
         undetermined=determined_only(whole @ fitted.undetermined, scale),
         frame=frame,
     )
-    return MapConversion(new, x, p, residuals.reshape(x.shape), motion)
+    return MapConversion(fitted, new, x, p, motion, tips)
 
 
-def _places(fitted: FittedMap, model: ErrorModel) -> tuple[Array, Array]:
-    """Scale readings (n, d) and probe offsets (n, d) at which corrections are compared."""
+def _places(fitted: FittedMap, model: ErrorModel) -> tuple[Array, Array, Array]:
+    """Scale readings (n, d) and probe offsets (n, d) at which corrections are fitted, and the
+    different ones (k, d) of these offsets.
+    """
     volume, d = fitted.volume, fitted.dimension
     generator = np.random.default_rng(np.random.SeedSequence(1))
     richer = max(len(model.parameters), len(fitted.values))
@@ -110,4 +123,4 @@ def _places(fitted: FittedMap, model: ErrorModel) -> tuple[Array, Array]:
         np.concatenate([x, np.repeat(x[: len(corners)], len(tips), axis=0)]),
         np.append(of, np.tile(np.arange(len(tips)), len(corners))),
     )
-    return x, tips[of]
+    return x, tips[of], np.unique(tips, axis=0)

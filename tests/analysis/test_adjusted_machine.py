@@ -78,6 +78,7 @@ def map_of_campaign(true: Real, seed: int) -> FittedMap:
         sigma_is_estimated=False,
         degrees_of_freedom=freedom,
         sum_of_squares=at.factor.sum_of_squares,
+        lack_of_fit=None,
         estimates=(),
         functions=estimated_functions(at, False),
     )

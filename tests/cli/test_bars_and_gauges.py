@@ -302,7 +302,7 @@ def test_a_wrong_reading_of_a_gauge_stands_first_among_residuals(
     position, ball, probe, x, y, z = lines[17].split(",")
     lines[17] = ",".join([position, ball, probe, str(float(x) + 30.0), y, z])
     (tmp_path / "r.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    assert main(["fit", GAUGE, str(tmp_path / "r.csv"), "--variant", "radius known"]) == 0
+    assert main(["fit", GAUGE, str(tmp_path / "r.csv"), "--variant", "radius known"]) == 1
     out, err = capsys.readouterr()
     assert "warning: S^2 is" in err
     first = out.split("largest residuals")[1].splitlines()[1].split()

@@ -6,6 +6,7 @@ sums that the manuals describe, without the code that writes or reads tables.
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -267,3 +268,51 @@ def test_the_face_takes_lengths_as_texts_or_in_metres() -> None:
     assert one.files("a") == two.files("a")
     with pytest.raises(ValueError, match="pitch"):
         bp.compensation(file, "isg", "50")
+
+
+def test_no_probe_differs_by_more_than_is_printed() -> None:
+    """What rotations make of each probe's offset is part of what a table without them leaves, in
+    arrangements of every kind; summed here from the text of the files.
+    """
+    offsets = np.array([[0.0, 0.3, 0.2], [0.3, -0.2, 0.4]])
+    for arrangement in ("MB1", "FB1", "CX1"):
+        machine = replace(machine_of("npl-like", arrangement), offsets=offsets)
+        made = made_compensation(
+            machine, "m", "heidenhain", (0.2,), sense="corrections", without_rotations=True
+        )
+        assert np.array_equal(made.made.offsets, [[0.0, 0.0, 0.0], *offsets])
+        x, _ = places(machine)
+        found = np.zeros(x.shape)
+        for k, axis in enumerate("xyz"):
+            lines = made.files("m")[f"m-{axis}.com"].split("\n")[2:-2]
+            rows = np.array([[float(cell) for cell in line.split()] for line in lines])
+            for j in range(3):
+                found[:, j] += 1e-3 * np.interp(1e3 * x[:, k], rows[:, 1], rows[:, 2 + j])
+        left = [
+            found - true_errors(machine, x, np.tile(offset, (len(x), 1)), machine.zero)
+            for offset in made.made.offsets
+        ]
+        sizes = np.linalg.norm(left, axis=2).max(axis=1)
+        assert 0.6 * made.made.written < sizes.max() <= made.made.written
+        # Without an offset less is left: nothing that this alone would show.
+        assert sizes[0] < 0.9 * sizes.max()
+
+
+@pytest.mark.parametrize("offset", [(0.0, 100.0, 0.0), (80.0, -50.0, -200.0)])
+def test_a_ram_that_turns_has_a_table_of_zeros(
+    offset: tuple[float, float, float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The turn of the last axis moves nothing but what the probe sticks out: |theta x p|."""
+    ends = "".join(f"{axis}: [0 mm, 400 mm], " for axis in "xyz")
+    (tmp_path / "ram.yaml").write_text(
+        f"title: a ram that turns\narrangement: MB1\nvolume: {{{ends.rstrip(', ')}}}\n"
+        f"probe: [{', '.join(f'{one} mm' for one in offset)}]\n"
+        "errors:\n  EAZ: {polynomial: [0 urad, 80 urad]}\n  EBZ: {polynomial: [0 urad, 20 urad]}\n"
+    )
+    asked = ["--format", "heidenhain", "--sense", "corrections", "--without-rotations", "--json"]
+    assert main(["compensation", str(tmp_path / "ram.yaml"), *asked]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert not any(row[f"displacement {axis}"] for row in told["corrections"] for axis in "xyz")
+    left = np.linalg.norm(np.cross([80e-6, 20e-6, 0.0], 1e-3 * np.array(offset)))
+    for name in ("all", "rotations_left_out"):
+        assert told["largest_differences"][name] == pytest.approx(left, rel=1e-9)

@@ -15,6 +15,7 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
+from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
 from ballplate.simulator.readings.same_readings import (
     position_fingerprints,
@@ -89,9 +90,9 @@ class ComparedMap:
     none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
     maps of the same model have them in common, as otherwise their spaces of errors would differ by
     what is of second order. `fit` has the balls of plates, and `data` are the readings that the map
-    comes from, where they are known. `is_expected`: nothing was measured, and
-    the map is exact but for what is stated, of which `stated` is the standard uncertainty of
-    lengths.
+    comes from with their `lack_of_fit`, where they are known; `cautions` are those of the fit.
+    `is_expected`: nothing was measured, and the map is exact but for what is stated, of which
+    `stated` is the standard uncertainty of lengths.
     """
 
     label: str
@@ -112,6 +113,8 @@ class ComparedMap:
     shared_balls: Array | None = None
     about: Array | None = None
     data: MapData | None = None
+    lack_of_fit: LackOfFit | None = None
+    cautions: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -250,6 +253,8 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
         date,
         fit,
         data=data_of(fit.observed, fit.experiment),
+        lack_of_fit=fit.lack_of_fit,
+        cautions=(*fit.cautions, fit.complaint),
     )
 
 

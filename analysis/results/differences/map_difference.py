@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import InCommon
 from ballplate.simulator.readings.same_readings import read_once_words
 
@@ -142,6 +143,11 @@ class MapDifference(Result):
                 f" of the same scale readings{probe}; U = {k:g} u, E_n = difference / U"
             ),
             self._assumption(),
+            *(
+                verdict_line(one.lack_of_fit, one.label)
+                for one in (self.first, self.second)
+                if not one.is_expected
+            ),
             "",
             *self._motion_table(),
             "",
@@ -165,8 +171,7 @@ class MapDifference(Result):
             if one.degrees_of_freedom < FEW
         ]
         for one in (self.first, self.second):
-            cautions = () if one.fit is None else one.fit.cautions
-            found += [f"warning: {one.label}: {caution}" for caution in cautions]
+            found += [f"warning: {one.label}: {caution}" for caution in one.cautions if caution]
         if self.in_common == "same":
             found.append(f"warning: {SAME_READINGS}")
         elif once := positions_in_common(self.first, self.second):
@@ -437,6 +442,7 @@ def _map_data(one: ComparedMap) -> dict[str, Any]:
         "date": one.date,
         "expected": one.is_expected,
         "degrees_of_freedom": finite(one.degrees_of_freedom),
+        **({} if one.is_expected else {"lack_of_fit": verdict_data(one.lack_of_fit)}),
         "frame_takes_out": list(one.held),
     }
 

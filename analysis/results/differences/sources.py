@@ -137,4 +137,6 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         side.probe,
         day or side.date,
         data=side.data,
+        lack_of_fit=side.lack_of_fit,
+        cautions=(side.known_lack_of_fit.caution,),
     )

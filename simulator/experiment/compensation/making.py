@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -42,7 +43,8 @@ class TabledMachine:
     """Errors of a machine in a volume from `lower` to `upper` (d,): a `model` with parameters `a`.
 
     `zero` (d,) is where its errors are zero, and `offsets` (k, d) are those of its probes, all in
-    metres; `bends` are positions of each axis where errors bend.
+    metres; `bends` are positions of each axis where errors bend, and `verdict` that on the fit of a
+    map.
     """
 
     title: str
@@ -53,6 +55,7 @@ class TabledMachine:
     zero: Array
     offsets: Array
     bends: tuple[Array, ...] = ()
+    verdict: str = ""
 
     @property
     def dimension(self) -> int:
@@ -65,8 +68,9 @@ class MadeTable:
 
     `interpolation` is that of the exact values, `rounding` what rounding them changes and `written`
     that of the table as written, each as the length of a vector in metres, over `places` points
-    with each probe. `left_out` is how far the tip is moved by rotations that the format has no room
-    for.
+    with each of the `offsets` (k, d): those of the probes, and none, to which a table without
+    rotations refers. `left_out` is how far these tips are moved by rotations that the format has no
+    room for.
     """
 
     table: Table
@@ -76,6 +80,7 @@ class MadeTable:
     written: float
     left_out: float
     places: int
+    offsets: Array
 
 
 def nodes_along(lower: float, upper: float, start: float, pitch: float, even: bool) -> Array:
@@ -259,9 +264,8 @@ def _compared(
     without = exact
     if not made.has_rotations:
         assert isinstance(exact, AxisTables)
-        probes = np.zeros((1, d))
         without = exact.changed(lambda one: one.values * (np.arange(6) < 3))
-    sides = [_places(machine, exact, k, origin) for k in range(d)]
+    sides = [_places(machine, exact, k, origin, probes) for k in range(d)]
     grid = grid_points(sides)
     generator = np.random.default_rng(np.random.SeedSequence(0))
     x = np.concatenate([grid, generator.uniform(machine.lower, machine.upper, (RANDOM, d))])
@@ -278,12 +282,13 @@ def _compared(
             largest, [np.linalg.norm(one - one[-1], axis=1).max() for one in apart]
         )
     interpolation, rounding, total, left_out = largest.tolist()
-    return MadeTable(written, origin, interpolation, rounding, total, left_out, len(x) - 1)
+    return MadeTable(written, origin, interpolation, rounding, total, left_out, len(x) - 1, probes)
 
 
-def _places(machine: TabledMachine, table: Table, axis: int, origin: Array) -> Array:
+def _places(machine: TabledMachine, table: Table, axis: int, origin: Array, probes: Array) -> Array:
     """Positions along an axis at which table and machine are compared: nodes, halfway between, and
-    where the machine's errors bend; of many, those where the two differ most beside three lines.
+    where the machine's errors bend; of many, those where the two differ most beside three lines,
+    with all probes.
     """
     own = table.nodes[axis] if isinstance(table, VolumeTable) else table.axes[axis].positions
     low, high = float(machine.lower[axis]), float(machine.upper[axis])
@@ -293,10 +298,10 @@ def _places(machine: TabledMachine, table: Table, axis: int, origin: Array) -> A
     if len(every) <= PLACES:
         return every
     differs = np.zeros(len(every))
-    for corner in (machine.lower, machine.upper, origin):
+    for corner, offset in product((machine.lower, machine.upper, origin), probes):
         x = np.tile(corner, (len(every), 1))
         x[:, axis] = every
-        p = np.zeros(x.shape)
+        p = np.broadcast_to(offset, x.shape)
         apart = correction(table, x, p) - machine.model.error(x, machine.a, p)
         differs += np.linalg.norm(apart - np.median(apart, axis=0), axis=1)
     chosen = np.argsort(-differs, kind="stable")[: PLACES - 2]

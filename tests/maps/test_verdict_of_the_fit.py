@@ -1,0 +1,249 @@
+"""A map carries the lack of fit of its fit, and whatever takes the map repeats it.
+
+Readings have one probe off by more and more, which the error model cannot follow: S^2 over the
+degrees of freedom goes through both limits.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pandas
+import pytest
+import yaml
+from ballplate.cli import main
+from ballplate.simulator.maps.fit_verdict import LIMIT, LackOfFit
+
+# By how much one probe's readings are wrong, in metres, and what that is.
+SHIFTS = {"clean": 0.0, "significant": 5e-6, "beyond": 1e-3}
+VERDICTS = {
+    "clean": "not significant",
+    "significant": "significant",
+    "beyond": "beyond the limit",
+    "old": "not stated",
+}
+PITCH = ["--pitch", "500 mm"]
+DESIGN = {
+    "artefacts": {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}},
+    "error_model": {
+        "kind": "kinematic",
+        "position_coefficients": 3,
+        "rotation_coefficients": 2,
+    },
+}
+
+
+@cache
+def fit(name: str, **options: Any) -> bp.Fit:
+    experiment = bp.quickstart().with_(DESIGN)
+    readings = bp.simulate(experiment)
+    wrong = readings["probe"] == "front"
+    assert wrong.any() and not wrong.all()
+    readings.loc[wrong, "x_mm"] += 1e3 * SHIFTS[name]
+    return bp.fit(experiment, readings, **options)
+
+
+@pytest.fixture(scope="module")
+def maps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Map files of each verdict, and one as earlier versions wrote it."""
+    folder = tmp_path_factory.mktemp("maps")
+    found = {name: folder / f"{name}.yaml" for name in VERDICTS}
+    for name in SHIFTS:
+        bp.write_map(fit(name).to_map(), found[name])
+    text = found["clean"].read_text()
+    old = re.sub("^(lack_of_fit|checksum):.*\n", "", text, flags=re.MULTILINE)
+    assert text.count("\n") == old.count("\n") + 2
+    found["old"].write_text(old)
+    (folder / "points.csv").write_text("name,x_mm,y_mm,z_mm\na,100,100,100\nb,600,500,400\n")
+    return found
+
+
+def squares_of(result: bp.Fit) -> float:
+    """S^2 over its degrees of freedom, of the residuals of readings and certified values."""
+    return result.to_dict()["sum_of_squares"] / result.degrees_of_freedom
+
+
+def test_the_three_verdicts_are_those_of_the_sum_of_squares() -> None:
+    """The test's level by its normal approximation, which is far from either case."""
+    freedom = fit("clean").degrees_of_freedom
+    level = 1.0 + 3.09 * np.sqrt(2.0 / freedom)
+    for name, low, high in (
+        ("clean", 0.0, level - 0.05),
+        ("significant", level + 0.05, LIMIT**2),
+        ("beyond", LIMIT**2, np.inf),
+    ):
+        assert low < squares_of(fit(name)) < high
+        lack = fit(name).to_map().lack_of_fit
+        assert lack is not None and lack.times == pytest.approx(squares_of(fit(name)))
+        assert fit(name).too_large == lack.is_significant == (name != "clean")
+        assert bool(fit(name).complaint) == lack.is_beyond_limit == (name == "beyond")
+
+
+@pytest.mark.parametrize("factor", [0.3, 3.0, 20.0])
+def test_uncertainties_stated_wrong_are_no_failure(factor: float) -> None:
+    """Scatter `factor` times what is stated has at most a warning, whatever the factor."""
+    experiment = bp.quickstart().with_(DESIGN)
+    scattered = experiment.with_({"machine.repeatability": f"{0.2 * factor} um"})
+    result = bp.fit(experiment, bp.simulate(scattered))
+    assert result.sigma == pytest.approx(factor, rel=0.25)
+    assert result.too_large == (factor > 1.0) and not result.complaint
+    bp.compensation(result, "isg", PITCH[1])
+
+
+def test_what_is_beyond_the_limit_is_significant() -> None:
+    for few in (1, 2, 3):
+        beyond = LackOfFit(1.01 * LIMIT**2 * few, few)
+        assert beyond.is_beyond_limit and beyond.is_significant
+    assert not LackOfFit(1e9, 0).is_beyond_limit
+
+
+def test_no_setting_of_sigma_hides_it() -> None:
+    """Neither uncertainties as given, nor variances estimated from the same residuals."""
+    for options in ({"sigma": "given"}, {"components": "probe", "reweight": True}):
+        result = fit("beyond", **options)
+        assert result.sigma == 1.0 and "beyond the limit" in result.complaint
+        lack = result.to_map().lack_of_fit
+        assert lack is not None and lack.is_beyond_limit
+    assert not fit("significant", components="probe", reweight=True).complaint
+
+
+def test_a_reversal_has_the_verdict_of_multiple_redundancy() -> None:
+    """Real readings, stated to a microinch, twelve times what they scatter; and a slip of 10 mil."""
+    folder = bp.quickstart().source.parent / "hocken_borchardt"
+    experiment = bp.load(folder / "real.yaml", "with scale")
+    readings = pandas.read_csv(folder / "real-readings.csv")
+    for slip, words in ((0.0, ""), (0.01, "beyond the limit")):
+        readings.loc[3, "x_in"] += slip
+        found = bp.fit(experiment, readings, estimator="reversal")
+        assert words in found.complaint and bool(words) == bool(found.complaint)
+
+
+def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
+    corner = {"x": "0 mm", "y": "0 mm"}
+    positions = [
+        {"name": level, "plane": "z", "level": level, "corner": corner, "probes": ["down"]}
+        for level in ("100 mm", "300 mm", "500 mm", "700 mm")
+    ]
+    one_probe = {"calibration": [], "probes": {"down": ["0 mm"] * 3}, "positions": positions}
+    experiment = bp.quickstart().with_(DESIGN | one_probe)
+    readings = bp.simulate(experiment)
+    readings["z_mm"] += np.arange(len(readings)) % 2
+    told = bp.fit(experiment, readings).complaint
+    assert "rank deficiency" in told and "beyond the limit" in told
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["correct", "MAP", "points.csv"],
+        ["map", "MAP", "--grid", "2,2,2"],
+        ["map", "MAP", "--error", "EXX"],
+        ["curves", "MAP"],
+        ["convert", "MAP", "--to", "metric"],
+        ["adjust", "MAP", "--scale", "x=10 um/m"],
+        ["diff", "MAP", "clean.npz"],
+        ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
+    ],
+    ids=lambda given: " ".join(given[:1] + given[2:3]),
+)
+def test_every_command_repeats_it(
+    arguments: list[str],
+    name: str,
+    maps: dict[str, Path],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(maps[name].parent)
+    if not Path("clean.npz").exists():
+        bp.write_map(fit("clean").to_map(), "clean.npz")
+    given = [f"{name}.yaml" if one == "MAP" else one for one in arguments]
+    assert main(given) in (0, 1)
+    told = capsys.readouterr()
+    lines = [one for one in told.out.splitlines() if one.startswith("lack of fit of")]
+    assert re.search(rf": {VERDICTS[name]}( \(|$)", lines[0])
+    assert ("in the fit of" in told.err) == (name in ("significant", "beyond"))
+    if name == "beyond":
+        assert main([*given, "--json"]) in (0, 1)
+        assert VERDICTS[name] in json.dumps(json.loads(capsys.readouterr().out))
+
+
+@pytest.mark.parametrize("role", ["priors", "true_machine"])
+def test_an_experiment_repeats_that_of_its_map(role: str, maps: dict[str, Path]) -> None:
+    for name in VERDICTS:
+        stated = {"kind": "map", "file": str(maps[name])}
+        change = DESIGN | {role: [stated] if role == "priors" else stated}
+        doubts = [
+            one for one in bp.quickstart().with_(change).doubts if "in the fit of" in str(one)
+        ]
+        assert len(doubts) == (name in ("significant", "beyond"))
+
+
+@pytest.mark.parametrize("kind", ["conversion", "adjustment", "arrays"])
+def test_maps_made_of_a_map_carry_it(
+    kind: str, maps: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = bp.load_map(maps["beyond"])
+    if kind == "conversion":
+        main(["convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
+    elif kind == "adjustment":
+        main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.npz"])
+    else:
+        bp.write_map(before, "new.npz")
+    assert bp.load_map("new.npz").lack_of_fit == before.lack_of_fit
+    # By hand it is not taken off.
+    text = maps["beyond"].read_text()
+    Path("edited.yaml").write_text(re.sub("^lack_of_fit:.*\n", "", text, flags=re.MULTILINE))
+    with pytest.raises(bp.ExperimentError, match="checksum"):
+        bp.load_map("edited.yaml")
+
+
+@pytest.mark.parametrize("form", ["csv", "isg", "heidenhain"])
+def test_controller_tables_are_made_only_if_it_is_allowed(
+    form: str, maps: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ending = "cma" if form == "heidenhain" else "csv"
+    options = ["--format", form, "-o", str(tmp_path / f"table.{ending}"), *PITCH]
+    if form == "heidenhain":
+        options += ["--sense", "corrections", "--without-rotations"]
+    assert main(["compensation", str(maps["beyond"]), *options]) == 3
+    assert "--allow-lack-of-fit" in capsys.readouterr().err and not list(tmp_path.iterdir())
+    assert main(["compensation", str(maps["beyond"]), *options, "--allow-lack-of-fit"]) == 0
+    assert list(tmp_path.iterdir())
+    assert main(["compensation", str(maps["significant"]), *options, "--force"]) == 0
+    with pytest.raises(bp.ExperimentError, match="allow_lack_of_fit"):
+        bp.compensation(fit("beyond"), "isg")
+    bp.compensation(fit("beyond"), "isg", PITCH[1], allow_lack_of_fit=True)
+
+
+def test_a_map_of_old_is_judged_by_its_sigma(maps: dict[str, Path], tmp_path: Path) -> None:
+    text = maps["beyond"].read_text()
+    old = tmp_path / "old.yaml"
+    old.write_text(re.sub("^(lack_of_fit|checksum):.*\n", "", text, flags=re.MULTILINE))
+    with pytest.raises(bp.ExperimentError, match="allow_lack_of_fit"):
+        bp.compensation(old, "isg")
+
+
+def test_the_exit_status_of_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    experiment = bp.quickstart().with_(DESIGN)
+    stated = yaml.safe_load(Path(bp.quickstart().source).read_text()) | DESIGN
+    Path("design.yaml").write_text(yaml.safe_dump(stated))
+    for name, shift in SHIFTS.items():
+        readings = bp.simulate(experiment)
+        readings.loc[readings["probe"] == "front", "x_mm"] += 1e3 * shift
+        readings.to_csv("readings.csv", index=False)
+        status = main(["fit", "design.yaml", "readings.csv", "-o", f"{name}.yaml"])
+        told = capsys.readouterr().err
+        assert status == (name == "beyond") and Path(f"{name}.yaml").exists()
+        assert ("S^2 is" in told) == (name != "clean")
+        assert ("lack of fit is beyond the limit" in told) == (name == "beyond")
