@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.estimation.covariance import Spectrum
 from ballplate.simulator.estimation.gauss_newton import as_drawn
+from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -102,19 +104,38 @@ class Search:
 
     def __init__(self, at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
         self.design, self.state, self.x, self.estimated = at.design, at.state, x, sigma_is_estimated
-        left = leftover(at, x, freedom)
+        # Of a design that determines a pattern not at all, noise would leave a little of it.
+        drawn = linearise(at.design)
+        left = leftover(drawn, None, freedom)
+        self.dimensions = [
+            _basis(left, one.columns).shape[1] for one in smooth_errors(at.design, drawn.state)
+        ]
+        left = self._left(drawn.spectrum, freedom)
         self.sum_of_squares, self.freedom = left.sum_of_squares, freedom
         self._begin(left)
+
+    def _left(self, drawn: Spectrum, freedom: int) -> Leftover:
+        """What the estimate leaves, linearised at the readings that it expects.
+
+        Residuals are independent of all that is estimated, but not of the readings: what is left of
+        a pattern that is nearly taken up would be a function of their noise, and would explain it.
+        """
+        at = linearise(self.design, self.state, None, drawn)
+        residual = whitened_residuals(self.design, self.state, self.x)
+        return leftover(at, None, freedom).of_residual(residual)
 
     def _begin(self, left: Leftover) -> None:
         self.left = self.start = left
         self.width = left.common.shape[1]
-        self.patterns = patterns(self.design, self.state, self.x, every_start=True)
+        self.patterns = patterns(self.design, self.state, None, every_start=True)
         self.groups = event_groups(self.patterns)
         self.columns = Columns(self.patterns.matrix, self.groups, left)
         self.tests = max(self.columns.tests(), 1)
-        every = smooth_errors(self.design, self.state, self.x)
-        reduced = [Smooth(one.words, _basis(left, one.columns)) for one in every]
+        every = smooth_errors(self.design, self.state)
+        reduced = [
+            Smooth(one.words, _basis(left, one.columns, most))
+            for one, most in zip(every, self.dimensions, strict=True)
+        ]
         self.smooth = [one for one in reduced if one.columns.shape[1]]
         self.scatters = scatters(self.design)
         self.other_tests = max(len(self.smooth) + len(self.scatters), 1)
@@ -240,8 +261,7 @@ class Search:
         for _ in range(WEIGHINGS):
             times *= ratio(left, scatter.rows)
             self.design = with_scatter(plain, scatter, times)
-            at = linearise(self.design, self.state, self.x, as_drawn(self.design))
-            left = leftover(at, self.x, self.start.freedom)
+            left = self._left(as_drawn(self.design), self.start.freedom)
         self._begin(left)
         return times
 
@@ -380,9 +400,9 @@ class Search:
         return tuple(found.values())
 
 
-def _basis(left: Leftover, columns: Array) -> Array:
-    """An orthonormal basis (n, q) of what is left of columns (n, k)."""
-    return orthonormal(left.of(columns), np.linalg.norm(columns, axis=0))
+def _basis(left: Leftover, columns: Array, most: int | None = None) -> Array:
+    """An orthonormal basis (n, q) of what is left of columns (n, k), as `orthonormal`."""
+    return orthonormal(left.of(columns), np.linalg.norm(columns, axis=0), most)
 
 
 def _further(left: Leftover, basis: Array, since: int) -> Array:

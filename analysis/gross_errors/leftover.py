@@ -43,6 +43,10 @@ class Leftover:
     def sum_of_squares(self) -> float:
         return float(self.residual @ self.residual)
 
+    def of_residual(self, residual: Array) -> Leftover:
+        """The same of whitened residuals (n,)."""
+        return replace(self, residual=self.of(residual[:, None])[:, 0])
+
     def of(self, columns: Array) -> Array:
         """What is left of biases (n, k)."""
         own = self.own_columns
@@ -100,11 +104,13 @@ def too_many_entries(design: Design) -> str:
     )
 
 
-def orthonormal(left: Array, size: Array) -> Array:
-    """An orthonormal basis (n, q) of what is left (n, k) of columns of some size (k,)."""
+def orthonormal(left: Array, size: Array, most: int | None = None) -> Array:
+    """An orthonormal basis (n, q) of what is left (n, k) of columns of some size (k,), of the
+    directions of which `most` is left.
+    """
     use = size > 0.0
     u, values, _ = np.linalg.svd(left[:, use] / size[use], full_matrices=False)
-    return u[:, values**2 > HIDDEN]
+    return u[:, values**2 > HIDDEN][:, :most]
 
 
 def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
@@ -118,7 +124,7 @@ def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
         common[some.rows], own[some.rows], ball[some.rows] = some.common, some.own, some.ball
     residual = whitened_residuals(design, at.state, x)
     found = Leftover(residual, common, own, ball, len(design.balls.places), freedom)
-    return replace(found, residual=found.of(residual[:, None])[:, 0])
+    return found.of_residual(residual)
 
 
 @dataclass(frozen=True)
