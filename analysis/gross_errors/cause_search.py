@@ -10,9 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.estimation.covariance import Spectrum
-from ballplate.simulator.estimation.gauss_newton import as_drawn
-from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -104,36 +101,33 @@ class Search:
 
     def __init__(self, at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
         self.design, self.state, self.x, self.estimated = at.design, at.state, x, sigma_is_estimated
-        # Of a design that determines a pattern not at all, noise would leave a little of it.
-        drawn = linearise(at.design)
-        left = leftover(drawn, None, freedom)
+        # Of what the design as drawn does not determine at all noise leaves a little: a direction
+        # that is nothing but a function of the noise, and that would explain it.
+        self.drawn = linearise(at.design)
+        left = leftover(self.drawn, None, freedom)
+        every = patterns(at.design, self.drawn.state, None, every_start=True)
+        self.of_drawn = Columns(every.matrix, event_groups(every), left)
         self.dimensions = [
-            _basis(left, one.columns).shape[1] for one in smooth_errors(at.design, drawn.state)
+            _basis(left, one.columns).shape[1] for one in smooth_errors(at.design, self.drawn.state)
         ]
-        left = self._left(drawn.spectrum, freedom)
+        left = leftover(at, x, freedom)
         self.sum_of_squares, self.freedom = left.sum_of_squares, freedom
         self._begin(left)
-
-    def _left(self, drawn: Spectrum, freedom: int) -> Leftover:
-        """What the estimate leaves, linearised at the readings that it expects.
-
-        Residuals are independent of all that is estimated, but not of the readings: what is left of
-        a pattern that is nearly taken up would be a function of their noise, and would explain it.
-        """
-        at = linearise(self.design, self.state, None, drawn)
-        residual = whitened_residuals(self.design, self.state, self.x)
-        return leftover(at, None, freedom).of_residual(residual)
 
     def _begin(self, left: Leftover) -> None:
         self.left = self.start = left
         self.width = left.common.shape[1]
-        self.patterns = patterns(self.design, self.state, None, every_start=True)
+        self.patterns = patterns(self.design, self.state, self.x, every_start=True)
         self.groups = event_groups(self.patterns)
-        self.columns = Columns(self.patterns.matrix, self.groups, left)
+        self.columns = Columns(self.patterns.matrix, self.groups, left, self.of_drawn)
         self.tests = max(self.columns.tests(), 1)
+        # Residuals are independent of all that is estimated, but not of the readings. Therefore
+        # directions are those at the readings that the estimate expects.
+        at = linearise(self.design, self.state, None, self.drawn.spectrum)
+        expected = leftover(at, None, left.freedom)
         every = smooth_errors(self.design, self.state)
         reduced = [
-            Smooth(one.words, _basis(left, one.columns, most))
+            Smooth(one.words, _basis(left, _basis(expected, one.columns, most)))
             for one, most in zip(every, self.dimensions, strict=True)
         ]
         self.smooth = [one for one in reduced if one.columns.shape[1]]
@@ -261,7 +255,8 @@ class Search:
         for _ in range(WEIGHINGS):
             times *= ratio(left, scatter.rows)
             self.design = with_scatter(plain, scatter, times)
-            left = self._left(as_drawn(self.design), self.start.freedom)
+            at = linearise(self.design, self.state, self.x, self.drawn.spectrum)
+            left = leftover(at, self.x, self.start.freedom)
         self._begin(left)
         return times
 
