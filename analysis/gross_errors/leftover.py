@@ -139,6 +139,8 @@ class Columns:
     left of them in the design as `drawn`.
     """
 
+    information: Array
+
     def __init__(
         self,
         matrix: csc_array,
