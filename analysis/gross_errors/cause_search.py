@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.estimation.gauss_newton import as_drawn
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -102,6 +101,15 @@ class Search:
 
     def __init__(self, at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
         self.design, self.state, self.x, self.estimated = at.design, at.state, x, sigma_is_estimated
+        # Of what the design as drawn does not determine at all noise leaves a little: a direction
+        # that is nothing but a function of the noise, and that would explain it.
+        self.drawn = linearise(at.design)
+        left = leftover(self.drawn, None, freedom)
+        every = patterns(at.design, self.drawn.state, None, every_start=True)
+        self.of_drawn = Columns(every.matrix, event_groups(every), left)
+        self.dimensions = [
+            _basis(left, one.columns).shape[1] for one in smooth_errors(at.design, self.drawn.state)
+        ]
         left = leftover(at, x, freedom)
         self.sum_of_squares, self.freedom = left.sum_of_squares, freedom
         self._begin(left)
@@ -111,10 +119,17 @@ class Search:
         self.width = left.common.shape[1]
         self.patterns = patterns(self.design, self.state, self.x, every_start=True)
         self.groups = event_groups(self.patterns)
-        self.columns = Columns(self.patterns.matrix, self.groups, left)
+        self.columns = Columns(self.patterns.matrix, self.groups, left, self.of_drawn)
         self.tests = max(self.columns.tests(), 1)
-        every = smooth_errors(self.design, self.state, self.x)
-        reduced = [Smooth(one.words, _basis(left, one.columns)) for one in every]
+        # Residuals are independent of all that is estimated, but not of the readings. Therefore
+        # directions are those at the readings that the estimate expects.
+        at = linearise(self.design, self.state, None, self.drawn.spectrum)
+        expected = leftover(at, None, left.freedom)
+        every = smooth_errors(self.design, self.state)
+        reduced = [
+            Smooth(one.words, _basis(left, _basis(expected, one.columns, most)))
+            for one, most in zip(every, self.dimensions, strict=True)
+        ]
         self.smooth = [one for one in reduced if one.columns.shape[1]]
         self.scatters = scatters(self.design)
         self.other_tests = max(len(self.smooth) + len(self.scatters), 1)
@@ -240,7 +255,7 @@ class Search:
         for _ in range(WEIGHINGS):
             times *= ratio(left, scatter.rows)
             self.design = with_scatter(plain, scatter, times)
-            at = linearise(self.design, self.state, self.x, as_drawn(self.design))
+            at = linearise(self.design, self.state, self.x, self.drawn.spectrum)
             left = leftover(at, self.x, self.start.freedom)
         self._begin(left)
         return times
@@ -380,9 +395,9 @@ class Search:
         return tuple(found.values())
 
 
-def _basis(left: Leftover, columns: Array) -> Array:
-    """An orthonormal basis (n, q) of what is left of columns (n, k)."""
-    return orthonormal(left.of(columns), np.linalg.norm(columns, axis=0))
+def _basis(left: Leftover, columns: Array, most: int | None = None) -> Array:
+    """An orthonormal basis (n, q) of what is left of columns (n, k), as `orthonormal`."""
+    return orthonormal(left.of(columns), np.linalg.norm(columns, axis=0), most)
 
 
 def _further(left: Leftover, basis: Array, since: int) -> Array:

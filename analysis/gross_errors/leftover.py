@@ -100,11 +100,13 @@ def too_many_entries(design: Design) -> str:
     )
 
 
-def orthonormal(left: Array, size: Array) -> Array:
-    """An orthonormal basis (n, q) of what is left (n, k) of columns of some size (k,)."""
+def orthonormal(left: Array, size: Array, most: int | None = None) -> Array:
+    """An orthonormal basis (n, q) of what is left (n, k) of columns of some size (k,), of the
+    directions of which `most` is left.
+    """
     use = size > 0.0
     u, values, _ = np.linalg.svd(left[:, use] / size[use], full_matrices=False)
-    return u[:, values**2 > HIDDEN]
+    return u[:, values**2 > HIDDEN][:, :most]
 
 
 def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
@@ -133,10 +135,28 @@ class Columns:
     """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat
     matrix.
 
-    `groups` are arrays (g, q) of columns that are tested together.
+    `groups` are arrays (g, q) of columns that are tested together, in no more dimensions than are
+    left of them in the design as `drawn`.
     """
 
-    def __init__(self, matrix: csc_array, groups: Sequence[Integers], of: Leftover) -> None:
+    information: Array
+
+    def __init__(
+        self,
+        matrix: csc_array,
+        groups: Sequence[Integers],
+        of: Leftover,
+        drawn: Columns | None = None,
+    ) -> None:
+        self.most = [
+            np.full(len(index), index.shape[1])
+            if drawn is None
+            else drawn.explained(number).dimensions
+            for number, index in enumerate(groups)
+        ]
+        self.is_determined = np.ones(matrix.shape[1], bool)
+        if drawn is not None:
+            self.is_determined = drawn.information > 0.0
         self.rows = matrix.T.tocsr()
         self.square = np.asarray(self.rows.power(2).sum(axis=1)).ravel()
         self.size = np.sqrt(np.maximum(self.square, np.finfo(float).tiny))
@@ -156,7 +176,8 @@ class Columns:
         self.product = np.asarray(self.rows @ of.residual)
         self.further = np.asarray(self.rows @ of.common[:, self._width :])
         information = self._information - (self.further**2).sum(axis=1)
-        self.information = np.where(information > HIDDEN * self.square, information, 0.0)
+        shows = self.is_determined & (information > HIDDEN * self.square)
+        self.information = np.where(shows, information, 0.0)
 
     def tests(self) -> int:
         """Number of groups that can be tested."""
@@ -204,6 +225,7 @@ class Columns:
         further = self.further[index] / self.size[index][:, :, None]
         values, vectors = np.linalg.eigh(gram - further @ further.transpose(0, 2, 1))
         along = np.einsum("gij,gi->gj", vectors, self.product[index] / self.size[index])
-        known = values > HIDDEN
+        q = index.shape[1]
+        known = (values > HIDDEN) & (np.arange(q) >= q - self.most[number][:, None])
         square = np.where(known, along**2 / np.where(known, values, 1.0), 0.0).sum(axis=1)
         return Explained(square, known.sum(axis=1).astype(float))

@@ -42,11 +42,9 @@ class Smooth:
     columns: Array
 
 
-def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
-    """All smooth errors that are looked for, at scale readings x (readings, d) in the order they
-    were taken in.
-    """
-    at = LinearisedDesign(design, state, x)
+def smooth_errors(design: Design, state: State) -> Iterator[Smooth]:
+    """All smooth errors that are looked for, at a state."""
+    at = LinearisedDesign(design, state, None)
     # Not at the readings themselves: where these are at few places on a scale, functions of them
     # differ by their noise, and would explain it.
     drawn = replace(state, balls=design.balls.places)

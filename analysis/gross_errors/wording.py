@@ -17,7 +17,7 @@ from ballplate.simulator.machines.protocol import Integers
 
 from ..presentation.formatting import SHOWN, number, picked
 from ..rank.proposed_bars import listed
-from .cause_search import MOST
+from .cause_search import FAMILY, MOST
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
@@ -80,8 +80,8 @@ def unexplained_words(unexplained: Unexplained) -> str:
     if unexplained.too_large:
         return f"{told}; {best}; try a richer error model, or larger uncertainties"
     return (
-        f"{told}, and so not too large; {best}; their pattern is no chance: look at it before the"
-        " error model is changed"
+        f"{told}, and so not too large; {best}; where nothing is wrong, at most {100 * FAMILY:g} %"
+        " of fits suspect anything: look at the pattern before the error model is changed"
     )
 
 

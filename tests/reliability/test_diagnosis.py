@@ -216,6 +216,8 @@ def test_what_the_stated_uncertainties_explain_is_laid_to_the_model_only_where_s
                 assert richer != is_explained(design, solution)
                 calm = "and so not too large" in unexplained_words(found.unexplained)
                 assert calm == is_explained(design, solution)
+                level = "at most 1 % of fits" in unexplained_words(found.unexplained)
+                assert level == calm
 
 
 def test_scatter_below_what_is_stated_is_told_only_where_sigma_is_estimated(tmp_path: Path) -> None:
