@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ import numpy as np
 from ..inputs.own_code import own_frame, told
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
+from ..inputs.trust import Trust
 from .protocol import Array, ErrorModel, Parameter
 
 GROUP = "ballplate.error_models"
@@ -51,6 +52,7 @@ def custom_model(
     name: str,
     options: Mapping[str, Any],
     folder: Path | None,
+    trust: Trust,
     lower: tuple[float, ...],
     upper: tuple[float, ...],
 ) -> ErrorModel:
@@ -62,7 +64,7 @@ def custom_model(
 
     :raises CustomModelError: no such object, or what it returns is no error model.
     """
-    build = named_object(name, folder)
+    build = named_object(name, folder, trust)
     key = "options" if options else "object"
     model = attempt(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
@@ -71,11 +73,18 @@ def custom_model(
     return model
 
 
-def named_object(name: str, folder: Path | None, group: str = GROUP) -> Callable[..., Any]:
+def named_object(
+    name: str, folder: Path | None, trust: Trust, group: str = GROUP
+) -> Callable[..., Any]:
     """The object `name`, module:function or an entry point's name of a `group`.
 
-    :raises CustomModelError: there is none, or it cannot be called.
+    Nothing else imports code that a file names.
+
+    :raises CustomModelError: there is none, it cannot be called, or it is not trusted.
     """
+    if not trust.modules:
+        text = "is code in Python that loading the file would run, and modules are not allowed here"
+        raise CustomModelError(f"{text}; {trust.remedy}")
     module_name, colon, path = name.partition(":")
     if not colon:
         from importlib.metadata import entry_points
@@ -128,6 +137,33 @@ def _imported(name: str, folder: Path | None) -> Any:
     if beside is not None and found is not None and Path(found).resolve() != beside:
         raise CustomModelError(f"another module {name} was found at {found}; rename {beside.name}")
     return module
+
+
+def module_source(name: str, folder: Path | None) -> Path | None:
+    """The file of the module of an object, module:function or an entry point's name; None where
+    there is none. Nothing of it is run, nor of the packages that it is in.
+    """
+    module, colon, _ = name.partition(":")
+    if not colon:
+        from importlib.metadata import entry_points
+
+        points = entry_points(name=name)
+        module = next((one.module for one in points if one.group.startswith("ballplate.")), "")
+    beside = None if folder is None or not module else module_file(folder.resolve(), module)
+    if beside is not None:
+        return beside
+    places: Sequence[str] | None = None
+    spec = None
+    parts = module.split(".")
+    for count in range(1, len(parts) + 1):
+        finders = (getattr(finder, "find_spec", None) for finder in sys.meta_path)
+        whole = ".".join(parts[:count])
+        specs = (find(whole, places) for find in finders if find is not None)
+        spec = next((one for one in specs if one is not None), None)
+        if spec is None:
+            return None
+        places = spec.submodule_search_locations
+    return None if spec is None or not spec.has_location else Path(str(spec.origin))
 
 
 def module_file(folder: Path, name: str) -> Path | None:

@@ -28,8 +28,9 @@ PLACES = {
     "true machine": ("  seed: 7", f"  seed: 7\n  error_model: {PYTHON}"),
     "variant": ("# Offsets", f"variants: {{one: {{}}, two: {{error_model: {PYTHON}}}}}\n# Offsets"),
     "key of a variant": (
-        "# Offsets",
-        "variants: {one: {}, two: {error_model.kind: python}}\n# Offsets",
+        "error_model:",
+        "variants: {one: {}, two: {error_model.object: 'mine:build'}}\n"
+        "error_model: {kind: python, object: 'gone:build'}\nformer:",
     ),
 }
 

@@ -20,6 +20,7 @@ from ...inputs.quantities import (
     with_quantities,
 )
 from ...inputs.settings import Forms, NonEmpty, Text, listing
+from ...inputs.trust import Trust
 from ...machines.custom import CustomModelError, attempt, named_object
 from ...machines.protocol import Array, Integers, Unit
 from ..arrays import Design
@@ -178,7 +179,9 @@ def read_python_values(
     drawn = layout.coordinates[balls][:, :dimension]
     folder = references.folder / (settings.folder or ".")
     try:
-        functions = ball_functions(settings.object, settings.options, folder, names, drawn)
+        functions = ball_functions(
+            settings.object, settings.options, folder, references.trust, names, drawn
+        )
     except CustomModelError as error:
         references.problems.add((*steps, error.key), str(error))
         return None
@@ -210,13 +213,18 @@ def read_python_values(
 
 
 def ball_functions(
-    name: str, options: dict[str, Any], folder: Path | None, names: tuple[str, ...], drawn: Array
+    name: str,
+    options: dict[str, Any],
+    folder: Path | None,
+    trust: Trust,
+    names: tuple[str, ...],
+    drawn: Array,
 ) -> BallFunctions:
     """The functions that the object `name` makes for balls of `names`, drawn at (n, d).
 
     :raises CustomModelError: there is no such object, or what it returns is not usable.
     """
-    build = named_object(name, folder, GROUP)
+    build = named_object(name, folder, trust, GROUP)
     key = "options" if options else "object"
     found = attempt(
         f"{name} has failed", lambda: build(names, drawn.copy(), **with_quantities(options)), key
