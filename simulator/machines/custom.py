@@ -9,16 +9,17 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ..inputs.own_code import own_frame, told
+from ..inputs.own_code import own_array, own_frame, own_result, running_own_code, told
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
 from ..inputs.trust import Trust
-from .protocol import Array, ErrorModel, Parameter
+from .protocol import Array, ErrorModel, HasLines, Line, Parameter, Reported
 
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
@@ -70,7 +71,38 @@ def custom_model(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
     )
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
-    return model
+    kind = OwnModelWithLines if isinstance(model, HasLines) else OwnModel
+    return kind(model, tuple(model.parameters))
+
+
+@dataclass(frozen=True)
+class OwnModel:
+    """A user's error `model`, whose every answer is checked."""
+
+    model: ErrorModel
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def dimension(self) -> int:
+        return self.model.dimension
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        return own_array(self.model.error, x.shape, x, a, p)
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        return own_array(self.model.jacobian, (*x.shape, len(self.parameters)), x, a, p)
+
+    def reported(self) -> Reported:
+        found: Reported = own_result(self.model.reported)
+        return found
+
+
+class OwnModelWithLines(OwnModel):
+    """The same of a model whose error functions can be drawn."""
+
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        found: tuple[Line, ...] = own_result(self.model.lines, function, t)  # type: ignore[attr-defined]
+        return found
 
 
 def named_object(
@@ -181,7 +213,7 @@ def attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resul
     :raises CustomModelError: it fails; says where.
     """
     try:
-        with np.errstate(all="ignore"):
+        with running_own_code():
             return call()
     except (Exception, SystemExit) as error:
         # Without a place in the user's code, the call itself was wrong.

@@ -275,7 +275,7 @@ def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Pa
         }
         (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
         assert load(tmp_path / "file.yaml")
-        with pytest.raises(bp.ExperimentError, match="own.*error_model.object: is code in Python"):
+        with pytest.raises(bp.ExperimentError, match="own.*: is code in Python"):
             load(tmp_path / "file.yaml", trust=UNKNOWN)
 
 

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, Name, frozen
 from ...inputs.messages import Steps
+from ...inputs.own_code import own_array
 from ...inputs.quantities import (
     QuantityError,
     parse_angle,
@@ -230,8 +231,22 @@ def ball_functions(
         f"{name} has failed", lambda: build(names, drawn.copy(), **with_quantities(options)), key
     )
     _check(name, found, drawn)
-    checked: BallFunctions = found
-    return checked
+    return OwnBallFunctions(found, tuple(found.names), found.unit)
+
+
+@dataclass(frozen=True)
+class OwnBallFunctions:
+    """A user's `functions` of balls, whose every answer is checked."""
+
+    functions: BallFunctions
+    names: tuple[tuple[str, str], ...]
+    unit: Unit
+
+    def values(self, balls: Array) -> Array:
+        return own_array(self.functions.values, (len(self.names),), balls)
+
+    def derivatives(self, balls: Array) -> Array:
+        return own_array(self.functions.derivatives, (len(self.names), *balls.shape), balls)
 
 
 def _values(
