@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
@@ -9,11 +10,9 @@ from pathlib import Path, PurePosixPath
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import Trust
-from ballplate.simulator.inputs.yamltree import read_tree
 
 from ..sweeps.bundle import Bundle, unpack
 from ..sweeps.load import experiment_of, load_sweep
-from ..sweeps.named_files import YAML, axis_paths, leads_out, path_scalars
 from ..sweeps.store import Store, StoreError, files
 from .results import ReportedSweep
 
@@ -51,8 +50,6 @@ def experiments(
                 f"the store's files cannot be unpacked ({error.strerror})"
             ) from None
         try:
-            if _leads_out(bundle, Path(folder)):
-                raise NoExperimentError("the experiment names files that are not in the store")
             # The stored file, whichever the sweep file names.
             base = Path(folder) / PurePosixPath(bundle.base)
             trust = Trust(run_modules, Path(folder), "add --run-modules if you trust the store")
@@ -61,22 +58,6 @@ def experiments(
                 raise NoExperimentError("the stored files make other cells than those stored")
             return [experiment_of(sweep, cell) for cell in cells]
         except ExperimentError as error:
-            raise NoExperimentError(error.messages[0].text) from None
-
-
-def _leads_out(bundle: Bundle, folder: Path) -> bool:
-    """Whether a file of the store names one that is not in it."""
-    base = folder / PurePosixPath(bundle.base)
-    axes = axis_paths(read_tree(folder / PurePosixPath(bundle.source)))
-    if leads_out(axes, base.parent, folder):
-        return True
-    paths = [
-        base,
-        *(folder / PurePosixPath(name) for name, _ in bundle.files if name.lower().endswith(YAML)),
-    ]
-    source = folder / PurePosixPath(bundle.source)
-    return any(
-        leads_out(path_scalars(read_tree(path), ""), path.parent, folder)
-        for path in paths
-        if path != source
-    )
+            first = error.messages[0]
+            text = ": ".join(part for part in (first.path, first.text) if part)
+            raise NoExperimentError(text.replace(f"{folder}{os.sep}", "")) from None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
 from ballplate.simulator.experiment.modules import python_models
@@ -127,44 +127,6 @@ def is_rooted(text: str) -> bool:
     """Whether a path begins at the root of a file system or of a drive, or at a home."""
     windows = PureWindowsPath(text)
     return text.startswith("~") or Path(text).is_absolute() or bool(windows.anchor or windows.drive)
-
-
-def leads_out(scalars: Iterable[Scalar], start: Path, folder: Path) -> bool:
-    """Whether any path, as it is meant from the folder `start`, is not one below `folder`."""
-    top = os.path.abspath(folder)
-    for scalar in scalars:
-        text = str(scalar.value)
-        if is_rooted(text) or os.path.commonpath([top, os.path.abspath(start / text)]) != top:
-            return True
-    return False
-
-
-def axis_paths(root: Node) -> Iterator[Scalar]:
-    """Texts of a sweep file's axes that are paths, by what the axes change."""
-    axes = root.items.get("axes") if isinstance(root, Mapping) else None
-    for axis in axes.items.values() if isinstance(axes, Mapping) else ():
-        if not isinstance(axis, Mapping):
-            continue
-        if "together" in axis.items:
-            for path, values in _entries(axis.items["together"]):
-                for _, value in _entries(values):
-                    yield from path_scalars(value, path)
-        changed = [
-            scalar for name in ("path", "paths") for _, scalar in _entries(axis.items.get(name))
-        ]
-        for scalar in changed:
-            for _, value in _entries(axis.items.get("values")):
-                if isinstance(scalar, Scalar):
-                    yield from path_scalars(value, str(scalar.value))
-
-
-def _entries(node: Node | None) -> list[tuple[str, Node]]:
-    """Entries of a mapping or of a list, or the node itself."""
-    if isinstance(node, Mapping):
-        return list(node.items.items())
-    if isinstance(node, Entries):
-        return [("", item) for item in node.items]
-    return [] if node is None else [("", node)]
 
 
 def _there(folder: Path, text: str) -> Iterator[Path]:

@@ -129,7 +129,9 @@ def _model(
         wrong = list(kind.wrong(own, d))
         for below, text in wrong:
             problems.add(("error_model", *below), text)
-        if wrong or not _has_its_files(settings, folder, problems):
+        # What is not to be run is refused where the model is made.
+        may_look = trust.modules or not isinstance(own, PythonSettings)
+        if wrong or may_look and not _has_its_files(settings, folder, problems):
             return None
         return build_error_model(own, *volume.corners)
     except CustomModelError as error:

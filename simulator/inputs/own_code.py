@@ -100,10 +100,13 @@ def own_result(call: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def own_array(
-    call: Callable[..., Any], shape: tuple[int, ...], *arguments: NDArray[np.float64]
+    call: Callable[..., Any],
+    shape: tuple[int, ...],
+    *arguments: NDArray[np.float64],
+    is_plausible: bool = True,
 ) -> NDArray[np.float64]:
-    """The array of a shape that a function of a user's own returns for arrays; finite for finite
-    arguments.
+    """The array of a shape that a function of a user's own returns for arrays; finite for plausible
+    ones.
 
     :raises OwnCodeError: it has failed, or returned anything else.
     """
@@ -115,8 +118,8 @@ def own_array(
         wrong = f"returns the shape {given.shape}; {shape} is needed"
     elif given.dtype.kind not in "fiu":
         wrong = f"returns values of type {given.dtype}; numbers are needed"
-    elif not np.isfinite(given).all() and all(np.isfinite(one).all() for one in arguments):
-        wrong = "returns values that are not finite for finite arguments"
+    elif is_plausible and not np.isfinite(given).all():
+        wrong = "returns values that are not finite numbers"
     if wrong:
         raise _failed(_definition(call), getattr(call, "__name__", ""), wrong)
     return np.asarray(given, float)

@@ -32,6 +32,8 @@ NEW_LINE = "from ballplate.models import Parameter, Reported"
 # Parameters are tried at random values that move points by about this much, in metres, and are
 # changed by as much.
 USUAL_ERROR = 1e-4
+# Errors beyond it, in metres, are those of no machine.
+IMPLAUSIBLE = 0.1
 # Largest difference of a derivative from the quotient of differences, in parts of the parameter's
 # stated effect.
 DERIVATIVE = 1e-4
@@ -87,10 +89,17 @@ class OwnModel:
         return self.model.dimension
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
-        return own_array(self.model.error, x.shape, x, a, p)
+        return own_array(self.model.error, x.shape, x, a, p, is_plausible=self._is_plausible(a))
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        return own_array(self.model.jacobian, (*x.shape, len(self.parameters)), x, a, p)
+        shape = (*x.shape, len(self.parameters))
+        return own_array(self.model.jacobian, shape, x, a, p, is_plausible=self._is_plausible(a))
+
+    def _is_plausible(self, a: Array) -> bool:
+        """Whether a machine may have such errors; a fit that diverges tries others."""
+        effects = (parameter.effect for parameter in self.parameters)
+        moved = (abs(value) * effect for value, effect in zip(a.tolist(), effects, strict=True))
+        return all(length <= IMPLAUSIBLE for length in moved)
 
     def reported(self) -> Reported:
         found: Reported = own_result(self.model.reported)
