@@ -44,6 +44,10 @@ def named_files(sweep: Sweep) -> list[Path]:
     allowed = [
         folder.resolve() for folder in (sweep.source.parent, sweep.base.parent, *sweep.folders)
     ]
+
+    def is_allowed(path: Path) -> bool:
+        return any(path.resolve().is_relative_to(folder) for folder in allowed)
+
     nodes: list[tuple[str, Node]] = [("", root) for root in sweep.trees.values()]
     for axis in sweep.axes:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
@@ -54,8 +58,9 @@ def named_files(sweep: Sweep) -> list[Path]:
             if _READINGS.search(key):
                 continue
             for path in _there(base.parent, str(scalar.value)):
+                found.setdefault(path, scalar)
                 # A machine file names tables beside it.
-                for one in (path, *_of_machine_file(path)):
+                for one in _of_machine_file(path) if is_allowed(path) else ():
                     found.setdefault(one, scalar)
     for folder, scalar in _modules(nodes, base.parent):
         for path in _imported(folder, str(scalar.value).partition(":")[0]):
@@ -65,7 +70,7 @@ def named_files(sweep: Sweep) -> list[Path]:
             "", f"names {path}, outside the folders of the sweep and its base; {MEND}"
         )
         for path, scalar in sorted(found.items(), key=lambda item: item[0])
-        if not any(path.resolve().is_relative_to(folder) for folder in allowed)
+        if not is_allowed(path)
     ]
     if messages:
         raise ExperimentError(messages)
