@@ -228,7 +228,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
         if found is None:
             words = "no changes were found that determine everything"
             raise one.refused((), words)
-        text = mended(text, Path(path), one.name, found)
+        text = mended(text, Path(path), one.name, found, one.trust)
     return text
 
 

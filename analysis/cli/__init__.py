@@ -143,15 +143,10 @@ def _run(options: argparse.Namespace) -> int:
         return internal_error(error)
     except Exception as error:
         from .memory import no_memory
-        from .own_code import told_of_own_code
 
         shortage = no_memory(error, options)
         if shortage is not None:
             print(shortage, file=sys.stderr)
-            return BAD_FILE
-        own = told_of_own_code(error, options)
-        if own:
-            print(in_one_line(own), file=sys.stderr)
             return BAD_FILE
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)

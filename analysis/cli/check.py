@@ -93,8 +93,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--no-modules",
         action="store_true",
         help=(
-            "refuse files with an error model or a calibration in Python, because loading them runs"
-            " its code"
+            "run no code: refuse files with an error model or a calibration in Python, and files"
+            " that name others outside this folder"
         ),
     )
 

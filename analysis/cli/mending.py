@@ -46,7 +46,7 @@ def with_repairs(
                     told.append(f"{name}: nothing to repair")
                 continue
             try:
-                new = mended(new, path, design.variant, repair)
+                new = mended(new, path, design.variant, repair, wanted.trust(path))
             except ExperimentError as error:
                 messages += error.messages
                 continue

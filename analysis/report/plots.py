@@ -92,7 +92,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_locator(NullLocator())
-    elif len(numbers) <= 8 and np.diff(numbers).min() > 0.09 * np.ptp(numbers):
+    elif 1 < len(numbers) <= 8 and np.diff(numbers).min() > 0.09 * np.ptp(numbers):
         axes.set_xticks(numbers, [f"{value:.6g}" for value in numbers])
 
 

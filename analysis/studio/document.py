@@ -13,6 +13,7 @@ from typing import Any
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import decoded, parse_tree, read_bytes, to_python
 
 # Texts before the present one that are kept.
@@ -31,15 +32,14 @@ class DesignDocument:
 
     `content` is what the file held when it was read or written last, None where there was none
     yet. `back` and `forward` are texts that undoing and redoing lead to, the next one last.
-    `with_modules` says whether error models in Python may be run, since the user has opened the
-    file by name.
+    `trust` is that in a file that the user has opened by name.
     """
 
     path: Path
     variant: str | None
     text: str
     content: bytes | None
-    with_modules: bool = True
+    trust: Trust = OPENED
     back: tuple[str, ...] = ()
     forward: tuple[str, ...] = ()
 
@@ -59,13 +59,13 @@ class DesignDocument:
         return bool(self.back) and not self.is_saved
 
 
-def opened(path: Path, variant: str | None = None, with_modules: bool = True) -> DesignDocument:
+def opened(path: Path, variant: str | None = None, trust: Trust = OPENED) -> DesignDocument:
     """The document of a file.
 
     :raises ExperimentError: the file cannot be read as text.
     """
     content = read_bytes(path)
-    return DesignDocument(path, variant, decoded(content, str(path)), content, with_modules)
+    return DesignDocument(path, variant, decoded(content, str(path)), content, trust)
 
 
 def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:
@@ -73,7 +73,7 @@ def experiment_of(document: DesignDocument, planning: bool = False) -> Experimen
 
     :raises ExperimentError: the text is wrong, or has no such variant.
     """
-    found = load(document.path, planning, document.with_modules, document.text)
+    found = load(document.path, planning, document.trust, document.text)
     for one in found:
         if one.name == document.variant or len(found) == 1:
             return one
@@ -92,7 +92,7 @@ def data_of(document: DesignDocument) -> Any:
 def variants_of(document: DesignDocument) -> tuple[str, ...]:
     """The names of the variants that the text has, none where it is wrong."""
     try:
-        found = load(document.path, True, document.with_modules, document.text)
+        found = load(document.path, True, document.trust, document.text)
     except ExperimentError:
         return ()
     return tuple(one.name for one in found if one.name is not None)
@@ -149,7 +149,7 @@ def ensure_as_read(document: DesignDocument) -> None:
 
 def reopened(document: DesignDocument) -> DesignDocument:
     """The document as it is on disk now, with the present text a step back."""
-    found = opened(document.path, document.variant, document.with_modules)
+    found = opened(document.path, document.variant, document.trust)
     return replace(changed(document, found.text), content=found.content)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from ballplate.simulator.experiment.load import trees_of
 from ballplate.simulator.experiment.modules import refused_modules
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.trust import UNKNOWN
 from ballplate.simulator.inputs.yamltree import Mapping, to_python, walk
 
 from .document import DesignDocument, changed, replace_file
@@ -94,8 +95,8 @@ def _recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, st
             " have an error model in Python that the file has not; look at them, and delete them"
         )
     # What nobody has read must not come to run by a change of something else, either.
-    with_modules = document.with_modules and bool(given)
-    found = replace(changed(document, text), content=content, with_modules=with_modules)
+    trust = document.trust if given else UNKNOWN
+    found = replace(changed(document, text), content=content, trust=trust)
     with suppress(OSError):
         _write(path, found, owner)
     since = "" if content == document.content else "; the file has changed since"

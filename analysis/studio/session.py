@@ -10,6 +10,7 @@ from threading import RLock
 from typing import Any
 
 from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
+from ballplate.simulator.inputs.trust import OPENED, UNKNOWN
 from ballplate.simulator.inputs.yamltree import to_python
 
 from .actions import ActionError, done, settings_of
@@ -314,8 +315,7 @@ class Session:
         path, before = self._inside(str(action.get("name", ""))), self._now.document
         if not before.is_saved and not action.get("discard"):
             raise RefusedError(f"{before.path.name} has changes that are not saved")
-        trusted = path.resolve() == self._first
-        document = opened(path, None, trusted)
+        document = opened(path, None, OPENED if path.resolve() == self._first else UNKNOWN)
         # What is left on purpose is not taken up again.
         is_left = document.path.name == before.path.name
         document, note = (document, "") if is_left else recovered(document, self.name)

@@ -17,6 +17,7 @@ from typing import Any
 
 import ballplate.simulator
 from ballplate.simulator.computing.unusable import UnusableError
+from ballplate.simulator.inputs.trust import OPENED
 
 from .bundle import Bundle, unpack
 from .execute import Runner
@@ -268,7 +269,7 @@ def _on_worker(bundle: Bundle, code: str, task: CellTask) -> CellResult:
 
 @cache
 def _loaded(source: Path, folder: Path) -> Sweep:
-    return load_sweep(source, folders=(folder,))
+    return load_sweep(source, folders=(folder,), trust=OPENED)
 
 
 @cache

@@ -5,7 +5,6 @@ like.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass, replace
 from functools import cache, lru_cache
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.design.observations.python_values import PythonCalibration
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.custom import module_source
 from ballplate.simulator.machines.settings import PythonSettings
 from pydantic import BaseModel
 
@@ -43,7 +43,9 @@ LEFT_OUT = (
     "notes",
     "tree",
     "builder",
+    "trust",
     "_folder",
+    "_trust",
     "_found",
 )
 # The same, of single classes: how the laboratory's tables are read; and functions in Python, which
@@ -206,15 +208,7 @@ def module_text(made_by: str, folder: Path | None) -> str:
     """The text of the module with a user's own error model or calibration, `made_by` an object
     there; empty where Python has none of it.
     """
-    name = made_by.partition(":")[0]
-    places = [] if folder is None else [folder.joinpath(*name.split(".")).with_suffix(".py")]
-    try:
-        found = importlib.util.find_spec(name)
-    except (ImportError, ValueError):
-        found = None
-    if found is not None and found.origin is not None:
-        places.append(Path(found.origin))
-    for place in places:
-        if place.suffix == ".py" and place.is_file():
-            return place.read_text(encoding="utf-8", errors="replace")
-    return ""
+    place = module_source(made_by, folder)
+    if place is None or place.suffix != ".py" or not place.is_file():
+        return ""
+    return place.read_text(encoding="utf-8", errors="replace")

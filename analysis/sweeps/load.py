@@ -22,6 +22,7 @@ from ballplate.simulator.experiment.variants import (
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.validation import validated
 from ballplate.simulator.inputs.yamltree import (
     Mapping,
@@ -45,7 +46,10 @@ MOST_CELLS = 1_000_000
 
 
 def load_sweep(
-    path: str | os.PathLike[str], base: Path | None = None, folders: tuple[Path, ...] = ()
+    path: str | os.PathLike[str],
+    base: Path | None = None,
+    folders: tuple[Path, ...] = (),
+    trust: Trust = OPENED,
 ) -> Sweep:
     """Load a sweep file and the experiment file that it starts from, or `base` in its place.
 
@@ -106,6 +110,7 @@ def load_sweep(
         settings.seed,
         settings.record,
         folders=folders,
+        trust=trust,
     )
     _check_base(sweep)
     bundle = bundle_of(sweep)
@@ -134,7 +139,7 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
                 tree = override(tree, path, node, mark)
             except ValueError as error:
                 raise mark.refused(str(error), path) from None
-    experiment, messages = build(tree, sweep.base, sweep.label(number))
+    experiment, messages = build(tree, sweep.base, sweep.label(number), sweep.trust)
     if experiment is None:
         raise ExperimentError(sorted(messages))
     return experiment
@@ -299,7 +304,7 @@ def _check_base(sweep: Sweep) -> None:
     except ExperimentError:
         messages: set[Message] = set()
         for name, tree in sweep.trees.items():
-            experiment, found = build(tree, sweep.base, name)
+            experiment, found = build(tree, sweep.base, name, sweep.trust)
             if experiment is not None:
                 return
             messages |= set(found)

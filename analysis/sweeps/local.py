@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ballplate.simulator.computing.processes import begin_worker, in_processes
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.trust import Trust
 
 from .bundle import Bundle, bundle_of, files_of
 from .execute import Runner
@@ -35,12 +36,13 @@ class ChangedError(Exception):
 
 @dataclass(frozen=True)
 class _Source:
-    """What a process loads a sweep from: its file, and further folders whose files it may take
-    along.
+    """What a process loads a sweep from: its file, further folders whose files it may take along,
+    and the trust in them.
     """
 
     file: Path
     folders: tuple[Path, ...]
+    trust: Trust
 
 
 def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
@@ -49,7 +51,8 @@ def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
     It raises ChangedError instead of a row that was computed from files other than those of the
     bundle.
     """
-    source, digest = _Source(Path(os.path.abspath(sweep.source)), sweep.folders), bundle.digest
+    source = _Source(Path(os.path.abspath(sweep.source)), sweep.folders, sweep.trust)
+    digest = bundle.digest
 
     def run(tasks: Sequence[CellTask]) -> Iterator[CellResult]:
         if workers > 1 and tasks:
@@ -151,7 +154,7 @@ def told(row: CellResult, source: Path) -> CellResult:
 @cache
 def _loaded(source: _Source, digest: str) -> _Watched:
     try:
-        sweep = load_sweep(source.file, folders=source.folders)
+        sweep = load_sweep(source.file, folders=source.folders, trust=source.trust)
     except ExperimentError:
         raise ChangedError from None
     return _watched(sweep, digest)

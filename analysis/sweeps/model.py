@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark, Node
 
 Unit = Literal["m", "rad", "1", ""]
@@ -58,7 +59,7 @@ class Sweep:
     `cells` are indices of choices, one for each axis, in the order of the file with the last axis
     fastest. `digest` is a hash of all files that the sweep depends on, `code` of those that an
     error model written in Python may use, empty without one. `folders` are those, besides its own
-    and that of its base, whose files it may take along.
+    and that of its base, whose files it may take along, and `trust` is that in all of them.
     """
 
     source: Path
@@ -74,6 +75,7 @@ class Sweep:
     digest: str = ""
     code: str = ""
     folders: tuple[Path, ...] = ()
+    trust: Trust = OPENED
 
     def choices(self, number: int) -> tuple[Choice, ...]:
         """The choices that make up a cell."""

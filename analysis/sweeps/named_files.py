@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
 from ballplate.simulator.experiment.modules import python_models
@@ -44,6 +44,10 @@ def named_files(sweep: Sweep) -> list[Path]:
     allowed = [
         folder.resolve() for folder in (sweep.source.parent, sweep.base.parent, *sweep.folders)
     ]
+
+    def is_allowed(path: Path) -> bool:
+        return any(path.resolve().is_relative_to(folder) for folder in allowed)
+
     nodes: list[tuple[str, Node]] = [("", root) for root in sweep.trees.values()]
     for axis in sweep.axes:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
@@ -54,8 +58,9 @@ def named_files(sweep: Sweep) -> list[Path]:
             if _READINGS.search(key):
                 continue
             for path in _there(base.parent, str(scalar.value)):
+                found.setdefault(path, scalar)
                 # A machine file names tables beside it.
-                for one in (path, *_of_machine_file(path)):
+                for one in _of_machine_file(path) if is_allowed(path) else ():
                     found.setdefault(one, scalar)
     for folder, scalar in _modules(nodes, base.parent):
         for path in _imported(folder, str(scalar.value).partition(":")[0]):
@@ -65,7 +70,7 @@ def named_files(sweep: Sweep) -> list[Path]:
             "", f"names {path}, outside the folders of the sweep and its base; {MEND}"
         )
         for path, scalar in sorted(found.items(), key=lambda item: item[0])
-        if not any(path.resolve().is_relative_to(folder) for folder in allowed)
+        if not is_allowed(path)
     ]
     if messages:
         raise ExperimentError(messages)
@@ -127,44 +132,6 @@ def is_rooted(text: str) -> bool:
     """Whether a path begins at the root of a file system or of a drive, or at a home."""
     windows = PureWindowsPath(text)
     return text.startswith("~") or Path(text).is_absolute() or bool(windows.anchor or windows.drive)
-
-
-def leads_out(scalars: Iterable[Scalar], start: Path, folder: Path) -> bool:
-    """Whether any path, as it is meant from the folder `start`, is not one below `folder`."""
-    top = os.path.abspath(folder)
-    for scalar in scalars:
-        text = str(scalar.value)
-        if is_rooted(text) or os.path.commonpath([top, os.path.abspath(start / text)]) != top:
-            return True
-    return False
-
-
-def axis_paths(root: Node) -> Iterator[Scalar]:
-    """Texts of a sweep file's axes that are paths, by what the axes change."""
-    axes = root.items.get("axes") if isinstance(root, Mapping) else None
-    for axis in axes.items.values() if isinstance(axes, Mapping) else ():
-        if not isinstance(axis, Mapping):
-            continue
-        if "together" in axis.items:
-            for path, values in _entries(axis.items["together"]):
-                for _, value in _entries(values):
-                    yield from path_scalars(value, path)
-        changed = [
-            scalar for name in ("path", "paths") for _, scalar in _entries(axis.items.get(name))
-        ]
-        for scalar in changed:
-            for _, value in _entries(axis.items.get("values")):
-                if isinstance(scalar, Scalar):
-                    yield from path_scalars(value, str(scalar.value))
-
-
-def _entries(node: Node | None) -> list[tuple[str, Node]]:
-    """Entries of a mapping or of a list, or the node itself."""
-    if isinstance(node, Mapping):
-        return list(node.items.items())
-    if isinstance(node, Entries):
-        return [("", item) for item in node.items]
-    return [] if node is None else [("", node)]
 
 
 def _there(folder: Path, text: str) -> Iterator[Path]:

@@ -14,6 +14,7 @@ from ..geometry.ball_layouts import ArtefactSettings, BallLayout, corners, froze
 from ..inputs.messages import Step, Steps
 from ..inputs.problems import Problems, written_text
 from ..inputs.settings import hint, listing, shorten
+from ..inputs.trust import UNKNOWN, Trust
 from ..inputs.yamltree import Sequence as SequenceNode
 from ..inputs.yamltree import written
 
@@ -47,7 +48,15 @@ class References:
     artefact_names: tuple[str, ...]
     artefacts: dict[str, ArtefactSettings]
     layouts: dict[str, BallLayout]
+    trust: Trust = UNKNOWN
     tally: ReadingCount = field(default_factory=ReadingCount)
+
+    def file(self, name: object) -> Path:
+        """The file that the experiment names.
+
+        :raises ExperimentError: it lies elsewhere than it may.
+        """
+        return self.trust.file(self.folder, name)
 
     def count_readings(self, count: int, steps: Steps) -> bool:
         """Count further readings; tell whether there is room for them, after saying once that there

@@ -79,7 +79,7 @@ def _check_model(
             return False
         settings.of(found)
     if isinstance(settings, PythonSettings):
-        settings.beside(references.folder)
+        settings.beside(references.folder, references.trust)
         if machine is None:
             return True
         try:
@@ -110,7 +110,7 @@ def _machine_of_file(
     from .machine_file import load_machine
 
     try:
-        return load_machine(references.folder / file, doubts)
+        return load_machine(references.file(file), doubts, references.trust)
     except ExperimentError as error:
         references.problems.take(error, (*steps, "file"))
         return None
@@ -210,7 +210,7 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
     for i, file in enumerate(truth.files):
         steps: Steps = ("true_machine", "files", i)
         try:
-            found = read_curves(references.folder / file)
+            found = read_curves(references.file(file))
         except ExperimentError as error:
             problems.take(error, steps)
             continue

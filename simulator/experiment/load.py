@@ -12,6 +12,7 @@ from typing import Any
 from ..design.observations.calibration import Calibration
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, in_order, written_count
+from ..inputs.trust import OPENED, Trust
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
 from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
@@ -31,7 +32,6 @@ from .exact_values import check_exact_values
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Experiment
-from .modules import refused_modules
 from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
@@ -47,7 +47,7 @@ from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 def load(
     path: str | os.PathLike[str],
     planning: bool = False,
-    with_modules: bool = True,
+    trust: Trust = OPENED,
     text: str | None = None,
 ) -> tuple[Experiment, ...]:
     """Load an experiment file.
@@ -55,8 +55,8 @@ def load(
     Returns the experiment, or one per variant in the order of the file. Tables that the file names
     are read from the folder it is in. For ``planning`` an experiment has its pool, and positions
     may be missing where there is one; otherwise what only the pool places is left out. Error models
-    in Python are code that loading runs; without ``with_modules`` files that have any are refused,
-    and nothing is run. A ``text`` is read as what the file is to have.
+    in Python are code that loading runs, as far as ``trust`` allows it. A ``text`` is read as what
+    the file is to have.
 
     :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
         found.
@@ -65,16 +65,8 @@ def load(
     refused: list[Message] = []
     written = read_text(source) if text is None else text
     root, trees, base_problems = trees_of(written, source, refused)
-    if not with_modules:
-        forbidden = {
-            message
-            for tree in (root, *trees.values())
-            for message in refused_modules(tree, source.parent)
-        }
-        if forbidden:
-            raise ExperimentError(sorted(forbidden))
     if not trees:
-        experiment, messages = build(_without_variants(root), source, None, planning)
+        experiment, messages = build(_without_variants(root), source, None, trust, planning)
         _raise_if_any([*base_problems.messages, *messages], refused, source)
         assert experiment is not None
         return (experiment,)
@@ -82,7 +74,7 @@ def load(
     variants_of: dict[Message, list[str]] = {}
     size = 0
     for name, tree in trees.items():
-        experiment, messages = build(tree, source, name, planning)
+        experiment, messages = build(tree, source, name, trust, planning)
         if experiment is not None:
             mark = mark_of(root, ("variants", name), of_key=True)
             experiments.append(replace(experiment, mark=mark))
@@ -128,7 +120,7 @@ def with_pool(experiment: Experiment) -> Experiment:
 
     :raises ExperimentError: what a plan may choose from is wrong.
     """
-    found = _built(experiment.tree, experiment.source, experiment.name, planning=True)
+    found = experiment.builder(experiment.tree, planning=True)
     return replace(found, mark=experiment.mark)
 
 
@@ -145,28 +137,28 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
         tree = with_present_keys(node_of(sections, mark))
     except ValueError as error:
         raise mark.refused(str(error)) from None
-    return _built(tree, folder / "experiment", None, False)
+    return _built(tree, folder / "experiment", None, OPENED, False)
 
 
-def _built(root: Node, source: Path, name: str | None, planning: bool) -> Experiment:
+def _built(root: Node, source: Path, name: str | None, trust: Trust, planning: bool) -> Experiment:
     """The experiment of a tree.
 
     :raises ExperimentError: it is wrong.
     """
-    found, messages = build(root, source, name, planning)
+    found, messages = build(root, source, name, trust, planning)
     if found is None:
         raise ExperimentError(sorted(messages))
     return found
 
 
 def build(
-    root: Node, source: Path, name: str | None, planning: bool = False
+    root: Node, source: Path, name: str | None, trust: Trust, planning: bool = False
 ) -> tuple[Experiment | None, list[Message]]:
     """Return the experiment of a tree without variants and no messages, or None and what is
     wrong.
     """
     try:
-        return _build(root, source, name, planning)
+        return _build(root, source, name, trust, planning)
     except ExperimentError as too_many:
         return None, list(too_many.messages)
 
@@ -174,11 +166,11 @@ def build(
 # In one piece: the order in which sections are resolved, each from those before it, stands in one
 # place.
 def _build(
-    root: Node, source: Path, name: str | None, planning: bool
+    root: Node, source: Path, name: str | None, trust: Trust, planning: bool
 ) -> tuple[Experiment | None, list[Message]]:
     problems = Problems(root)
     sections = validate_sections(root, problems, planning)
-    references = resolve_references(sections, source.parent, problems)
+    references = resolve_references(sections, source.parent, problems, trust)
     machine = (
         resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
     )
@@ -251,11 +243,12 @@ def _build(
         seed=sections.get("seed"),
         tree=root,
         mark=mark_of(root, ("positions",), of_key=True),
-        builder=partial(_built, source=source, name=name, planning=planning),
+        builder=partial(_built, source=source, name=name, trust=trust, planning=planning),
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         influences=influences,
         noise=noise,
+        trust=trust,
         stars=stars,
         pool=pool if planning else None,
         doubts=tuple(str(doubt) for doubt in problems.doubts),

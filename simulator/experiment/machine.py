@@ -222,7 +222,7 @@ def _points_of_file(
 ) -> Floats | None:
     assert references.dimension is not None
     try:
-        rows = read_table(references.folder / file, [], AXES[: references.dimension])
+        rows = read_table(references.file(file), [], AXES[: references.dimension])
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None

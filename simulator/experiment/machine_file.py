@@ -16,6 +16,7 @@ from ..inputs.messages import ExperimentError, Message, Steps
 from ..inputs.problems import Problems, in_order
 from ..inputs.quantities import format_angle, format_length
 from ..inputs.settings import describe, listing
+from ..inputs.trust import UNKNOWN, Trust
 from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
@@ -41,7 +42,9 @@ NOTHING = 1e-12
 
 
 def load_machine(
-    path: str | os.PathLike[str], doubts: list[Message] | None = None
+    path: str | os.PathLike[str],
+    doubts: list[Message] | None = None,
+    trust: Trust = UNKNOWN,
 ) -> MachineDescription:
     """Load a machine file. Tables that it names are read from the folder it is in.
 
@@ -66,7 +69,7 @@ def load_machine(
         problems.add((), text)
     else:
         problems.add_empty()
-        found = _machine(root, source, problems)
+        found = _machine(root, source, problems, trust)
         if found is not None and not refused:
             if doubts is not None:
                 _doubt_what_is_taken_off(found, problems)
@@ -75,18 +78,20 @@ def load_machine(
     raise ExperimentError(in_order(problems.messages, refused, source))
 
 
-def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescription | None:
+def _machine(
+    root: Mapping, source: Path, problems: Problems, trust: Trust
+) -> MachineDescription | None:
     settings = validated(DescribedMachineSettings, root, problems)
     if settings is None:
         _volume_of(root, problems)
         # Tables are told about as well, where the keys that name them can be read.
-        _read_tables(root, source, problems)
+        _read_tables(root, source, problems, trust)
         return None
     machine = _bare(settings, problems)
     if machine is None:
-        _read_tables(root, source, problems)
+        _read_tables(root, source, problems, trust)
         return None
-    errors = tuple(_errors(settings, machine, source, problems))
+    errors = tuple(_errors(settings, machine, source, problems, trust))
     squareness = []
     for name in SQUARENESS:
         stated = getattr(settings.squareness, name, None)
@@ -183,6 +188,7 @@ def _errors(
     machine: MachineDescription,
     source: Path,
     problems: Problems,
+    trust: Trust,
 ) -> Iterable[ParametricError]:
     for name in NAMES:
         one = getattr(settings.errors, name, None)
@@ -204,7 +210,7 @@ def _errors(
         elif one.file is not None:
             ends = machine.lower[error.axis], machine.upper[error.axis]
             covered = ends if math.isfinite(ends[0]) else None
-            table = _table(source.parent / one.file, name, covered, (*steps, "file"), problems)
+            table = _table(source, one.file, name, covered, (*steps, "file"), problems, trust)
             if table is None:
                 continue
             line = _complete(table.line, machine, error.axis)
@@ -280,22 +286,29 @@ def _doubt_what_is_taken_off(machine: MachineDescription, problems: Problems) ->
 
 
 def _table(
-    path: Path, name: str, ends: tuple[float, float] | None, steps: Steps, problems: Problems
+    source: Path,
+    file: str,
+    name: str,
+    ends: tuple[float, float] | None,
+    steps: Steps,
+    problems: Problems,
+    trust: Trust,
 ) -> ErrorTable | None:
     try:
-        return read_error_table(path, name, ends)
+        return read_error_table(trust.file(source.parent, file), name, ends)
     except ExperimentError as error:
         problems.take(error, steps)
         return None
 
 
-def _read_tables(root: Mapping, source: Path, problems: Problems) -> None:
+def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) -> None:
     """Say what is wrong with the tables of a file that is wrong itself."""
     errors = root.items.get("errors")
     for name, node in errors.items.items() if isinstance(errors, Mapping) else ():
         file = node.items.get("file") if isinstance(node, Mapping) else None
         if name in NAMES and isinstance(file, Scalar) and isinstance(file.value, str):
-            _table(source.parent / file.value, name, None, ("errors", name, "file"), problems)
+            steps = ("errors", name, "file")
+            _table(source, file.value, name, None, steps, problems, trust)
 
 
 def _line(

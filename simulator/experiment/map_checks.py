@@ -13,6 +13,7 @@ from ..inputs.messages import ExperimentError
 from ..inputs.problems import Problems
 from ..inputs.quantities import format_length
 from ..inputs.settings import describe, listing, shorten
+from ..inputs.trust import Trust
 from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping as MappingNode
 from ..inputs.yamltree import Node, to_python
@@ -40,7 +41,7 @@ SAME, SAME_PART = 1e-12, 1e-9
 
 # In one piece: what is checked needs what was found right before it.
 def map_of_tree(
-    root: Node, arrays: Mapping[str, Array], source: Path, problems: Problems
+    root: Node, arrays: Mapping[str, Array], source: Path, problems: Problems, trust: Trust
 ) -> FittedMap | None:
     """The map of a tree, or None after saying what is wrong."""
     if not isinstance(root, MappingNode) or "map" not in root.items:
@@ -61,7 +62,7 @@ def map_of_tree(
         return None
     lower, upper = (np.array(one) for one in zip(*ends, strict=True))
     volume = Volume(lower, upper)
-    model = _model(settings, volume, source.parent, problems)
+    model = _model(settings, volume, source.parent, problems, trust)
     probes = _probes(settings, len(lower), problems)
     if model is None or probes is None:
         return None
@@ -114,7 +115,7 @@ def map_of_tree(
 
 
 def _model(
-    settings: MapSettings, volume: Volume, folder: Path, problems: Problems
+    settings: MapSettings, volume: Volume, folder: Path, problems: Problems, trust: Trust
 ) -> ErrorModel | None:
     """The error model, or None after saying what is wrong."""
     own: Any = settings.error_model
@@ -125,15 +126,16 @@ def _model(
         return None
     try:
         if isinstance(own, MachineFileSettings):
-            own.of(load_machine(folder / own.file))
+            own.of(load_machine(trust.file(folder, own.file), trust=trust))
         elif isinstance(own, PythonSettings):
-            own.beside(folder)
+            own.beside(folder, trust)
         wrong = list(kind.wrong(own, d))
         for below, text in wrong:
             problems.add(("error_model", *below), text)
-        if wrong:
+        # What is not to be run is refused where the model is made.
+        may_look = trust.modules or not isinstance(own, PythonSettings)
+        if wrong or may_look and not _has_its_files(settings, folder, problems):
             return None
-        _check_files(settings, folder, problems)
         return build_error_model(own, *volume.corners)
     except CustomModelError as error:
         problems.add(("error_model", error.key), str(error))
@@ -142,17 +144,19 @@ def _model(
     return None
 
 
-def _check_files(settings: MapSettings, folder: Path, problems: Problems) -> None:
-    """Report files that the error model rests on and that are not what they were."""
+def _has_its_files(settings: MapSettings, folder: Path, problems: Problems) -> bool:
+    """Whether files that the error model rests on are what they were; reports which are not."""
+    before = len(problems.messages)
     stated = to_python(problems.root)["error_model"]  # type: ignore[index,unused-ignore]
-    for name, found in fingerprints(absolute(stated, folder)).items():
-        known = settings.files.get(name)
-        if known is not None and known != found:
+    present = fingerprints(absolute(stated, folder))
+    for name, fingerprint in settings.files.items():
+        if name not in present or present[name] != fingerprint:
             text = (
                 "has changed since the map was written, which may no longer belong to it; put the"
                 " earlier file back, or fit again"
             )
             problems.add(("files", name), text)
+    return len(problems.messages) == before
 
 
 def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:

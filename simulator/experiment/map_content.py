@@ -12,9 +12,7 @@ import numpy as np
 
 from ..design.objects import Volume
 from ..geometry.grids import even_grid
-from ..inputs.messages import refused
 from ..inputs.yamltree import to_list
-from ..machines.custom import CustomModelError
 from ..machines.protocol import Array, ErrorModel
 from ..maps.fitted_map import FittedMap, MapData
 from .model_files import fingerprints, relative
@@ -26,10 +24,6 @@ WORDS = ("title", "experiment", "date", "program", "frame", "checksum")
 
 def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
     """What a map file holds besides its covariance and undetermined directions."""
-    try:
-        files = fingerprints(fitted.settings)
-    except CustomModelError as error:
-        raise refused(folder, str(error), "error_model") from None
     lower, upper = fitted.volume.corners
     found: dict[str, Any] = {
         "map": 1,
@@ -38,7 +32,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "date": fitted.date,
         "program": fitted.program,
         "error_model": to_list(relative(fitted.settings, folder)),
-        "files": files,
+        "files": fingerprints(fitted.settings),
         "volume": {
             axis: [_length(low), _length(high)]
             for axis, low, high in zip(AXES, lower, upper, strict=False)

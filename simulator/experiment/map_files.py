@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import zipfile
 from collections.abc import Mapping
@@ -17,7 +18,8 @@ import numpy as np
 from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.problems import Problems, in_order
 from ..inputs.settings import shorten
-from ..inputs.yamltree import Mark, Node, read_bytes, read_tree
+from ..inputs.trust import OPENED, Trust
+from ..inputs.yamltree import MOST_BYTES, Mark, Node, read_bytes, read_tree
 from ..machines.protocol import Array
 from ..maps.fitted_map import FittedMap
 from .changes import node_of
@@ -75,8 +77,9 @@ def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def read_map(path: str | os.PathLike[str]) -> FittedMap:
-    """Read a map file, YAML or arrays of NumPy.
+def read_map(path: str | os.PathLike[str], trust: Trust = OPENED) -> FittedMap:
+    """Read a map file, YAML or arrays of NumPy; an error model in Python is run as far as the file
+    is trusted.
 
     :raises ExperimentError: it cannot be read, is damaged, incomplete or edited, is no map, or
         rests on a file that has changed; holds everything that was found.
@@ -85,7 +88,7 @@ def read_map(path: str | os.PathLike[str]) -> FittedMap:
     refused_messages: list[Message] = []
     root, arrays = map_tree(source, refused_messages)
     problems = Problems(root)
-    found = map_of_tree(root, arrays, source, problems)
+    found = map_of_tree(root, arrays, source, problems, trust)
     if found is None or problems.messages or refused_messages:
         raise ExperimentError(in_order(problems.messages, refused_messages, source))
     return found
@@ -107,9 +110,9 @@ def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
     """What a file of arrays says, as a tree whose nodes are all at its name, and its arrays."""
     content = read_bytes(source)
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as found:
-            head = json.loads(str(found["map"]))
-            arrays = {name: np.array(found[name]) for name in ("covariance", "undetermined")}
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            head = json.loads(str(_array(archive, "map")))
+            arrays = {name: _array(archive, name) for name in ("covariance", "undetermined")}
         if not all(one.dtype == float and one.ndim == 2 for one in arrays.values()):
             raise ValueError("its arrays are no matrices of doubles")
         root = node_of({**head, "covariance": [""]}, Mark(str(source), 0, 0))
@@ -117,3 +120,21 @@ def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
         text = f"is no map, or damaged ({shorten(str(error))}); write it again with fit -o"
         raise refused(source, text) from None
     return root, arrays
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> Array:
+    """An array of a file, as large as it is: neither what is compressed nor the array's own head
+    may make it larger.
+
+    :raises ValueError: it is larger than a file may be, or than its head says.
+    """
+    size = archive.getinfo(f"{name}.npy").file_size
+    if size > MOST_BYTES:
+        raise ValueError(f"{name} has {size / 1e6:.0f} MB, and {MOST_BYTES / 1e6:.0f} are possible")
+    stream = io.BytesIO(archive.read(f"{name}.npy"))
+    np.lib.format.read_magic(stream)
+    shape, _, kind = np.lib.format.read_array_header_1_0(stream)
+    if math.prod(shape) * kind.itemsize > size:
+        raise ValueError(f"{name} is cut off")
+    stream.seek(0)
+    return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))

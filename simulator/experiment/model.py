@@ -22,6 +22,7 @@ from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.quantities import Target
+from ..inputs.trust import UNKNOWN, Trust
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
 from ..maps.fitted_map import MapData
 from ..maps.map_prior import EarlierCampaign, MapShare
@@ -229,7 +230,7 @@ class Experiment:
     what of the file is possible, and unlikely to be meant. ``notes``: what was found in its tables
     by itself. ``readings``: where tables of readings are and how they are written. ``tree``: what
     was written, without variants, ``mark``: where the experiment itself stands, and ``builder``:
-    what makes an experiment of a tree.
+    what makes an experiment of a tree, with the ``trust`` that is in the file.
     """
 
     title: str
@@ -251,11 +252,12 @@ class Experiment:
     seed: int
     tree: Node
     mark: Mark
-    builder: Callable[[Node], Experiment]
+    builder: Callable[..., Experiment]
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     influences: tuple[InfluenceSettings, ...] = ()
     noise: Noise = Noise()
+    trust: Trust = UNKNOWN
     stars: tuple[Star, ...] = ()
     pool: Pool | None = None
     doubts: tuple[str, ...] = ()

@@ -6,13 +6,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..inputs.yamltree import child, read_bytes, read_tree, to_python
-from ..machines.custom import named_object
+from ..machines.custom import module_source
 
 # Keys of settings of error models that name a file or a folder, by the kind of the model.
 PLACES = {"machine": "file", "python": "folder"}
@@ -48,7 +47,6 @@ def model_files(settings: Mapping[str, Any]) -> dict[str, Path]:
     """Files that an error model of `settings` with absolute paths rests on, by their names.
 
     :raises ExperimentError: a machine file cannot be read.
-    :raises CustomModelError: there is no such model.
     """
     if settings["kind"] == "machine":
         path = Path(settings["file"])
@@ -58,9 +56,8 @@ def model_files(settings: Mapping[str, Any]) -> dict[str, Path]:
         return {path.name: path, **{name: path.parent / name for name in tables}}
     if settings["kind"] == "python":
         folder = settings.get("folder")
-        found = named_object(settings["object"], None if folder is None else Path(folder))
-        file = getattr(sys.modules.get(found.__module__), "__file__", None)
-        return {} if file is None else {Path(file).name: Path(file)}
+        file = module_source(settings["object"], None if folder is None else Path(folder))
+        return {} if file is None else {file.name: file}
     return {}
 
 

@@ -145,7 +145,7 @@ def _star_values(
     """Co-ordinates (l, d) of a star's tips from its table, None after saying what is wrong."""
     letters = list("xyz"[: references.dimension])
     try:
-        rows = read_table(references.folder / str(settings.values), ["probe"], letters, [])
+        rows = read_table(references.file(settings.values), ["probe"], letters, [])
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None

@@ -98,6 +98,6 @@ def _read_correction(settings: ReadingsSettings, references: References) -> None
     from .machine_file import load_machine
 
     try:
-        correction.of(load_machine(references.folder / correction.file))
+        correction.of(load_machine(references.file(correction.file), trust=references.trust))
     except ExperimentError as error:
         references.problems.take(error, steps)

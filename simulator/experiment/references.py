@@ -20,6 +20,7 @@ from ..inputs.problems import Problems, written_keys
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
+from ..inputs.trust import Trust
 from ..inputs.yamltree import Mapping, Node, written
 from ..inputs.yamltree import Sequence as SequenceNode
 from .structure import Sections
@@ -30,7 +31,9 @@ DEFAULT_PROBE = "probe"
 MOST_BALLS_OF_ALL = 100_000
 
 
-def resolve_references(sections: Sections, folder: Path, problems: Problems) -> References:
+def resolve_references(
+    sections: Sections, folder: Path, problems: Problems, trust: Trust
+) -> References:
     """Return what positions and calibrations can refer to; tables of balls are read from
     ``folder``.
     """
@@ -44,7 +47,7 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
     balls = 0
     for key, settings in sections.entries("artefacts").items():
         name, steps = str(key), ("artefacts", str(key))
-        listed = _with_coordinates(settings, folder, steps, problems)
+        listed = _with_coordinates(settings, folder, steps, problems, trust)
         if listed is None:
             continue
         try:
@@ -84,9 +87,8 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
                 problems.add((*steps, "reads"), text)
         if listed.axes is not None:
             _check_axes(listed, layout, (*steps, "axes"), dimension, problems)
-    return References(
-        problems, folder, dimension, probes, written_keys(root, "artefacts"), artefacts, layouts
-    )
+    names = written_keys(root, "artefacts")
+    return References(problems, folder, dimension, probes, names, artefacts, layouts, trust)
 
 
 def _check_axes(
@@ -115,13 +117,13 @@ def _check_axes(
 
 
 def _with_coordinates(
-    settings: ArtefactSettings, folder: Path, steps: Steps, problems: Problems
+    settings: ArtefactSettings, folder: Path, steps: Steps, problems: Problems, trust: Trust
 ) -> ArtefactSettings | None:
     if not isinstance(settings, BallsSettings) or settings.file is None:
         return settings
     steps = (*steps, "file")
     try:
-        rows = read_table(folder / settings.file, ["ball"], ["x", "y"], ["z"])
+        rows = read_table(trust.file(folder, settings.file), ["ball"], ["x", "y"], ["z"])
     except ExperimentError as error:
         problems.take(error, steps)
         return None

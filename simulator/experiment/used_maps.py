@@ -43,7 +43,7 @@ def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: R
         generator = np.random.default_rng(np.random.SeedSequence(truth.draw))
         root = found.root
         a = a + (root @ generator.standard_normal(root.shape[1]))[: len(a)]
-    content = hashlib.sha256(read_bytes(references.folder / truth.file)).hexdigest()
+    content = hashlib.sha256(read_bytes(references.file(truth.file))).hexdigest()
     truth.of(TrueMachine(found.model, a), content)
     if found.undetermined.shape[1]:
         text = (
@@ -137,7 +137,7 @@ def resolve_map_prior(
 
 def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
     try:
-        fitted = read_map(references.folder / file)
+        fitted = read_map(references.file(file), references.trust)
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None

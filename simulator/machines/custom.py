@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ..inputs.own_code import own_frame, told
+from ..inputs.own_code import own_array, own_frame, own_result, running_own_code, told
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
-from .protocol import Array, ErrorModel, Parameter
+from ..inputs.trust import Trust
+from .protocol import Array, ErrorModel, HasLines, Line, Parameter, Reported
 
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
@@ -30,6 +32,8 @@ NEW_LINE = "from ballplate.models import Parameter, Reported"
 # Parameters are tried at random values that move points by about this much, in metres, and are
 # changed by as much.
 USUAL_ERROR = 1e-4
+# Errors beyond it, in metres, are those of no machine.
+IMPLAUSIBLE = 0.1
 # Largest difference of a derivative from the quotient of differences, in parts of the parameter's
 # stated effect.
 DERIVATIVE = 1e-4
@@ -51,6 +55,7 @@ def custom_model(
     name: str,
     options: Mapping[str, Any],
     folder: Path | None,
+    trust: Trust,
     lower: tuple[float, ...],
     upper: tuple[float, ...],
 ) -> ErrorModel:
@@ -62,20 +67,65 @@ def custom_model(
 
     :raises CustomModelError: no such object, or what it returns is no error model.
     """
-    build = named_object(name, folder)
+    build = named_object(name, folder, trust)
     key = "options" if options else "object"
     model = attempt(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
     )
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
-    return model
+    kind = OwnModelWithLines if isinstance(model, HasLines) else OwnModel
+    return kind(model, tuple(model.parameters))
 
 
-def named_object(name: str, folder: Path | None, group: str = GROUP) -> Callable[..., Any]:
+@dataclass(frozen=True)
+class OwnModel:
+    """A user's error `model`, whose every answer is checked."""
+
+    model: ErrorModel
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def dimension(self) -> int:
+        return self.model.dimension
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        return own_array(self.model.error, x.shape, x, a, p, is_plausible=self._is_plausible(a))
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        shape = (*x.shape, len(self.parameters))
+        return own_array(self.model.jacobian, shape, x, a, p, is_plausible=self._is_plausible(a))
+
+    def _is_plausible(self, a: Array) -> bool:
+        """Whether a machine may have such errors; a fit that diverges tries others."""
+        effects = (parameter.effect for parameter in self.parameters)
+        moved = (abs(value) * effect for value, effect in zip(a.tolist(), effects, strict=True))
+        return all(length <= IMPLAUSIBLE for length in moved)
+
+    def reported(self) -> Reported:
+        found: Reported = own_result(self.model.reported)
+        return found
+
+
+class OwnModelWithLines(OwnModel):
+    """The same of a model whose error functions can be drawn."""
+
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        found: tuple[Line, ...] = own_result(self.model.lines, function, t)  # type: ignore[attr-defined]
+        return found
+
+
+def named_object(
+    name: str, folder: Path | None, trust: Trust, group: str = GROUP
+) -> Callable[..., Any]:
     """The object `name`, module:function or an entry point's name of a `group`.
 
-    :raises CustomModelError: there is none, or it cannot be called.
+    Nothing else imports code that a file names.
+
+    :raises CustomModelError: there is none, it cannot be called, or it is not trusted.
     """
+    if not trust.modules:
+        text = "is code in Python that loading the file would run, and modules are not allowed here"
+        raise CustomModelError(f"{text}; {trust.remedy}")
     module_name, colon, path = name.partition(":")
     if not colon:
         from importlib.metadata import entry_points
@@ -130,6 +180,33 @@ def _imported(name: str, folder: Path | None) -> Any:
     return module
 
 
+def module_source(name: str, folder: Path | None) -> Path | None:
+    """The file of the module of an object, module:function or an entry point's name; None where
+    there is none. Nothing of it is run, nor of the packages that it is in.
+    """
+    module, colon, _ = name.partition(":")
+    if not colon:
+        from importlib.metadata import entry_points
+
+        points = entry_points(name=name)
+        module = next((one.module for one in points if one.group.startswith("ballplate.")), "")
+    beside = None if folder is None or not module else module_file(folder.resolve(), module)
+    if beside is not None:
+        return beside
+    places: Sequence[str] | None = None
+    spec = None
+    parts = module.split(".")
+    for count in range(1, len(parts) + 1):
+        finders = (getattr(finder, "find_spec", None) for finder in sys.meta_path)
+        whole = ".".join(parts[:count])
+        specs = (find(whole, places) for find in finders if find is not None)
+        spec = next((one for one in specs if one is not None), None)
+        if spec is None:
+            return None
+        places = spec.submodule_search_locations
+    return None if spec is None or not spec.has_location else Path(str(spec.origin))
+
+
 def module_file(folder: Path, name: str) -> Path | None:
     """The file of a module in a folder, None where it is not there."""
     path = folder.joinpath(*name.split("."))
@@ -145,7 +222,7 @@ def attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resul
     :raises CustomModelError: it fails; says where.
     """
     try:
-        with np.errstate(all="ignore"):
+        with running_own_code():
             return call()
     except (Exception, SystemExit) as error:
         # Without a place in the user's code, the call itself was wrong.

@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr, StringConstraints
 
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings, listing
+from ..inputs.trust import UNKNOWN, Trust
 from .custom import custom_model
 from .described import OfMachineFile
 from .empirical_settings import EMPIRICAL
@@ -70,12 +71,14 @@ class PythonSettings(Settings):
 
     # Where modules are looked for besides where Python finds them.
     _folder: Path | None = PrivateAttr(default=None)
+    _trust: Trust = PrivateAttr(default=UNKNOWN)
 
-    def beside(self, folder: Path) -> None:
+    def beside(self, folder: Path, trust: Trust) -> None:
         """Look for modules in the folder of the experiment file too, or in that named from
         there.
         """
         self._folder = folder if self.folder is None else folder / self.folder
+        self._trust = trust
 
 
 class MachineFileSettings(OfMachineFile):
@@ -117,7 +120,9 @@ def _metric_with_defaults(settings: MetricSettings, dimension: int) -> MetricSet
 
 
 def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    return custom_model(settings.object, settings.options, settings._folder, lower, upper)
+    return custom_model(
+        settings.object, settings.options, settings._folder, settings._trust, lower, upper
+    )
 
 
 def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:

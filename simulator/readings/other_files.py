@@ -46,7 +46,7 @@ def what_it_is(source: GivenText) -> str:
 
 def is_program(form: Format, text: str) -> bool:
     """Whether a file of a format moves a machine, and has nothing that was measured."""
-    return form.name == "dmis" and not re.search(r"^\s*FA\(", text, re.MULTILINE)
+    return form.name == "dmis" and not re.search(r"^[ \t]*FA\(", text, re.MULTILINE)
 
 
 def is_calibration_table(source: GivenText) -> bool:

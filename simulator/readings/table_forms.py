@@ -115,7 +115,7 @@ def _split_headings(text: str, separator: str) -> list[str] | None:
     nothing.
     """
     if separator == " ":
-        text = re.sub(r"\s+(?=[\[(][^\])]*[\])])", "_", text)
+        text = re.sub(r"(?<!\s)\s+(?=[\[(][^\])]*[\])])", "_", text)
     return split(text.removeprefix("#").strip(), separator)
 
 

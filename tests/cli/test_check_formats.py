@@ -302,13 +302,12 @@ def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
     """Run a script as GitHub's shell `bash` does, with the command of this source tree."""
     tools = folder / "tools"
     tools.mkdir(exist_ok=True)
-    program = tools / "ballplate"
-    program.write_text(
-        f"#!{sys.executable}\nimport sys\nsys.path.insert(0, {os.getcwd()!r})\n"
-        "from ballplate.cli import main\nsys.exit(main())\n",
-        encoding="utf-8",
-    )
-    program.chmod(0o755)
+    for name, call in (("python", ""), ("ballplate", " -I -m ballplate")):
+        program = tools / name
+        if program.exists():
+            continue
+        program.write_text(f'#!/bin/sh\nexec "{sys.executable}"{call} "$@"\n', encoding="utf-8")
+        program.chmod(0o755)
     return subprocess.run(
         ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script],
         cwd=folder,
@@ -396,7 +395,10 @@ def test_the_action_installs(tmp_path: Path) -> None:
         found = shell(
             install["run"], tmp_path, INSTALL=chosen, GITHUB_ACTION_PATH="/actions/ballplate"
         )
-        assert found.stdout.splitlines() == ["-m", "pip", "install", "--quiet", expected or chosen]
+        assert found.stdout.splitlines() == [
+            *("-I", "-m", "pip", "install", "--quiet"),
+            expected or chosen,
+        ]
 
 
 def test_the_hook(tmp_path: Path) -> None:

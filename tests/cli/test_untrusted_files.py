@@ -4,6 +4,7 @@ command.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -28,8 +29,9 @@ PLACES = {
     "true machine": ("  seed: 7", f"  seed: 7\n  error_model: {PYTHON}"),
     "variant": ("# Offsets", f"variants: {{one: {{}}, two: {{error_model: {PYTHON}}}}}\n# Offsets"),
     "key of a variant": (
-        "# Offsets",
-        "variants: {one: {}, two: {error_model.kind: python}}\n# Offsets",
+        "error_model:",
+        "variants: {one: {}, two: {error_model.object: 'mine:build'}}\n"
+        "error_model: {kind: python, object: 'gone:build'}\nformer:",
     ),
 }
 
@@ -77,6 +79,33 @@ def test_the_hook_and_the_action_refuse_modules(tmp_path: Path) -> None:
     assert not (tmp_path / "intruder").exists()
     assert shell(run, tmp_path, FILES="*.yaml", MODULES="true").returncode == 3
     assert (tmp_path / "intruder").exists()
+
+
+def test_the_action_runs_no_module_of_the_change_that_it_checks(tmp_path: Path) -> None:
+    pytest.importorskip("pip")
+    hostile = (
+        "pip",
+        "ballplate",
+        "yaml",
+        "numpy",
+        "sitecustomize",
+        "usercustomize",
+        "argparse",
+        "site",
+    )
+    for name in hostile:
+        (tmp_path / f"{name}.py").write_text(
+            f"from pathlib import Path\nPath({str(tmp_path / 'intruder')!r}).touch()\n",
+            encoding="utf-8",
+        )
+    (tmp_path / "design.yaml").write_text(QUICKSTART.read_text(encoding="utf-8"), encoding="utf-8")
+    setup, install, check = described("action.yml")["runs"]["steps"]
+    assert re.fullmatch(r"actions/setup-python@[0-9a-f]{40}", setup["uses"])
+    found = shell(install["run"], tmp_path, INSTALL="--help")
+    assert found.returncode == 0 and "pip install" in found.stdout
+    found = shell(check["run"], tmp_path, FILES="*.yaml", MODULES="false")
+    assert found.returncode == 0 and "full rank" in found.stdout
+    assert not (tmp_path / "intruder").exists()
 
 
 def test_patterns_are_expanded_without_a_shell(

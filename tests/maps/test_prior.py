@@ -16,6 +16,7 @@ from ballplate.results import campaign_sigmas
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.trust import UNKNOWN
 from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.maps.map_prior import (
     EarlierCampaign,
@@ -461,8 +462,8 @@ def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Pa
         }
         (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
         assert load(tmp_path / "file.yaml")
-        with pytest.raises(bp.ExperimentError, match="true_machine.file: is the map of an error"):
-            load(tmp_path / "file.yaml", with_modules=False)
+        with pytest.raises(bp.ExperimentError, match="own.*: is code in Python"):
+            load(tmp_path / "file.yaml", trust=UNKNOWN)
 
 
 def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:

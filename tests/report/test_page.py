@@ -237,7 +237,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     rows = [(1, name, content.encode()) for name, content in contents.items()]
     store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
-    assert "is run only with --run-modules" in report(store.path)
+    assert "modules are not allowed here; add --run-modules" in report(store.path)
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
     page_file = tmp_path / "own.html"

@@ -15,6 +15,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
 from ...results.prediction import Advice, Prediction
@@ -62,13 +63,21 @@ class Wanted:
     """What designs are checked for besides their rank: `goals`, and whether a weak direction fails.
 
     With `repairs` changes are looked for that would determine the rest. Without `with_modules` no
-    error model in Python is run, and files that have one are refused.
+    code that a file names is run, and no file read outside the current folder, or the file's own
+    where it is elsewhere.
     """
 
     goals: tuple[Goal, ...] = ()
     nothing_weak: bool = False
     repairs: bool = False
     with_modules: bool = True
+
+    def trust(self, path: Path) -> Trust:
+        """The trust in a file."""
+        if self.with_modules:
+            return OPENED
+        here, own = Path.cwd(), path.resolve().parent
+        return Trust(within=here if own.is_relative_to(here) else own)
 
 
 @dataclass(frozen=True)
@@ -108,11 +117,14 @@ def check_files(
     within = report if len(files) == 1 else unreported
     for path in counted(files, "files", len(files), report) if len(files) > 1 else files:
         try:
-            experiments = load(path, with_modules=wanted.with_modules)
+            trust = wanted.trust(path)
+            experiments = load(path, trust=trust)
             found |= {experiment.name for experiment in experiments}
             chosen = [one for one in experiments if not variants or one.name in variants]
             # What a plan may choose from is loaded where it is asked for only.
-            pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
+            pools = {}
+            if wanted.repairs:
+                pools = {one.name: one for one in load(path, True, trust)}
             doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
             notes = tuple(dict.fromkeys(note for one in chosen for note in one.notes))
             is_single = len(chosen) == 1

@@ -10,6 +10,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import place_of
 from ballplate.simulator.inputs.messages import Steps, format_path
+from ballplate.simulator.inputs.trust import UNKNOWN, Trust
 from ballplate.simulator.inputs.yamltext import TextChange, changed_data, with_changes
 from ballplate.simulator.inputs.yamltree import (
     Mapping as MappingNode,
@@ -45,7 +46,9 @@ def to_write(found: Repairs | None, judged: Verdict, nothing_weak: bool = False)
     return cheapest if is_enough and not cheapest.is_faint else None
 
 
-def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
+def mended(
+    text: str, source: Path, variant: str | None, repair: Repair, trust: Trust = UNKNOWN
+) -> str:
     """The text of an experiment's file with a repair in it; what a variant does not say itself is
     changed for that variant alone.
 
@@ -54,7 +57,8 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
     :raises ExperimentError: the repair cannot be written without changing what stands about it, or
         what others refer to.
     """
-    (experiment,) = (one for one in load(source, planning=True, text=text) if one.name == variant)
+    loaded = load(source, True, trust, text)
+    (experiment,) = (one for one in loaded if one.name == variant)
     changed = apply_all(repair.changes, experiment)
     # Nothing is left undetermined, whatever the file expected until now.
     extra = (
@@ -63,7 +67,7 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
         else []
     )
     new = with_experiment(text, source, experiment, changed, repair.edits, extra)
-    (checked,) = (one for one in load(source, text=new) if one.name == variant)
+    (checked,) = (one for one in load(source, False, trust, new) if one.name == variant)
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
         text = "the repaired file does not have the rank that was found; nothing is changed"
@@ -89,7 +93,7 @@ def with_experiment(
     """
     before = {experiment.name: experiment}
     if experiment.name is not None:
-        before = {one.name: one for one in load(source, planning=True, text=text)}
+        before = {one.name: one for one in load(source, True, experiment.trust, text)}
     # A variant with more entries of a list has a list of its own, in which the others are changed.
     changes = sorted(
         [
@@ -99,7 +103,7 @@ def with_experiment(
         key=lambda one: len(one.steps),
     )
     new = with_text_changes(text, source, experiment.name, changes)
-    after = {one.name: one for one in load(source, planning=True, text=new)}
+    after = {one.name: one for one in load(source, True, experiment.trust, new)}
     others_differ = before.keys() != after.keys() or any(
         to_python(before[name].tree) != to_python(one.tree)
         for name, one in after.items()

@@ -4,15 +4,14 @@ prediction of its own.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.load import build
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import override
 from ballplate.simulator.inputs.messages import ExperimentError, refused
@@ -87,7 +86,7 @@ def reach(
     root = override(root, "true_machine", zero, root.mark)
     if target is not None:
         root = override(root, "target_uncertainty", Scalar(root.mark, target), root.mark)
-    searched = _Searched(root, experiment.source, experiment.name, goal)
+    searched = _Searched(root, experiment.builder, goal)
     present = searched.uncertainty(root)
     check_goal(goal, present)
     judged = judge(goal, present)
@@ -108,22 +107,11 @@ def reach(
 
 @dataclass(frozen=True)
 class _Searched:
-    """The file of which values are tried."""
+    """The file of which values are tried, and what makes the experiment of a tree."""
 
     root: Node
-    source: Path
-    name: str | None
+    built: Callable[[Node], Experiment]
     goal: Goal
-
-    def built(self, tree: Node) -> Experiment:
-        """The experiment of a tree.
-
-        :raises ExperimentError: the file is wrong so.
-        """
-        experiment, messages = build(tree, self.source, self.name)
-        if experiment is None:
-            raise ExperimentError(sorted(messages))
-        return experiment
 
     def uncertainty(self, tree: Node) -> PlannedUncertainty:
         """Uncertainties of a tree's design.
@@ -187,8 +175,11 @@ class _Trials:
         result.
         """
         if step not in self.known:
-            experiment, _ = build(self.one.tree(step), self.searched.source, self.searched.name)
-            return experiment is not None
+            try:
+                self.searched.built(self.one.tree(step))
+            except ExperimentError:
+                return False
+            return True
         return not self.known[step].refusal
 
 

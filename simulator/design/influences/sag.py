@@ -96,9 +96,10 @@ class SagSettings(InfluenceSettings):
             return
         layout = references.layouts[name]
         try:
-            shape = _shape(
-                self, layout.names, layout.coordinates[:, : d or 3], d or 3, references.folder
-            )
+            if self.values is not None:
+                references.file(self.values)
+            places = layout.coordinates[:, : d or 3]
+            shape = _shape(self, layout.names, places, d or 3, references.folder)
         except ExperimentError as error:
             references.problems.take(error, (*steps, "values"))
             return

@@ -33,12 +33,12 @@ def read_rows(
     """Rows of a CSV file, and the standard uncertainties of each row's `lengths`, NaN without any;
     None after saying what is wrong.
     """
-    path = references.folder / settings.values
     problems = references.problems
     own = [f"{one}_{name}" for name in (STANDARD, EXPANDED) for one in lengths]
     optional = [*others, STANDARD, EXPANDED, *own]
     columns = [*texts, FACTOR]
     try:
+        path = references.file(settings.values)
         _refuse_unclear(table_lines(path), str(path))
         rows = read_table(
             path, columns, lengths, optional, defaults={FACTOR: NO_FACTOR}, absent=math.nan

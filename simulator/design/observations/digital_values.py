@@ -45,9 +45,9 @@ def read_digital(
     # Loaded with a parser of XML, which few experiments need.
     from ...inputs.digital_certificates import RELATIVE, matrix_of, read_digital_certificate
 
-    problems, path = references.problems, references.folder / settings.values
-    place = (*steps, "values")
+    problems, place = references.problems, (*steps, "values")
     try:
+        path = references.file(settings.values)
         version, results = read_digital_certificate(path)
     except ExperimentError as error:
         problems.take(error, place)

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, Name, frozen
 from ...inputs.messages import Steps
+from ...inputs.own_code import own_array
 from ...inputs.quantities import (
     QuantityError,
     parse_angle,
@@ -20,6 +21,7 @@ from ...inputs.quantities import (
     with_quantities,
 )
 from ...inputs.settings import Forms, NonEmpty, Text, listing
+from ...inputs.trust import Trust
 from ...machines.custom import CustomModelError, attempt, named_object
 from ...machines.protocol import Array, Integers, Unit
 from ..arrays import Design
@@ -178,7 +180,9 @@ def read_python_values(
     drawn = layout.coordinates[balls][:, :dimension]
     folder = references.folder / (settings.folder or ".")
     try:
-        functions = ball_functions(settings.object, settings.options, folder, names, drawn)
+        functions = ball_functions(
+            settings.object, settings.options, folder, references.trust, names, drawn
+        )
     except CustomModelError as error:
         references.problems.add((*steps, error.key), str(error))
         return None
@@ -210,20 +214,39 @@ def read_python_values(
 
 
 def ball_functions(
-    name: str, options: dict[str, Any], folder: Path | None, names: tuple[str, ...], drawn: Array
+    name: str,
+    options: dict[str, Any],
+    folder: Path | None,
+    trust: Trust,
+    names: tuple[str, ...],
+    drawn: Array,
 ) -> BallFunctions:
     """The functions that the object `name` makes for balls of `names`, drawn at (n, d).
 
     :raises CustomModelError: there is no such object, or what it returns is not usable.
     """
-    build = named_object(name, folder, GROUP)
+    build = named_object(name, folder, trust, GROUP)
     key = "options" if options else "object"
     found = attempt(
         f"{name} has failed", lambda: build(names, drawn.copy(), **with_quantities(options)), key
     )
     _check(name, found, drawn)
-    checked: BallFunctions = found
-    return checked
+    return OwnBallFunctions(found, tuple(found.names), found.unit)
+
+
+@dataclass(frozen=True)
+class OwnBallFunctions:
+    """A user's `functions` of balls, whose every answer is checked."""
+
+    functions: BallFunctions
+    names: tuple[tuple[str, str], ...]
+    unit: Unit
+
+    def values(self, balls: Array) -> Array:
+        return own_array(self.functions.values, (len(self.names),), balls)
+
+    def derivatives(self, balls: Array) -> Array:
+        return own_array(self.functions.derivatives, (len(self.names), *balls.shape), balls)
 
 
 def _values(

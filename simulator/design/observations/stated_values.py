@@ -199,7 +199,7 @@ def _of_file(
 
     problems, place = references.problems, (*steps, "covariance")
     try:
-        matrix = read_matrix(references.folder / settings.covariance)
+        matrix = read_matrix(references.file(settings.covariance))
     except ExperimentError as error:
         problems.take(error, place)
         return None
