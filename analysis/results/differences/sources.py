@@ -137,4 +137,5 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         side.probe,
         day or side.date,
         data=side.data,
+        sigma=side.sigma,
     )
