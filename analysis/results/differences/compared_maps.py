@@ -88,11 +88,11 @@ class ComparedMap:
     `shared` (n, q) is the effect of one standard deviation of each value that both maps rest on,
     which is not in the root; `absorbed` (q, r) are its rows of the root of the hat matrix. `sigma`
     is a factor of both, and `degrees_of_freedom` are those that it comes from, infinite where
-    uncertainties are as stated. `offsets` are those of probes by name, `probe` the one that is meant where
-    none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
-    maps of the same model have them in common, as otherwise their spaces of errors would differ by
-    what is of second order. `fit` has the balls of plates, and `data` are the readings that the map
-    comes from, where they are known. `is_expected`: nothing was measured, and
+    uncertainties are as stated. `offsets` are those of probes by name, `probe` the one that is
+    meant where none is named. Derivatives are taken at the parameters `about` (n,), by default the
+    values; two maps of the same model have them in common, as otherwise their spaces of errors
+    would differ by what is of second order. `fit` has the balls of plates, and `data` are the
+    readings that the map comes from, where they are known. `is_expected`: nothing was measured, and
     the map is exact but for what is stated, of which `stated` is the standard uncertainty of
     lengths.
     """

@@ -204,16 +204,17 @@ def cross_validate(
         for at, _ in fits
     ]
     scatters = _scatter(one, scale_1, given), _scatter(two, scale_2, given)
-    roots = _roots(fits, (first.x, second.x), rows, common, scatters)
+    roots, alone = _roots(fits, (first.x, second.x), rows, common, scatters)
     # Motions, and what the readings leave open, are no difference.
     free = [
         _motions(places),
         *(own @ at.shared_null for own, (at, _) in zip(rows, fits, strict=True)),
     ]
     free_of = _complement(np.concatenate(free, axis=1))
-    change, roots = free_of @ change, (free_of @ roots[0], free_of @ roots[1])
+    change, alone = free_of @ change, free_of @ alone
+    roots = free_of @ roots[0], free_of @ roots[1]
     root = np.hstack(roots)
-    test = joint_difference(change, roots, scatters)
+    test = joint_difference(change, roots, scatters, alone)
     if test is None:
         raise refused(experiment.source, "the readings leave nothing to compare")
     shape = places.shape
@@ -261,9 +262,9 @@ def _roots(
     rows: list[Array],
     have_common: bool,
     scatters: Scatters,
-) -> Roots:
+) -> tuple[Roots, Array]:
     """Square roots (m, k) of both campaigns' parts of the covariance of differences of functions
-    with derivatives `rows`.
+    with derivatives `rows`, and of what it would be with nothing in common.
 
     Each estimate follows its observations by the root of the hat matrix. Certificates of plates are
     the same observations in both if they `have_common` ones.
@@ -281,7 +282,9 @@ def _roots(
                 is_common[row_places(at.design)[one.word]] = True
         parts.append(scale * follows[:, ~is_common])
         common.append(follows[:, is_common])
-    return with_common((parts[0], parts[1]), common[1] - common[0], scatters)
+    scaled = [at[1] * own for at, own in zip(fits, common, strict=True)]
+    alone = np.hstack([*parts, *scaled])
+    return with_common((parts[0], parts[1]), common[1] - common[0], scatters), alone
 
 
 def _motions(places: Array) -> Array:
