@@ -11,6 +11,7 @@ ratio of both sigmas, over which the chance is integrated.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
@@ -131,15 +132,12 @@ def joint_chance(squares: Array, shares: Array, scatters: Scatters) -> float:
     >>> round(joint_chance(np.array([7.708647]), np.zeros(1), (known, few)), 5)
     0.05
     """
-    from scipy.special import betaincinv, chdtrc, fdtrc
+    from scipy.special import chdtrc, fdtrc
 
     count = len(squares)
     if all(np.isinf(one.degrees_of_freedom) for one in scatters):
         return float(chdtrc(count, squares.sum()))
-    # Fisher's quantile, by which a sum of squares of such a scatter is larger than another.
-    grid = np.linspace(0.0, 1.0, SHARES)
-    freedom = 0.5 * np.minimum(welch(grid, scatters), MANY)
-    quantiles = freedom * (1.0 / betaincinv(freedom, 0.5 * count, LEVEL) - 1.0)
+    grid, quantiles = _quantiles(count, *_freedom(scatters))
     of_first, deviations, weights, total = _ratios(shares, scatters)
     deviations = deviations / np.interp(of_first, grid, quantiles)
     statistic = float((squares / np.interp(shares, grid, quantiles)).sum())
@@ -174,17 +172,40 @@ def _ratios(shares: Array, scatters: Scatters) -> tuple[Array, Array, Array, flo
     shares of the first campaign (k, n), the variances of differences over what they are estimated
     as (k, n), weights (k,) of the nodes, and the degrees of freedom of both together.
     """
-    from scipy.special import betaincinv
-
-    one, other = (min(scatter.degrees_of_freedom, MANY) for scatter in scatters)
-    places, weights = np.polynomial.legendre.leggauss(NODES)
-    part = betaincinv(0.5 * one, 0.5 * other, 0.5 * (1.0 + places))[:, None]
+    one, other = _freedom(scatters)
+    part, weights = _nodes(one, other)
     total = one + other
     sigma = total * part / one, total * (1.0 - part) / other
     own = shares / scatters[0].sigma ** 2, (1.0 - shares) / scatters[1].sigma ** 2
     true = own[0] / (own[0] + own[1])
     estimated = sigma[0] * true + sigma[1] * (1.0 - true)
-    return sigma[0] * true / estimated, 1.0 / estimated, 0.5 * weights, total
+    return sigma[0] * true / estimated, 1.0 / estimated, weights, total
+
+
+def _freedom(scatters: Scatters) -> tuple[float, float]:
+    one, other = (min(scatter.degrees_of_freedom, MANY) for scatter in scatters)
+    return one, other
+
+
+@lru_cache(maxsize=16)
+def _nodes(one: float, other: float) -> tuple[Array, Array]:
+    """Parts (k, 1) of the first campaign in the residual sum of squares of both, and weights."""
+    from scipy.special import betaincinv
+
+    places, weights = np.polynomial.legendre.leggauss(NODES)
+    return betaincinv(0.5 * one, 0.5 * other, 0.5 * (1.0 + places))[:, None], 0.5 * weights
+
+
+@lru_cache(maxsize=256)
+def _quantiles(count: int, one: float, other: float) -> tuple[Array, Array]:
+    """Shares of the first campaign, and Fisher's quantile of so many differences at each, by which
+    a sum of squares is larger for a scatter of few degrees of freedom.
+    """
+    from scipy.special import betaincinv
+
+    shares = np.linspace(0.0, 1.0, SHARES)
+    freedom = 0.5 * welch(shares, (Scatter(1.0, one), Scatter(1.0, other)))
+    return shares, freedom * (1.0 / betaincinv(freedom, 0.5 * count, LEVEL) - 1.0)
 
 
 def orthonormal(columns: Array, least: float = NO_DIRECTION, largest: float | None = None) -> Array:

@@ -10,12 +10,13 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.results.campaign_tests import Scatter, joint_chance, orthonormal, single_chances
-from ballplate.results.differences.compared_maps import ComparedMap, motions
+from ballplate.results.differences.compared_maps import MappedValues, motions
 from ballplate.results.differences.comparison import ComparisonSettings, compared
 from ballplate.results.differences.normalised_errors import ValueDifference
 from ballplate.results.differences.shared_certificates import with_shared_certificates
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.machines.protocol import Array
 from scipy.stats import beta, norm
 from scipy.stats import t as student
 
@@ -113,42 +114,36 @@ def test_what_a_shared_certificate_fixes_is_not_counted() -> None:
 
 
 class Pairs:
-    """Linear campaigns by the factors of two designs' estimates."""
+    """Linear campaigns by the factors of two designs' estimates: errors at corners of the volume."""
 
     def __init__(self, is_shared: bool) -> None:
-        fits = [simulated_map(small(u), 100 + k, 7) for k, u in enumerate(("0.2 um", "0.4 um"))]
-        self.maps = list(with_shared_certificates(*fits)[:2]) if is_shared else fits
+        maps = [simulated_map(small(u), 100 + k, 7) for k, u in enumerate(("0.2 um", "0.4 um"))]
+        if is_shared:
+            maps = list(with_shared_certificates(maps[0], maps[1])[:2])
         self.generator = np.random.default_rng(11)
-        one = fits[0]
-        self.points = even_grid(one.volume.lower, one.volume.upper, [2] * 3)
-        free = motions(self.points - self.points.mean(axis=0))
-        self.basis = orthonormal(free.reshape(self.points.size, -1))
+        points = even_grid(maps[0].volume.lower, maps[0].volume.upper, [2] * 3)
+        free = motions(points - points.mean(axis=0)).reshape(points.size, -1)
+        self.stated = [
+            replace(one, root=one.root / one.sigma, shared=one.shared / one.sigma)
+            .displacements(points, one.offsets["down"])
+            .without(orthonormal(free))
+            for one in maps
+        ]
 
-    def drawn(self, one: ComparedMap, errors: np.ndarray, freedom: float) -> ComparedMap:
-        """A campaign whose sigma is estimated with so many degrees of freedom."""
-        rng = self.generator
-        sigma = float(np.sqrt(rng.chisquare(freedom) / freedom))
-        root, shared = one.root / one.sigma, one.shared / one.sigma
-        values = root @ rng.normal(size=root.shape[1]) + shared @ errors
-        about = np.zeros(len(values))
-        return replace(
-            one,
-            values=values,
-            about=about,
-            root=sigma * root,
-            shared=sigma * shared,
-            sigma=sigma,
-            degrees_of_freedom=freedom,
-        )
+    def drawn(self, one: MappedValues, errors: Array, sigma: float) -> MappedValues:
+        """A campaign that estimates such a sigma."""
+        values = one.root @ self.generator.normal(size=one.root.shape[1]) + one.shared @ errors
+        return replace(one, values=values, root=sigma * one.root, shared=sigma * one.shared)
 
     def p(self, freedom: tuple[int, int]) -> float:
         """That of the joint test of a pair."""
-        errors = self.generator.normal(size=self.maps[0].shared.shape[1])
-        both = [self.drawn(one, errors, own) for one, own in zip(self.maps, freedom, strict=True)]
-        offset = both[0].offsets["down"]
-        one, other = (each.displacements(self.points, offset) for each in both)
-        found = ValueDifference(one, other, (both[0].scatter, both[1].scatter))
-        test = found.without(self.basis).joint_test("errors")
+        rng = self.generator
+        errors = rng.normal(size=self.stated[0].shared.shape[1])
+        both = [Scatter(float(np.sqrt(rng.chisquare(one) / one)), one) for one in freedom]
+        first, second = (
+            self.drawn(one, errors, own.sigma) for one, own in zip(self.stated, both, strict=True)
+        )
+        test = ValueDifference(first, second, (both[0], both[1])).joint_test("errors")
         assert test is not None
         return test.p
 
