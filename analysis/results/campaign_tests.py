@@ -34,7 +34,7 @@ NODES = 100
 
 
 @dataclass(frozen=True)
-class Scatter:
+class CampaignSigma:
     """The `sigma` of a campaign, by which its stated uncertainties were multiplied, and the degrees
     of freedom that it was estimated with, infinite where it is stated.
     """
@@ -43,7 +43,7 @@ class Scatter:
     degrees_of_freedom: float
 
 
-Scatters = tuple[Scatter, Scatter]
+CampaignSigmas = tuple[CampaignSigma, CampaignSigma]
 Roots = tuple[Array, Array]
 
 
@@ -65,7 +65,7 @@ class JointDifference:
     held: float = 0.0
 
 
-def with_common(roots: Roots, common: Array, scatters: Scatters) -> Roots:
+def with_common(roots: Roots, common: Array, scatters: CampaignSigmas) -> Roots:
     """Square roots (m, r) of both campaigns' parts of a covariance, with errors that both share:
     `common` (m, q) is the effect of one standard deviation, as stated, on the difference.
 
@@ -81,7 +81,7 @@ def with_common(roots: Roots, common: Array, scatters: Scatters) -> Roots:
 
 @single_threaded
 def joint_difference(
-    values: Array, roots: Roots, scatters: Scatters, alone: Array | None = None
+    values: Array, roots: Roots, scatters: CampaignSigmas, alone: Array | None = None
 ) -> JointDifference | None:
     """Test differences (m,); `roots` are square roots (m, r) of both campaigns' parts of their
     covariance. None where none has a variance.
@@ -122,11 +122,11 @@ def joint_difference(
     )
 
 
-def joint_chance(squares: Array, shares: Array, scatters: Scatters) -> float:
+def joint_chance(squares: Array, shares: Array, scatters: CampaignSigmas) -> float:
     """The chance of so large `squares` (n,) of independent differences together, over variances of
     which the first campaign has the estimated `shares` (n,).
 
-    >>> known, few = Scatter(1.0, np.inf), Scatter(1.0, 4)
+    >>> known, few = CampaignSigma(1.0, np.inf), CampaignSigma(1.0, 4)
     >>> round(joint_chance(np.array([3.841459]), np.ones(1), (known, few)), 6)
     0.05
     >>> round(joint_chance(np.array([7.708647]), np.zeros(1), (known, few)), 5)
@@ -146,11 +146,11 @@ def joint_chance(squares: Array, shares: Array, scatters: Scatters) -> float:
     return float(weights @ fdtrc(first**2 / second, total, statistic / first))
 
 
-def single_chances(limit: float, shares: Array, scatters: Scatters) -> Array:
+def single_chances(limit: float, shares: Array, scatters: CampaignSigmas) -> Array:
     """The chances (m,) that single differences are more than `limit` times their standard
     uncertainty; the first campaign has the estimated `shares` (m,) of their variances.
 
-    >>> both = Scatter(1.0, 5), Scatter(2.0, 5)
+    >>> both = CampaignSigma(1.0, 5), CampaignSigma(2.0, 5)
     >>> single_chances(2.228, np.array([0.2]), both).round(3)
     array([0.05])
     """
@@ -160,14 +160,14 @@ def single_chances(limit: float, shares: Array, scatters: Scatters) -> Array:
     return np.asarray(weights @ fdtrc(1.0, total, limit**2 / deviations))
 
 
-def welch(share: Array | float, scatters: Scatters) -> Array:
+def welch(share: Array | float, scatters: CampaignSigmas) -> Array:
     """Effective degrees of freedom of a variance of which the first campaign has a share."""
     one, other = (scatter.degrees_of_freedom for scatter in scatters)
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / (np.square(share) / one + np.square(1.0 - share) / other))
 
 
-def _ratios(shares: Array, scatters: Scatters) -> tuple[Array, Array, Array, float]:
+def _ratios(shares: Array, scatters: CampaignSigmas) -> tuple[Array, Array, Array, float]:
     """At nodes (k,) of the ratio of both estimated sigmas where the true ones are the same: the
     shares of the first campaign (k, n), the variances of differences over what they are estimated
     as (k, n), weights (k,) of the nodes, and the degrees of freedom of both together.
@@ -182,7 +182,7 @@ def _ratios(shares: Array, scatters: Scatters) -> tuple[Array, Array, Array, flo
     return sigma[0] * true / estimated, 1.0 / estimated, weights, total
 
 
-def _freedom(scatters: Scatters) -> tuple[float, float]:
+def _freedom(scatters: CampaignSigmas) -> tuple[float, float]:
     one, other = (min(scatter.degrees_of_freedom, MANY) for scatter in scatters)
     return one, other
 
@@ -204,7 +204,7 @@ def _quantiles(count: int, one: float, other: float) -> tuple[Array, Array]:
     from scipy.special import betaincinv
 
     shares = np.linspace(0.0, 1.0, SHARES)
-    freedom = 0.5 * welch(shares, (Scatter(1.0, one), Scatter(1.0, other)))
+    freedom = 0.5 * welch(shares, (CampaignSigma(1.0, one), CampaignSigma(1.0, other)))
     return shares, freedom * (1.0 / betaincinv(freedom, 0.5 * count, LEVEL) - 1.0)
 
 

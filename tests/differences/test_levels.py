@@ -9,7 +9,12 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.campaign_tests import Scatter, joint_chance, orthonormal, single_chances
+from ballplate.results.campaign_tests import (
+    CampaignSigma,
+    joint_chance,
+    orthonormal,
+    single_chances,
+)
 from ballplate.results.differences.compared_maps import MappedValues, motions
 from ballplate.results.differences.comparison import ComparisonSettings, compared
 from ballplate.results.differences.normalised_errors import ValueDifference
@@ -80,7 +85,7 @@ def test_few_degrees_of_freedom_keep_the_level(shares: list[float]) -> None:
     for freedom in ((2, 2), (2, 50)):
         above = 0
         for _ in range(count):
-            both = [Scatter(float(np.sqrt(rng.chisquare(one) / one)), one) for one in freedom]
+            both = [CampaignSigma(float(np.sqrt(rng.chisquare(one) / one)), one) for one in freedom]
             parts = both[0].sigma ** 2 * of_first, both[1].sigma ** 2 * (1.0 - of_first)
             total = parts[0] + parts[1]
             squares = rng.normal(size=len(of_first)) ** 2 / total
@@ -90,13 +95,15 @@ def test_few_degrees_of_freedom_keep_the_level(shares: list[float]) -> None:
 
 def test_single_figures_follow_student() -> None:
     """Where both have the same degrees of freedom and shares, or one has everything."""
-    two = Scatter(0.7, 2), Scatter(1.6, 2)
+    two = CampaignSigma(0.7, 2), CampaignSigma(1.6, 2)
     share = 0.7**2 / (0.7**2 + 1.6**2)
-    assert single_chances(2.0, np.array([share]), two) == pytest.approx(2 * student.sf(2, 4))
-    unequal = Scatter(0.7, 2), Scatter(1.6, 50)
+    assert single_chances(2.0, np.array([share]), two) == pytest.approx(
+        2 * student.sf(2, 4), rel=1e-4
+    )
+    unequal = CampaignSigma(0.7, 2), CampaignSigma(1.6, 50)
     of_one = single_chances(2.0, np.array([1.0, 0.0]), unequal)
-    assert of_one == pytest.approx([2 * student.sf(2, 2), 2 * student.sf(2, 50)])
-    known = Scatter(1.0, np.inf), Scatter(1.0, np.inf)
+    assert of_one == pytest.approx([2 * student.sf(2, 2), 2 * student.sf(2, 50)], rel=1e-4)
+    known = CampaignSigma(1.0, np.inf), CampaignSigma(1.0, np.inf)
     assert single_chances(2.0, np.array([0.3]), known) == pytest.approx(2 * norm.sf(2), rel=1e-4)
 
 
@@ -139,7 +146,7 @@ class Pairs:
         """That of the joint test of a pair."""
         rng = self.generator
         errors = rng.normal(size=self.stated[0].shared.shape[1])
-        both = [Scatter(float(np.sqrt(rng.chisquare(one) / one)), one) for one in freedom]
+        both = [CampaignSigma(float(np.sqrt(rng.chisquare(one) / one)), one) for one in freedom]
         first, second = (
             self.drawn(one, errors, own.sigma) for one, own in zip(self.stated, both, strict=True)
         )

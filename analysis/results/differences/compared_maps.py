@@ -23,7 +23,7 @@ from ballplate.simulator.readings.same_readings import (
 )
 
 from ...error_maps.volumetric_errors import Volumetric
-from ..campaign_tests import Scatter
+from ..campaign_tests import CampaignSigma
 from ..fit import Fit
 from ..map_of_fit import data_of, maps_known
 
@@ -123,9 +123,9 @@ class ComparedMap:
         return self.model.dimension
 
     @property
-    def scatter(self) -> Scatter:
+    def scatter(self) -> CampaignSigma:
         """The campaign's sigma."""
-        return Scatter(self.sigma, self.degrees_of_freedom)
+        return CampaignSigma(self.sigma, self.degrees_of_freedom)
 
     def displacements(self, points: Array, offset: Array) -> MappedValues:
         """Errors (n d,) at scale readings `points` (n, d) of a tip with an `offset` (d,), in

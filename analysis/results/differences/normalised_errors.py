@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..campaign_tests import (
     HELD,
+    CampaignSigmas,
     JointDifference,
     Roots,
-    Scatters,
     joint_difference,
     orthonormal,
     single_chances,
@@ -92,7 +92,7 @@ class ValueDifference:
 
     first: MappedValues
     second: MappedValues
-    scatters: Scatters
+    scatters: CampaignSigmas
 
     @property
     def values(self) -> Array:

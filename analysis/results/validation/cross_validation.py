@@ -30,7 +30,7 @@ from ballplate.simulator.readings.same_readings import (
 
 from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
-from ..campaign_tests import Roots, Scatter, Scatters, joint_difference, with_common
+from ..campaign_tests import CampaignSigma, CampaignSigmas, Roots, joint_difference, with_common
 from .lack_of_fit import TOO_ALIKE, TOO_RARE, chance_words
 from .left_out import MOST_POINTS
 from .left_out_result import FAILED
@@ -251,9 +251,9 @@ def _fitted(
     return at, float(np.sqrt(left)) if is_estimated else 1.0
 
 
-def _scatter(at: Linearisation, scale: float, given: bool) -> Scatter:
+def _scatter(at: Linearisation, scale: float, given: bool) -> CampaignSigma:
     freedom = at.degrees_of_freedom
-    return Scatter(scale, np.inf if given or freedom <= 0 else freedom)
+    return CampaignSigma(scale, np.inf if given or freedom <= 0 else freedom)
 
 
 def _roots(
@@ -261,7 +261,7 @@ def _roots(
     x: tuple[Array, Array],
     rows: list[Array],
     have_common: bool,
-    scatters: Scatters,
+    scatters: CampaignSigmas,
 ) -> tuple[Roots, Array]:
     """Square roots (m, k) of both campaigns' parts of the covariance of differences of functions
     with derivatives `rows`, and of what it would be with nothing in common.
