@@ -145,7 +145,7 @@ class Pairs:
     def p(self, freedom: tuple[int, int]) -> float:
         """That of the joint test of a pair."""
         rng = self.generator
-        errors = rng.normal(size=self.stated[0].shared.shape[1])
+        errors = rng.normal(size=(self.stated[0].shared.shape[1],))
         both = [CampaignSigma(float(np.sqrt(rng.chisquare(one) / one)), one) for one in freedom]
         first, second = (
             self.drawn(one, errors, own.sigma) for one, own in zip(self.stated, both, strict=True)
