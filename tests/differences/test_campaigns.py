@@ -164,9 +164,9 @@ def test_what_a_certificate_does_is_what_another_value_of_it_would() -> None:
     apart = compared(maps[0], maps[1], SETTINGS).lengths[0].standard_uncertainties
     together = compared(first, second, SETTINGS).lengths[0].standard_uncertainties
     assert (together < apart).all()
-    own = np.concatenate([first.root, second.root], axis=1)
-    covariance = own @ own.T - first.shared @ second.shared.T - second.shared @ first.shared.T
-    assert np.linalg.eigvalsh(covariance).min() > 0.0
+    for before, one in zip(maps, (first, second), strict=True):
+        covariance = one.root @ one.root.T + one.shared @ one.shared.T
+        assert covariance == pytest.approx(before.root @ before.root.T, rel=1e-9, abs=1e-24)
 
 
 def test_other_certificates_are_not_shared() -> None:

@@ -24,6 +24,7 @@ from ballplate.simulator.readings.same_readings import (
 )
 
 from ...error_maps.volumetric_errors import Volumetric
+from ..campaign_tests import EstimatedSigma
 from ..fit import Fit
 from ..map_of_fit import data_of, maps_known
 
@@ -47,7 +48,8 @@ class MappedValues:
     """Functions (m,) with their `values`, a square `root` (m, r) of their covariance, and how much
     undetermined directions change them, `null` (m, k), of what any could, `size` (m,).
 
-    `shared` (m, q) is what the standard deviations of values that both maps rest on make of them.
+    `shared` (m, q) is what the standard deviations of values that both maps rest on make of them;
+    their part of the covariance is not in that of the root.
     """
 
     values: Array
@@ -84,15 +86,16 @@ class ComparedMap:
     """The errors of a machine by a `model` with the parameters `values` (n,), of which `root`
     (n, r) is a square root of the covariance and `undetermined` (n, k) what is open.
 
-    `shared` (n, q) is what one standard deviation of each value that both maps rest on changes.
-    `degrees_of_freedom` are those of the scatter that the uncertainties come from, infinite where
-    they are as stated. `offsets` are those of probes by name, `probe` the one that is meant where
-    none is named. Derivatives are taken at the parameters `about` (n,), by default the values; two
-    maps of the same model have them in common, as otherwise their spaces of errors would differ by
-    what is of second order. `fit` has the balls of plates, and `data` are the readings that the map
-    comes from with their `lack_of_fit`, where they are known; `cautions` are those of the fit.
-    `is_expected`: nothing was measured, and the map is exact but for what is stated, of which
-    `stated` is the standard uncertainty of lengths.
+    `shared` (n, q) is the effect of one standard deviation of each value that both maps rest on,
+    which is not in the root; `absorbed` (q, r) are its rows of the root of the hat matrix. `sigma`
+    is a factor of both, and `degrees_of_freedom` are those that it comes from, infinite where
+    uncertainties are as stated. `offsets` are those of probes by name, `probe` the one that is
+    meant where none is named. Derivatives are taken at the parameters `about` (n,), by default the
+    values; two maps of the same model have them in common, as otherwise their spaces of errors
+    would differ by what is of second order. `fit` has the balls of plates, and `data` are the
+    readings that the map comes from with their `lack_of_fit`, where they are known; `cautions` are
+    those of the fit. `is_expected`: nothing was measured, and the map is exact but for what is
+    stated, of which `stated` is the standard uncertainty of lengths.
     """
 
     label: str
@@ -110,7 +113,8 @@ class ComparedMap:
     fit: Fit | None = None
     is_expected: bool = False
     stated: LengthFunction | None = None
-    shared_balls: Array | None = None
+    absorbed: Array | None = None
+    sigma: float = 1.0
     about: Array | None = None
     data: MapData | None = None
     lack_of_fit: LackOfFit | None = None
@@ -120,6 +124,11 @@ class ComparedMap:
     def dimension(self) -> int:
         """2 or 3, the number of machine axes."""
         return self.model.dimension
+
+    @property
+    def scatter(self) -> EstimatedSigma:
+        """The campaign's sigma."""
+        return EstimatedSigma(self.sigma, self.degrees_of_freedom)
 
     def displacements(self, points: Array, offset: Array) -> MappedValues:
         """Errors (n d,) at scale readings `points` (n, d) of a tip with an `offset` (d,), in
@@ -184,6 +193,18 @@ class ComparedMap:
         names = (*MOTIONS[d], *(f"{name} of the probe" for name in MOTIONS[d][d:]))
         missing = np.linalg.norm(left, axis=0) > CONTAINED
         return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
+
+
+def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:
+    """A square root (m, k) of a covariance without the part of some errors, and the effects (m, q)
+    of one standard deviation of each; `absorbed` (q, k) are their rows of the root of the hat
+    matrix.
+    """
+    if absorbed is None:
+        return root, np.zeros((len(root), 0))
+    _, sizes, axes = np.linalg.svd(absorbed, full_matrices=False)
+    kept = np.sqrt(np.maximum(1.0 - sizes**2, 0.0))
+    return root - (root @ axes.T * (1.0 - kept)) @ axes, root @ absorbed.T
 
 
 def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
@@ -255,6 +276,7 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
         data=data_of(fit.observed, fit.experiment),
         lack_of_fit=fit.lack_of_fit,
         cautions=(*fit.cautions, fit.complaint),
+        sigma=fit.sigma,
     )
 
 

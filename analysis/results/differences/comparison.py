@@ -15,8 +15,9 @@ from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines, Integers
 
+from ..campaign_tests import orthonormal
 from .compared_maps import MOTIONS, ComparedMap, motions
-from .normalised_errors import FigureGroup, JointTest, ValueDifference, orthonormal
+from .normalised_errors import FigureGroup, JointTest, ValueDifference
 from .plates import PlateDifference, plate_differences
 
 # Places along an axis at which error functions are compared, by fractions of it.
@@ -107,12 +108,12 @@ def compared(
     first, second = _linearised_alike(first, second)
     volume = _common_volume(first, second)
     probe, offsets = _offsets(first, second, settings.probe)
-    freedom = first.degrees_of_freedom, second.degrees_of_freedom
+    scatters = first.scatter, second.scatter
     k = settings.coverage_factor
 
     def at(points: Array, offset: Array) -> ValueDifference:
         one, other = (each.displacements(points, offset) for each in (first, second))
-        return ValueDifference(one, other, freedom)
+        return ValueDifference(one, other, scatters)
 
     reference = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
     points = settings.points if isinstance(settings.points, np.ndarray) else reference
@@ -251,14 +252,12 @@ def _lengths(
     matrix[rows, pairs[:, 1]] = apart / length[:, None]
     matrix[rows, pairs[:, 0]] = -apart / length[:, None]
     names = tuple(f"{_place(points[i])} to {_place(points[j])}" for i, j in pairs.tolist())
-    group = found.by(matrix.reshape(len(pairs), -1)).group(kind, "m", names, coverage_factor)
-    stated = [one.stated.at(length) for one in maps if one.stated is not None]
-    if not stated:
-        return group
-    u = np.sqrt(group.standard_uncertainties**2 + sum(np.square(one) for one in stated))
-    freedom = group.degrees_of_freedom * (u / group.standard_uncertainties) ** 4
-    changed: dict[str, Any] = {"standard_uncertainties": u, "degrees_of_freedom": freedom}
-    return FigureGroup(**(vars(group) | changed))
+    first, second = (
+        0.0 if one.stated is None else np.square(one.stated.at(length)) for one in maps
+    )
+    return found.by(matrix.reshape(len(pairs), -1)).group(
+        kind, "m", names, coverage_factor, (first, second)
+    )
 
 
 def _functions(
@@ -273,7 +272,7 @@ def _functions(
     if not _have_same_functions(first.model, second.model) or set(names[0]) != set(names[1]):
         return (), "the models, or the conditions of their frames, differ"
     found = []
-    freedom = first.degrees_of_freedom, second.degrees_of_freedom
+    scatters = first.scatter, second.scatter
     dense = np.linspace(0.0, 1.0, 4 * max(len(first.values), 8))
     for name in names[0]:
         parameter = next(p for p in first.model.parameters if p.function == name)
@@ -288,10 +287,10 @@ def _functions(
         if one is None or other is None or whole is None or others is None:
             continue
         words = (name,) if constant else tuple(f"{name} at {100 * place:.0f} %" for place in t)
-        figures = ValueDifference(one, other, freedom).group(
+        figures = ValueDifference(one, other, scatters).group(
             name, parameter.unit, words, coverage_factor
         )
-        test = ValueDifference(whole, others, freedom).joint_test(name)
+        test = ValueDifference(whole, others, scatters).joint_test(name)
         found.append(FunctionDifference(name, parameter.meaning, figures, test))
     return tuple(found), "" if found else "the models have no error functions of one variable"
 
@@ -336,5 +335,5 @@ def _whole(at: Any, volume: Volume, offsets: dict[str, Array], count: int) -> Jo
         )
         for side, one in (("first", parts[0].first), ("second", parts[0].second))
     ]
-    found = ValueDifference(joined[0], joined[1], parts[0].freedom)
+    found = ValueDifference(joined[0], joined[1], parts[0].scatters)
     return found.without(basis).joint_test("errors through the volume")

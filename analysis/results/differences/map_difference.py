@@ -235,6 +235,11 @@ class MapDifference(Result):
         for one in self.tests:
             freedom = one.degrees_of_freedom
             scatter = "" if math.isinf(freedom) else f" (sigma of {freedom:.0f} degrees of freedom)"
+            if one.fixed:
+                scatter += (
+                    f", {one.fixed} more fixed by the certificate and not tested, the same to"
+                    f" {number(1e6 * one.held, 2)} µm"
+                )
             lines.append(
                 f"{one.what}, one joint test: chi-squared {number(one.statistic)} of"
                 f" {one.dimensions} independent differences{scatter}, p = {_chance(one.p)}:"
@@ -401,7 +406,7 @@ def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
         for name, is_in in zip(one.names, which, strict=True)
         if is_in
     )
-    freedom = [one.degrees_of_freedom[which] for one, which in zip(groups, compared, strict=True)]
+    chances = [one.chances[which] for one, which in zip(groups, compared, strict=True)]
     k = groups[0].coverage_factor
     return FigureGroup(
         "error functions",
@@ -409,7 +414,7 @@ def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
         tuple(names),
         k * np.concatenate(normalised),
         u,
-        np.concatenate(freedom),
+        np.concatenate(chances),
         k,
     )
 
@@ -451,7 +456,7 @@ def _test_data(test: JointTest) -> dict[str, Any]:
     return {
         "what": test.what,
         "chi_squared": test.statistic,
-        "dimensions": test.dimensions,
+        **picked(test, "dimensions", "fixed"),
         "degrees_of_freedom": finite(test.degrees_of_freedom),
         "p": test.p,
     }

@@ -9,9 +9,10 @@ from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.geometry.motions import AXIS_NAMES, fit_motion
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from ..campaign_tests import orthonormal
 from ..fit import Fit
-from .compared_maps import ComparedMap, MappedValues, motions
-from .normalised_errors import FigureGroup, JointTest, ValueDifference, orthonormal
+from .compared_maps import ComparedMap, MappedValues, motions, without_shared
+from .normalised_errors import FigureGroup, JointTest, ValueDifference
 
 # Balls of a plate beyond which it is not compared: their joint covariance takes too much memory.
 MOST_BALLS = 500
@@ -35,7 +36,7 @@ def plate_differences(
     if first.fit is None or second.fit is None:
         return ()
     found = []
-    freedom = first.degrees_of_freedom, second.degrees_of_freedom
+    scatters = first.scatter, second.scatter
     for name in _plates(first.fit):
         if name not in _plates(second.fit):
             continue
@@ -54,7 +55,7 @@ def plate_differences(
         shifted = turned.values + np.tile(origin, len(common))
         other = MappedValues(shifted, turned.root, turned.null, turned.size, turned.shared)
         moving = motions(places - places.mean(axis=0)).reshape(places.size, -1)
-        left = ValueDifference(one, other, freedom).without(orthonormal(moving))
+        left = ValueDifference(one, other, scatters).without(orthonormal(moving))
         names = tuple(f"{ball} {axis}" for ball in common for axis in AXIS_NAMES[:d])
         kind = f"balls of {name}"
         group = left.group(kind, "m", names, coverage_factor)
@@ -81,12 +82,11 @@ def _estimated(one: ComparedMap, index: Integers) -> MappedValues:
     assert one.fit is not None
     moved = displacements(one.fit.functions.at, BallPlaces(index))
     n, d = moved.places.shape
-    own = np.zeros((n, d, n, moved.own.shape[2]))
-    own[np.arange(n), :, np.arange(n)] = moved.own
+    balls = len(one.fit.design.balls.names)
+    own = np.zeros((n, d, balls, moved.own.shape[2]))
+    own[np.arange(n), :, index] = moved.own
     common = moved.common.reshape(n * d, -1)
     root: Array = one.fit.sigma * np.concatenate([common, own.reshape(n * d, -1)], axis=1)
-    shared = np.zeros((n * d, one.shared.shape[1]))
-    if one.shared_balls is not None:
-        shared = one.shared_balls[index].reshape(n * d, -1)
+    root, shared = without_shared(root, one.absorbed)
     null = moved.null.reshape(n * d, -1)
     return MappedValues(moved.places.ravel(), root, null, moved.size.ravel(), shared)

@@ -11,13 +11,16 @@ from ballplate.simulator.design.arrays import Design, Observations
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.joint_values import JointValues
-from ballplate.simulator.design.observations.lengths import Lengths, length_name
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.gauss_newton import newton_step
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design.observations.lengths import (
+    Lengths,
+    length_name,
+    length_whitening,
+)
+from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
+from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..fit import Fit
-from .compared_maps import ComparedMap
+from .compared_maps import ComparedMap, without_shared
 
 # Observations that are values of certificates, each with an error of its own.
 SINGLE = (CalibratedDistances, CalibratedCoordinates)
@@ -30,13 +33,13 @@ class NothingSharedError(ValueError):
 @dataclass(frozen=True, eq=False)
 class CertifiedErrors:
     """Errors of certified values that have a common cause: what one standard deviation of each
-    cause adds to the values of observations of a kind, `errors` (causes, m).
+    cause, `errors` (causes, m), adds to `rows` (m,) of all whitened observations.
 
     `key` identifies them: what they are, their values and their uncertainties.
     """
 
     key: tuple[object, ...]
-    observations: Observations
+    rows: Integers
     errors: Array
 
 
@@ -69,59 +72,67 @@ def with_shared_certificates(
     found = []
     for one, own in zip((first, second), both, strict=True):
         assert one.fit is not None
-        shared, balls = _effects(one.fit, [own[key] for key in common])
-        found.append(replace(one, shared=shared, shared_balls=balls))
+        absorbed = _absorbed(one.fit, [own[key] for key in common])
+        at = one.fit.functions.at
+        model = np.zeros((len(one.values), absorbed.shape[1]))
+        model[:, : at.rank] = one.fit.sigma * at.shared[at.layout.model]
+        root, shared = without_shared(model, absorbed)
+        found.append(replace(one, root=root, shared=shared, absorbed=absorbed))
     return found[0], found[1], count
 
 
 def _certified(design: Design) -> Iterator[CertifiedErrors]:
+    places = row_places(design)
     for one in design.observations:
+        start = places[one.word].start
         if isinstance(one, SINGLE):
             for k in range(len(one)):
-                single = np.zeros((1, len(one)))
-                single[0, k] = one.uncertainty[k]
-                yield _errors(one, (one.name(design, k),), [k], single)
+                errors = np.eye(1)[: int(one.uncertainty[k] > 0.0)]
+                yield _errors(one, (one.name(design, k),), [k], np.array([start + k]), errors)
         elif isinstance(one, Lengths):
             for number in np.unique(one.certificate).tolist():
                 own = np.flatnonzero(one.certificate == number).tolist()
-                errors = np.zeros((1, len(one)))
-                errors[0, own] = one.uncertainty[own]
-                yield _errors(one, (length_name(design, own[0], False),), own[:1], errors)
+                errors = np.where(one.certificate == number, one.uncertainty, 0.0)
+                whitened = design.once(length_whitening).whitened(errors[:, None]).T
+                rows = start + np.arange(whitened.shape[1])
+                kept = whitened[: int(errors.any())]
+                yield _errors(one, (length_name(design, own[0], False),), own[:1], rows, kept)
         elif isinstance(one, JointValues):
             names = tuple(one.name(design, k) for k in range(len(one)))
-            start = 0
+            first = 0
             for root in one.roots:
                 size = len(root.own)
-                errors = np.zeros((size, len(one)))
-                part = range(start, start + size)
-                errors[:, part] = root.drawn(np.eye(size))
-                yield _errors(one, names[part.start : part.stop], list(part), errors)
-                start += size
+                part = np.arange(first, first + size)
+                drawn = np.abs(root.drawn(np.eye(size))).max(axis=1)
+                errors = np.eye(size)[drawn > 0.0]
+                own_names = names[first : first + size]
+                yield _errors(one, own_names, part.tolist(), start + part, errors)
+                first += size
 
 
 def _errors(
-    one: Observations, names: tuple[str, ...], chosen: list[int], errors: Array
+    one: Observations, names: tuple[str, ...], chosen: list[int], rows: Integers, errors: Array
 ) -> CertifiedErrors:
     values = (*one.value[chosen].tolist(), *one.uncertainty[chosen].tolist())
-    kept = errors[np.abs(errors).max(axis=1) > 0.0]
     key = (type(one).__name__, *names, *(round(value, 12) for value in values))
-    return CertifiedErrors(key, one, kept)
+    return CertifiedErrors(key, rows, errors)
 
 
 @single_threaded
-def _effects(fit: Fit, certified: list[CertifiedErrors]) -> tuple[Array, Array]:
-    """What one standard deviation of each error changes: model parameters (n, q) and balls
-    (balls, d, q), in metres and radians.
+def _absorbed(fit: Fit, certified: list[CertifiedErrors]) -> Array:
+    """Rows (q, r) of the root of the hat matrix, of one standard deviation of each error: first the
+    columns that all balls share, and then each ball's own.
     """
-    design, solution, x = fit.design, fit.solution, fit.observed.x
-    layout = solution.factor.layout
-    at_rest = newton_step(design, solution.factor, solution.spectrum)
-    shared, balls = [], []
-    for one in certified:
-        for errors in one.errors:
-            changed = design.observed(one.observations.given(value=one.observations.value + errors))
-            factor = eliminate(changed, layout, solution.state, x)
-            step = newton_step(changed, factor, solution.spectrum)
-            shared.append(fit.sigma * (step[0] - at_rest[0])[layout.model])
-            balls.append(fit.sigma * (step[1] - at_rest[1]))
-    return np.stack(shared, axis=1), np.stack(balls, axis=2)
+    at = fit.functions.at
+    d, width = fit.design.dimension, at.balls.common.shape[2]
+    rows = np.unique(np.concatenate([one.rows for one in certified]))
+    hat = np.zeros((len(rows), width + d * len(fit.design.balls.names)))
+    place = np.full(row_count(fit.design), -1)
+    place[rows] = np.arange(len(rows))
+    for some in hat_rows(at, fit.observed.x):
+        to = place[some.rows]
+        hat[to[to >= 0], :width] = some.common[to >= 0]
+        alone = (to >= 0) & (some.ball >= 0)
+        columns = width + d * some.ball[alone][:, None] + np.arange(d)
+        hat[to[alone][:, None], columns] = some.own[alone]
+    return np.concatenate([one.errors @ hat[place[one.rows]] for one in certified])

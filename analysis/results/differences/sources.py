@@ -139,4 +139,5 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         data=side.data,
         lack_of_fit=side.lack_of_fit,
         cautions=(side.known_lack_of_fit.caution,),
+        sigma=side.sigma,
     )

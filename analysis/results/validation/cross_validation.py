@@ -31,11 +31,12 @@ from ballplate.simulator.readings.same_readings import (
 from ...presentation.formatting import aligned, as_data, number, picked
 from ...presentation.result import FitResult
 from ..campaign_sigmas import campaign_sigmas
-from .lack_of_fit import TOO_ALIKE, TOO_RARE, chance_of, chance_words
+from ..campaign_tests import EstimatedSigma, Roots, SigmaPair, joint_difference, with_common
+from .lack_of_fit import TOO_ALIKE, TOO_RARE, chance_words
 from .left_out import MOST_POINTS
 from .left_out_result import FAILED
 
-# Share of the largest singular value below which a combination of differences has no variance.
+# Share of the largest singular value below which a direction is rounding.
 FLAT = 1e-8
 
 
@@ -203,23 +204,21 @@ def cross_validate(
         correction_rows(at.design, at.layout, at.state, places, probes).reshape(len(change), -1)
         for at, _ in fits
     ]
-    root = _root(fits, (first.x, second.x), rows, common)
+    scatters = _scatter(one, scale_1, given), _scatter(two, scale_2, given)
+    roots, alone = _roots(fits, (first.x, second.x), rows, common, scatters)
     # Motions, and what the readings leave open, are no difference.
     free = [
         _motions(places),
         *(own @ at.shared_null for own, (at, _) in zip(rows, fits, strict=True)),
     ]
     free_of = _complement(np.concatenate(free, axis=1))
-    change, root = free_of @ change, free_of @ root
-    u, values, _ = np.linalg.svd(root, full_matrices=False)
-    used = values > FLAT * values.max(initial=0.0)
-    dimensions = int(used.sum())
-    if not dimensions:
+    change, alone = free_of @ change, free_of @ alone
+    roots = free_of @ roots[0], free_of @ roots[1]
+    root = np.hstack(roots)
+    test = joint_difference(change, roots, scatters, alone)
+    if test is None:
         raise refused(experiment.source, "the readings leave nothing to compare")
-    square = float((((u.T @ change)[used] / values[used]) ** 2).sum())
-    freedom = min(at.degrees_of_freedom for at, _ in fits)
     shape = places.shape
-    chance = chance_of(square, dimensions, float(freedom), freedom, given)
     return CrossValidation(
         experiment.label,
         experiment.title,
@@ -227,15 +226,15 @@ def cross_validate(
         places,
         change.reshape(shape),
         np.sqrt((root**2).sum(axis=1)).reshape(shape),
-        square,
-        dimensions,
-        chance,
+        test.statistic,
+        test.dimensions,
+        test.p,
         _largest_length(places, change, root),
         (scale_1, scale_2),
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         common,
         same_positions(first, second),
-        square > 0.0 and (given or freedom > 0) and 1.0 - chance < TOO_RARE,
+        test.statistic > 0.0 and 1.0 - test.p < TOO_RARE,
     )
 
 
@@ -255,13 +254,20 @@ def _fitted(
     return at, float(np.sqrt(left)) if is_estimated else 1.0
 
 
-def _root(
+def _scatter(at: Linearisation, scale: float, given: bool) -> EstimatedSigma:
+    freedom = at.degrees_of_freedom
+    return EstimatedSigma(scale, np.inf if given or freedom <= 0 else freedom)
+
+
+def _roots(
     fits: list[tuple[Linearisation, float]],
     x: tuple[Array, Array],
     rows: list[Array],
     have_common: bool,
-) -> Array:
-    """A square root (m, k) of the covariance of differences of functions with derivatives `rows`.
+    scatters: SigmaPair,
+) -> tuple[Roots, Array]:
+    """Square roots (m, k) of both campaigns' parts of the covariance of differences of functions
+    with derivatives `rows`, and of what it would be with nothing in common.
 
     Each estimate follows its observations by the root of the hat matrix. Certificates of plates are
     the same observations in both if they `have_common` ones.
@@ -279,8 +285,9 @@ def _root(
                 is_common[row_places(at.design)[one.word]] = True
         parts.append(scale * follows[:, ~is_common])
         common.append(follows[:, is_common])
-    scale = float(np.sqrt((fits[0][1] ** 2 + fits[1][1] ** 2) / 2.0))
-    return np.concatenate([*parts, scale * (common[1] - common[0])], axis=1)
+    scaled = [at[1] * own for at, own in zip(fits, common, strict=True)]
+    alone = np.hstack([*parts, *scaled])
+    return with_common((parts[0], parts[1]), common[1] - common[0], scatters), alone
 
 
 def _motions(places: Array) -> Array:

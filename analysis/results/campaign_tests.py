@@ -1,0 +1,221 @@
+"""Tests of the difference of two campaigns of which each may estimate its sigma.
+
+Welch's effective degrees of freedom come from the estimated shares of both campaigns. A campaign
+whose sigma came out too small has too small a share as well, so that a test by Welch's degrees of
+freedom is wrong if these are few. Here they only weight differences of unequal shares. The
+distribution of the weighted sum is computed for campaigns whose stated uncertainties are wrong by
+the same factor: the residual sum of squares of both is then chi-squared and independent of the
+ratio of both sigmas, over which the chance is integrated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.machines.protocol import Array
+
+# Standard uncertainties below this part of the largest of a group are rounding: the frame, or the
+# plate's axes, hold the figure.
+HELD = 1e-9
+# Parts of the largest column below which what is left of another is rounding.
+NO_DIRECTION = 1e-9
+# Standard deviation of a direction, in that which it would have with nothing in common, below which
+# what both campaigns have in common fixes it: estimates are linear to that at best.
+FIXED = 1e-3
+# Degrees of freedom that are as good as any number.
+MANY = 1e6
+# The level at which statistics of scatters of all shares are made alike, and at how many shares.
+LEVEL, SHARES = 0.05, 129
+# Nodes of the integral over the ratio of both sigmas.
+NODES = 100
+
+
+@dataclass(frozen=True)
+class EstimatedSigma:
+    """The `sigma` of a campaign, by which its stated uncertainties were multiplied, and the degrees
+    of freedom that it was estimated with, infinite where it is stated.
+    """
+
+    sigma: float
+    degrees_of_freedom: float
+
+
+SigmaPair = tuple[EstimatedSigma, EstimatedSigma]
+Roots = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class JointDifference:
+    """The test of differences together: `statistic` is their sum of squares, weighted with their
+    covariance, of as many `dimensions` as there are independent ones.
+
+    `degrees_of_freedom` are Welch's, of the mean share of both campaigns, and `p` is the chance of
+    so much where nothing has changed. What both campaigns have in common fixes `fixed` directions,
+    which are not tested; `held` is the largest difference along these.
+    """
+
+    statistic: float
+    dimensions: int
+    degrees_of_freedom: float
+    p: float
+    fixed: int = 0
+    held: float = 0.0
+
+
+def with_common(roots: Roots, common: Array, scatters: SigmaPair) -> Roots:
+    """Square roots (m, r) of both campaigns' parts of a covariance, with errors that both share:
+    `common` (m, q) is the effect of one standard deviation, as stated, on the difference.
+
+    Both sigmas estimate by how much such errors are stated too small, so that half of their
+    variance belongs to either campaign.
+    """
+    first, second = (
+        np.hstack([root, one.sigma * np.sqrt(0.5) * common])
+        for root, one in zip(roots, scatters, strict=True)
+    )
+    return first, second
+
+
+@single_threaded
+def joint_difference(
+    values: Array, roots: Roots, scatters: SigmaPair, alone: Array | None = None
+) -> JointDifference | None:
+    """Test differences (m,); `roots` are square roots (m, r) of both campaigns' parts of their
+    covariance. None where none has a variance.
+
+    `alone` (m, k) is a square root of the covariance that there would be with nothing in common.
+    """
+    alone = np.hstack(roots) if alone is None else alone
+    size = np.linalg.norm(alone, axis=1)
+    is_uncertain = size > HELD * size.max(initial=0.0)
+    size = size[is_uncertain]
+    scaled, *parts = (one[is_uncertain] / size[:, None] for one in (alone, *roots))
+    basis = orthonormal(scaled)
+    if not basis.shape[1]:
+        return None
+    linalg = scipy_linalg()
+    triangle = linalg.qr((basis.T @ scaled).T, mode="r")[0][: basis.shape[1]]
+
+    def whitened(some: Array) -> Array:
+        return np.asarray(linalg.solve_triangular(triangle, basis.T @ some, trans="T"))
+
+    difference, first, second = map(whitened, (values[is_uncertain] / size, *parts))
+    spread, directions = np.linalg.eigh(first @ first.T + second @ second.T)
+    is_fixed = spread <= FIXED**2
+    fixed = directions[:, is_fixed]
+    left = size * (basis @ (triangle.T @ (fixed @ (fixed.T @ difference))))
+    to_unit = (directions[:, ~is_fixed] / np.sqrt(spread[~is_fixed])).T
+    if not len(to_unit):
+        return None
+    shares, directions = np.linalg.eigh(to_unit @ first @ (to_unit @ first).T)
+    shares, squares = np.clip(shares, 0.0, 1.0), (directions.T @ to_unit @ difference) ** 2
+    return JointDifference(
+        float(squares.sum()),
+        len(squares),
+        float(welch(shares.mean(), scatters)),
+        joint_chance(squares, shares, scatters),
+        int(is_fixed.sum()),
+        float(np.abs(left).max()),
+    )
+
+
+def joint_chance(squares: Array, shares: Array, scatters: SigmaPair) -> float:
+    """The chance of so large `squares` (n,) of independent differences together, over variances of
+    which the first campaign has the estimated `shares` (n,).
+
+    >>> known, few = EstimatedSigma(1.0, np.inf), EstimatedSigma(1.0, 4)
+    >>> round(joint_chance(np.array([3.841459]), np.ones(1), (known, few)), 6)
+    0.05
+    >>> round(joint_chance(np.array([7.708647]), np.zeros(1), (known, few)), 5)
+    0.05
+    """
+    from scipy.special import chdtrc, fdtrc
+
+    count = len(squares)
+    if all(np.isinf(one.degrees_of_freedom) for one in scatters):
+        return float(chdtrc(count, squares.sum()))
+    grid, quantiles = _quantiles(count, *_freedom(scatters))
+    of_first, deviations, weights, total = _ratios(shares, scatters)
+    deviations = deviations / np.interp(of_first, grid, quantiles)
+    statistic = float((squares / np.interp(shares, grid, quantiles)).sum())
+    # A sum of squares of unequal variances, as one of equal variances with the same two moments.
+    first, second = deviations.sum(axis=1), (deviations**2).sum(axis=1)
+    return float(weights @ fdtrc(first**2 / second, total, statistic / first))
+
+
+def single_chances(limit: float, shares: Array, scatters: SigmaPair) -> Array:
+    """The chances (m,) that single differences are more than `limit` times their standard
+    uncertainty; the first campaign has the estimated `shares` (m,) of their variances.
+
+    >>> both = EstimatedSigma(1.0, 5), EstimatedSigma(2.0, 5)
+    >>> single_chances(2.228, np.array([0.2]), both).round(3)
+    array([0.05])
+    """
+    from scipy.special import fdtrc
+
+    _, deviations, weights, total = _ratios(shares, scatters)
+    return np.asarray(weights @ fdtrc(1.0, total, limit**2 / deviations))
+
+
+def welch(share: Array | float, scatters: SigmaPair) -> Array:
+    """Effective degrees of freedom of a variance of which the first campaign has a share."""
+    one, other = (scatter.degrees_of_freedom for scatter in scatters)
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / (np.square(share) / one + np.square(1.0 - share) / other))
+
+
+def _ratios(shares: Array, scatters: SigmaPair) -> tuple[Array, Array, Array, float]:
+    """At nodes (k,) of the ratio of both estimated sigmas where the true ones are the same: the
+    shares of the first campaign (k, n), the variances of differences over what they are estimated
+    as (k, n), weights (k,) of the nodes, and the degrees of freedom of both together.
+    """
+    one, other = _freedom(scatters)
+    part, weights = _nodes(one, other)
+    total = one + other
+    sigma = total * part / one, total * (1.0 - part) / other
+    own = shares / scatters[0].sigma ** 2, (1.0 - shares) / scatters[1].sigma ** 2
+    true = own[0] / (own[0] + own[1])
+    estimated = sigma[0] * true + sigma[1] * (1.0 - true)
+    return sigma[0] * true / estimated, 1.0 / estimated, weights, total
+
+
+def _freedom(scatters: SigmaPair) -> tuple[float, float]:
+    one, other = (min(scatter.degrees_of_freedom, MANY) for scatter in scatters)
+    return one, other
+
+
+@lru_cache(maxsize=16)
+def _nodes(one: float, other: float) -> tuple[Array, Array]:
+    """Parts (k, 1) of the first campaign in the residual sum of squares of both, and weights."""
+    from scipy.special import betaincinv
+
+    places, weights = np.polynomial.legendre.leggauss(NODES)
+    return betaincinv(0.5 * one, 0.5 * other, 0.5 * (1.0 + places))[:, None], 0.5 * weights
+
+
+@lru_cache(maxsize=256)
+def _quantiles(count: int, one: float, other: float) -> tuple[Array, Array]:
+    """Shares of the first campaign, and Fisher's quantile of so many differences at each, by which
+    a sum of squares is larger for a scatter of few degrees of freedom.
+    """
+    from scipy.special import betaincinv
+
+    shares = np.linspace(0.0, 1.0, SHARES)
+    freedom = 0.5 * welch(shares, (EstimatedSigma(1.0, one), EstimatedSigma(1.0, other)))
+    return shares, freedom * (1.0 / betaincinv(freedom, 0.5 * count, LEVEL) - 1.0)
+
+
+def orthonormal(columns: Array, least: float = NO_DIRECTION, largest: float | None = None) -> Array:
+    """An orthonormal basis (m, r) of the space of columns (m, n); what is left of a column, up to
+    the part `least` of the `largest`, by default that of the columns, is rounding.
+    """
+    if not columns.size:
+        return np.zeros((len(columns), 0))
+    # With pivots: singular values would say the same, but are not always found.
+    basis, triangle, _ = scipy_linalg().qr(columns, mode="economic", pivoting=True)
+    sizes = np.abs(np.diagonal(triangle))
+    limit = least * (float(sizes.max()) if largest is None else largest)
+    return np.asarray(basis[:, sizes > limit])
