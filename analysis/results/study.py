@@ -115,8 +115,8 @@ def fit(
     # Loaded only now, so that what plans and checks need not load answers sooner.
     from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 
-    from ..gross_errors.exact_values import diagnosis_of_all
     from ..gross_errors.leftover import too_many_entries
+    from ..gross_errors.refits import diagnosis_with_refits
     from ..gross_errors.suspects import Diagnosis
     from .estimates import estimated_functions, parameter_estimates
     from .fit import Fit
@@ -161,7 +161,7 @@ def fit(
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        Diagnosis() if untested else diagnosis_of_all(at, observed.x, freedom, estimated),
+        Diagnosis() if untested else diagnosis_with_refits(at, observed.x, freedom, estimated),
         untested,
         functions,
         found,

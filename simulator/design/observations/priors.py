@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar
 
 import numpy as np
@@ -49,6 +49,17 @@ class Priors(Observations):
     def of_model(self) -> Flags:
         """Which (m,) are about the error model."""
         return (self.position < 0) & (self.probe < 0) & (self.of_influence < 0)
+
+    def select(self, chosen: Integers) -> Priors:
+        """Some of them."""
+        arrays = {
+            one.name: getattr(self, one.name)[chosen]
+            for one in fields(self)
+            if isinstance(getattr(self, one.name), np.ndarray)
+        }
+        names = tuple(self.names[k] for k in chosen)
+        units = tuple(self.units[k] for k in chosen if k < len(self.units))
+        return replace(self, names=names, units=units, **arrays)
 
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
         weight = 1.0 / self.uncertainty

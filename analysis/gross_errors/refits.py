@@ -1,0 +1,279 @@
+"""Mistakes in an experiment file that estimates without them show: offsets of probes, and the
+arrangement of the axes.
+
+Offsets that are wrong by millimetres and another chain of axes are no small biases: their patterns
+at the wrong estimate explain little. The estimate is made anew with all offsets free, which gives
+the sum of squares of every single mistake in them, and once with each other arrangement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.estimation.gauss_newton import as_drawn, estimate, linearised_fit
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import KinematicModel
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.readings.wrong_offsets import (
+    WrongOffsets,
+    discrete_mistakes,
+    offset_differences,
+    stated_offsets,
+    with_offsets,
+)
+
+from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search
+from .exact_values import diagnosis_of_all
+from .leftover import HIDDEN
+from .suspects import Diagnosis, Refit
+from .tails import log_chance, normal_equivalent
+
+# Significance level of S^2 beyond which estimates are made anew, and of what a mistake may leave
+# more than all offsets free.
+TOO_LARGE = 1e-3
+
+# Offsets that a standard uncertainty of all readings does not show beyond this (m) are not.
+SMALLEST_OFFSET = 1.0
+
+# Share of S^2 below which a mistake is named although what it leaves shows more.
+NEARLY_ALL = 1e-2
+
+
+def diagnosis_with_refits(
+    at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
+) -> Diagnosis:
+    """What is suspected of the observations behind a fit, and of the file's offsets and arrangement.
+
+    Where S^2 is too large for what is stated, and no single cause explains that to first order, the
+    estimate is made anew without each mistake of these kinds. One is named if it explains S^2 and
+    what it leaves shows nothing that is unexplained; those that the readings do not distinguish
+    from it, together with it.
+    """
+    from scipy.special import chdtri
+
+    found = diagnosis_of_all(at, x, freedom, sigma_is_estimated)
+    few = found.unexplained is None and len(found.suspects) < 2
+    if few or at.factor.sum_of_squares <= float(chdtri(freedom, TOO_LARGE)):
+        return found
+    search = _Refits(at, x, freedom, sigma_is_estimated, found)
+    return search.offsets() or search.arrangements() or found
+
+
+@dataclass(frozen=True)
+class _Refits:
+    """A fit, and what was found of it to first order."""
+
+    at: Linearisation
+    x: Array
+    freedom: int
+    estimated: bool
+    found: Diagnosis
+
+    @property
+    def total(self) -> float:
+        return self.at.factor.sum_of_squares
+
+    def _log_p(self, left: float, dimensions: int) -> float:
+        """Logarithm of the chance that so little is left."""
+        square = max(self.total - left, 0.0)
+        return float(log_chance(square, self.total, max(dimensions, 1), self.freedom, False))
+
+    def _variance(self, left: float) -> float:
+        return max(left / self.freedom, 1.0) if self.estimated else 1.0
+
+    def _refit(self, design: Design) -> Linearisation | None:
+        solution = estimate(design, self.x)
+        return linearised_fit(design, solution) if solution.status == "converged" else None
+
+    def _remainder(self, at: Linearisation) -> Diagnosis | None:
+        """What is suspected beside a mistake; None where that leaves S^2 unexplained."""
+        left = at.factor.sum_of_squares
+        found = Search(at, self.x, at.degrees_of_freedom, self.estimated).found()
+        if left < NEARLY_ALL * self.total:
+            return found
+        clear = found.unexplained is None and (self.found.unexplained or not found.suspects)
+        return found if clear else None
+
+    def offsets(self) -> Diagnosis | None:
+        """A mistake in the offsets of probes; None where none explains S^2."""
+        design = self.at.design
+        free = _free_offsets(design, self.x, self.estimated)
+        if free is None:
+            return None
+        every = [(free.left(one), one) for one in discrete_mistakes(design)]
+        single = [(free.left(one), one) for one in free.single()]
+        least = min([free.least, *(left for left, _ in every)])
+        limit = math.log(0.5 * FAMILY / max(len(every) + len(single), 1))
+        for mistakes in (every, single):
+            possible = [
+                (left, one)
+                for left, one in mistakes
+                if left <= least + self._variance(least) * free.tolerance
+                and self._log_p(left, 0 if one.axes or len(one.probes) > 1 else 3) < limit
+            ]
+            if possible:
+                best = min(left for left, _ in possible)
+                near = best + 2.0 * LOG_ODDS_LIMIT * self._variance(least)
+                chosen = sorted((one for one in possible if one[0] <= near), key=lambda one: one[0])
+                return self._of_offsets([one for _, one in chosen], limit)
+        return None
+
+    def _of_offsets(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
+        design, mistake = self.at.design, mistakes[0]
+        if not mistake.is_off:
+            at = self._refit(with_offsets(design, mistake.change))
+            rest = None if at is None else self._remainder(at)
+            if at is None or rest is None:
+                return None
+            words = tuple(one.words(design) for one in mistakes)
+            cure = "correct the offsets under probes, or the names of probes in the readings"
+            return replace(rest, refit=self._told("probe", words, cure, at, limit))
+        (probe,) = mistake.probes
+        exact = _exact(design, stated_offsets(design) + mistake.change, np.array([probe]))
+        at = self._refit(exact)
+        rest = None if at is None else self._remainder(at)
+        if at is None or rest is None:
+            return None
+        search = Search(at, self.x, at.degrees_of_freedom, self.estimated)
+        statistic = normal_equivalent(self._log_p(at.factor.sum_of_squares, 3))
+
+        suspect = search.offset(probe, -mistake.change[probe], statistic, normal_equivalent(limit))
+        return replace(rest, suspects=(suspect, *rest.suspects))
+
+    def _told(
+        self, kind: str, words: tuple[str, ...], cure: str, at: Linearisation, limit: float
+    ) -> Refit:
+        left = at.factor.sum_of_squares
+        before, times = (math.sqrt(one / self.freedom) for one in (self.total, left))
+        statistic = normal_equivalent(self._log_p(left, 0))
+        return Refit(kind, words, cure, before, times, statistic, normal_equivalent(limit))
+
+    def arrangements(self) -> Diagnosis | None:
+        """Other arrangements of the axes that explain S^2; None where none does."""
+        design = self.at.design
+        model = design.model
+        if not isinstance(model, KinematicModel) or design.of(Priors).of_model.any():
+            return None
+        names: dict[object, list[str]] = {}
+        for name, arrangement in ARRANGEMENTS.items():
+            names.setdefault(arrangement, []).append(name)
+        fits = []
+        for arrangement in names:
+            if arrangement != model.arrangement:
+                at = self._refit(replace(design, model=replace(model, arrangement=arrangement)))
+                fits += [] if at is None else [(at.factor.sum_of_squares, arrangement, at)]
+        least, _, best = min(fits, key=lambda one: one[0])
+        limit = math.log(0.5 * FAMILY / len(names))
+        odds = 2.0 * LOG_ODDS_LIMIT * self._variance(least)
+        if self._log_p(least, 0) > limit or self.total - least < odds:
+            return None
+        rest = self._remainder(best)
+        if rest is None:
+            return None
+        near = sorted((one for one in fits if one[0] <= least + odds), key=lambda one: one[0])
+        words = tuple(
+            f"the arrangement of the axes is {' or '.join(names[one[1]])}" for one in near
+        )
+        cure = "correct arrangement under error_model"
+        return replace(rest, refit=self._told("arrangement", words, cure, best, limit))
+
+
+@dataclass(frozen=True)
+class _Offsets:
+    """S^2 as a function of the offsets, from an estimate with all of them free.
+
+    The norm of `root` (r, l d) times the difference of offsets from those estimated, plus `side`
+    (r,), is what readings leave; `prior` (l d,) are standard uncertainties of stated offsets, 0 of
+    exact ones. `tolerance` is what the right offsets leave more than the best at most.
+    """
+
+    design: Design
+    root: Array
+    side: Array
+    estimated: Array
+    prior: Array
+    tolerance: float
+
+    @property
+    def least(self) -> float:
+        """What the best offsets leave."""
+        return self._solved(np.zeros_like(self.prior), np.ones(len(self.prior), bool))[0]
+
+    def left(self, mistake: WrongOffsets) -> float:
+        """What is left with the offsets as they are but for a mistake."""
+        change, loose = mistake.change.ravel(), np.zeros(mistake.change.shape, bool)
+        loose[mistake.probes[0]] = mistake.is_off
+        return self._solved(change, loose.ravel())[0]
+
+    def single(self) -> Iterator[WrongOffsets]:
+        """Each probe as one whose offset is off, by as much as leaves least."""
+        shape = self.design.probes.offsets.shape
+        for probe in np.unique(self.design.readings.probe).tolist():
+            loose = np.arange(shape[0])[:, None] == probe
+            loose = np.broadcast_to(loose, shape)
+            _, change = self._solved(np.zeros(self.prior.shape), loose.ravel())
+            yield WrongOffsets((probe,), np.where(loose, change.reshape(shape), 0.0))
+
+    def _solved(self, stated: Array, loose: Array) -> tuple[float, Array]:
+        """The least that is left with offsets as `stated` (l d,) but for those that are `loose`
+        (l d,), and these offsets (l d,), all as changes of those in the file.
+        """
+        change = stated.copy()
+        moving = loose | (self.prior > 0.0)
+        change[moving] = self.estimated[moving]
+        side = self.side + self.root @ (change - self.estimated)
+        weight = np.where(
+            loose | (self.prior == 0.0),
+            0.0,
+            1.0 / np.where(moving & (self.prior > 0.0), self.prior, 1.0),
+        )
+        side = np.concatenate([side, weight * (change - stated)])
+        root = np.concatenate([self.root, np.diag(weight)])[:, moving]
+        size = np.maximum(np.abs(root).max(axis=0, initial=0.0), 1.0 / SMALLEST_OFFSET)
+        step = np.linalg.lstsq(root / size, -side, rcond=math.sqrt(HIDDEN))[0]
+        change[moving] += step / size
+        rest = side + root @ (step / size)
+        return float(rest @ rest), change
+
+
+def _free_offsets(design: Design, x: Array, sigma_is_estimated: bool) -> _Offsets | None:
+    """S^2 as a function of a design's offsets; None where the estimate with all of them free fails."""
+    from scipy.special import chdtri
+
+    stated, read = stated_offsets(design), np.unique(design.readings.probe)
+    shifts = offset_differences(design, x).shifts(len(stated))
+    known = _exact(design, stated + shifts, read)
+    free = np.isin(np.arange(len(stated)), read)[:, None] & np.ones(stated.shape, bool)
+    solution = estimate(replace(known, probes=replace(known.probes, free=free)), x)
+    if solution.status != "converged":
+        return None
+    exact = _exact(design, solution.state.probes, read)
+    at = linearise(exact, solution.state, x, as_drawn(exact))
+    search = Search(at, x, at.degrees_of_freedom, sigma_is_estimated)
+    given, chosen = search.patterns, search.patterns.of_kind("probe")
+    columns = np.zeros((len(search.left.residual), stated.size + 1))
+    places = stated.shape[1] * given.subject[chosen] + given.axis[chosen]
+    columns[:, places] = search.left.of(given.matrix[:, chosen].toarray())
+    columns[:, -1] = search.left.residual
+    root = np.linalg.qr(columns, mode="r")
+    priors, prior = design.of(Priors), np.zeros(stated.shape)
+    rows = np.flatnonzero(priors.probe >= 0)
+    prior[priors.probe[rows], priors.component[rows]] = priors.uncertainty[rows]
+    change = (solution.state.probes - stated).ravel()
+    tolerance = float(chdtri(stated.size, TOO_LARGE))
+    return _Offsets(design, root[:, :-1], root[:, -1], change, prior.ravel(), tolerance)
+
+
+def _exact(design: Design, offsets: Array, probes: Integers) -> Design:
+    """The design with some probes' offsets, out of `offsets` (l, d), as exact ones."""
+    priors, mine = design.of(Priors), np.isin(np.arange(len(offsets)), probes)[:, None]
+    kept = np.flatnonzero((priors.probe < 0) | ~np.isin(priors.probe, probes))
+    old = design.probes
+    new = replace(old, offsets=np.where(mine, offsets, old.offsets), free=old.free & ~mine)
+    return replace(design, probes=new).observed(priors.select(kept))
