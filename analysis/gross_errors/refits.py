@@ -11,15 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import as_drawn, estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from ballplate.simulator.machines.kinematic import KinematicModel
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.plane import PlaneModel
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from ballplate.simulator.readings.wrong_offsets import (
     WrongOffsets,
     discrete_mistakes,
@@ -33,6 +35,8 @@ from .exact_values import diagnosis_of_all
 from .leftover import HIDDEN
 from .suspects import Diagnosis, Refit
 from .tails import log_chance, normal_equivalent
+
+Made = TypeVar("Made")
 
 # Significance level of S^2 beyond which estimates are made anew, and of what a mistake may leave
 # more than all offsets free.
@@ -48,18 +52,18 @@ NEARLY_ALL = 1e-2
 def diagnosis_with_refits(
     at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
 ) -> Diagnosis:
-    """What is suspected of the observations behind a fit, and of the file's offsets and arrangement.
+    """What is suspected of the observations behind a fit, and of its offsets and arrangement.
 
-    Where S^2 is too large for what is stated, and no single cause explains that to first order, the
-    estimate is made anew without each mistake of these kinds. One is named if it explains S^2 and
-    what it leaves shows nothing that is unexplained; those that the readings do not distinguish
+    Where nothing explains the residuals to first order, or only several causes a S^2 that is too
+    large, the estimate is made anew without each mistake of these kinds. One is named if
+    it explains S^2 and leaves nothing unexplained; those that the readings do not distinguish
     from it, together with it.
     """
     from scipy.special import chdtri
 
     found = diagnosis_of_all(at, x, freedom, sigma_is_estimated)
-    few = found.unexplained is None and len(found.suspects) < 2
-    if few or at.factor.sum_of_squares <= float(chdtri(freedom, TOO_LARGE)):
+    is_small = at.factor.sum_of_squares <= float(chdtri(max(freedom, 1), TOO_LARGE))
+    if found.unexplained is None and (is_small or len(found.suspects) < 2):
         return found
     search = _Refits(at, x, freedom, sigma_is_estimated, found)
     return search.offsets() or search.arrangements() or found
@@ -75,6 +79,76 @@ class _Refits:
     estimated: bool
     found: Diagnosis
 
+    def offsets(self) -> Diagnosis | None:
+        """A mistake in the offsets of probes; None where none explains S^2."""
+        design = self.at.design
+        free = _free_offsets(design, self.x, self.estimated)
+        if free is None:
+            return None
+        kinds = [
+            [(free.left(one), one) for one in every]
+            for every in (discrete_mistakes(design), free.single())
+        ]
+        least = min([free.least, *(left for left, _ in kinds[0])])
+        most = least + self._variance(least) * free.tolerance
+        limit = math.log(0.5 * FAMILY / max(sum(map(len, kinds)), 1))
+        for mistakes, dimensions in zip(kinds, (1, design.dimension), strict=True):
+            possible = [
+                one
+                for one in mistakes
+                if one[0] <= most and self._log_p(one[0], dimensions) < limit
+            ]
+            near = self._near(possible)
+            found = self._of_offsets(near, limit) if near else None
+            if found:
+                return found
+        return None
+
+    def _of_offsets(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
+        """What is suspected with the first of some mistakes."""
+        design, first = self.at.design, mistakes[0]
+        if not first.is_off:
+            words = tuple(one.words(design) for one in mistakes)
+            cure = "correct the offsets under probes, or the names of probes in the readings"
+            return self._named("probe", words, cure, with_offsets(design, first.change), limit)
+        exact = _exact(design, stated_offsets(design) + first.change, np.array(first.probes))
+        found = self._without(exact)
+        if found is None:
+            return None
+        search, rest = found
+        log_p = self._log_p(search.sum_of_squares, design.dimension)
+        statistics = normal_equivalent(log_p), normal_equivalent(limit)
+        suspect = search.offset(first.probes[0], -first.change[first.probes[0]], *statistics)
+        return replace(rest, suspects=(suspect, *rest.suspects))
+
+    def arrangements(self) -> Diagnosis | None:
+        """Other arrangements of the axes that explain S^2; None where none does."""
+        design = self.at.design
+        model = design.model
+        chain = model.spatial if isinstance(model, PlaneModel) else model
+        if not isinstance(chain, KinematicModel) or design.of(Priors).of_model.any():
+            return None
+        names: dict[Arrangement, list[str]] = {}
+        for name, arrangement in ARRANGEMENTS.items():
+            if arrangement != chain.arrangement:
+                names.setdefault(arrangement, []).append(name)
+        fits = []
+        for arrangement in names:
+            other: ErrorModel = replace(chain, arrangement=arrangement)
+            other = replace(model, spatial=other) if isinstance(model, PlaneModel) else other
+            solution = estimate(replace(design, model=other), self.x)
+            if solution.status == "converged":
+                fits.append((solution.factor.sum_of_squares, (arrangement, other)))
+        near, limit = self._near(fits), math.log(0.5 * FAMILY / len(names))
+        least = min((left for left, _ in fits), default=self.total)
+        if not near or self._log_p(least, 1) > limit or self.total - least < self._odds(least):
+            return None
+        words = tuple(
+            f"the arrangement of the axes is {' or '.join(names[one])}" for one, _ in near
+        )
+        cure = "correct arrangement under error_model"
+        return self._named("arrangement", words, cure, replace(design, model=near[0][1]), limit)
+
     @property
     def total(self) -> float:
         return self.at.factor.sum_of_squares
@@ -82,106 +156,47 @@ class _Refits:
     def _log_p(self, left: float, dimensions: int) -> float:
         """Logarithm of the chance that so little is left."""
         square = max(self.total - left, 0.0)
-        return float(log_chance(square, self.total, max(dimensions, 1), self.freedom, False))
+        return float(log_chance(square, self.total, dimensions, self.freedom, False))
 
     def _variance(self, left: float) -> float:
         return max(left / self.freedom, 1.0) if self.estimated else 1.0
 
-    def _refit(self, design: Design) -> Linearisation | None:
+    def _odds(self, least: float) -> float:
+        """What one explanation leaves more than another that clearly is the better."""
+        return 2.0 * LOG_ODDS_LIMIT * self._variance(least)
+
+    def _near(self, fits: list[tuple[float, Made]]) -> list[Made]:
+        """Of explanations with what they leave, those that the best does not clearly beat."""
+        fits = sorted(fits, key=lambda one: one[0])
+        return [one for left, one in fits if left <= fits[0][0] + self._odds(fits[0][0])]
+
+    def _without(self, design: Design) -> tuple[Search, Diagnosis] | None:
+        """The search of what a design without a mistake leaves, and what it finds; None where that
+        remains unexplained.
+        """
         solution = estimate(design, self.x)
-        return linearised_fit(design, solution) if solution.status == "converged" else None
-
-    def _remainder(self, at: Linearisation) -> Diagnosis | None:
-        """What is suspected beside a mistake; None where that leaves S^2 unexplained."""
-        left = at.factor.sum_of_squares
-        found = Search(at, self.x, at.degrees_of_freedom, self.estimated).found()
-        if left < NEARLY_ALL * self.total:
-            return found
-        clear = found.unexplained is None and (self.found.unexplained or not found.suspects)
-        return found if clear else None
-
-    def offsets(self) -> Diagnosis | None:
-        """A mistake in the offsets of probes; None where none explains S^2."""
-        design = self.at.design
-        free = _free_offsets(design, self.x, self.estimated)
-        if free is None:
+        if solution.status != "converged":
             return None
-        every = [(free.left(one), one) for one in discrete_mistakes(design)]
-        single = [(free.left(one), one) for one in free.single()]
-        least = min([free.least, *(left for left, _ in every)])
-        limit = math.log(0.5 * FAMILY / max(len(every) + len(single), 1))
-        for mistakes in (every, single):
-            possible = [
-                (left, one)
-                for left, one in mistakes
-                if left <= least + self._variance(least) * free.tolerance
-                and self._log_p(left, 0 if one.axes or len(one.probes) > 1 else 3) < limit
-            ]
-            if possible:
-                best = min(left for left, _ in possible)
-                near = best + 2.0 * LOG_ODDS_LIMIT * self._variance(least)
-                chosen = sorted((one for one in possible if one[0] <= near), key=lambda one: one[0])
-                return self._of_offsets([one for _, one in chosen], limit)
+        at = linearised_fit(design, solution)
+        search = Search(at, self.x, at.degrees_of_freedom, self.estimated)
+        found = search.found()
+        is_clear = found.unexplained is None and (self.found.unexplained or not found.suspects)
+        if is_clear or solution.factor.sum_of_squares < NEARLY_ALL * self.total:
+            return search, found
         return None
 
-    def _of_offsets(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
-        design, mistake = self.at.design, mistakes[0]
-        if not mistake.is_off:
-            at = self._refit(with_offsets(design, mistake.change))
-            rest = None if at is None else self._remainder(at)
-            if at is None or rest is None:
-                return None
-            words = tuple(one.words(design) for one in mistakes)
-            cure = "correct the offsets under probes, or the names of probes in the readings"
-            return replace(rest, refit=self._told("probe", words, cure, at, limit))
-        (probe,) = mistake.probes
-        exact = _exact(design, stated_offsets(design) + mistake.change, np.array([probe]))
-        at = self._refit(exact)
-        rest = None if at is None else self._remainder(at)
-        if at is None or rest is None:
+    def _named(
+        self, kind: str, words: tuple[str, ...], cure: str, design: Design, limit: float
+    ) -> Diagnosis | None:
+        """A mistake with what is suspected of the design without it."""
+        found = self._without(design)
+        if found is None:
             return None
-        search = Search(at, self.x, at.degrees_of_freedom, self.estimated)
-        statistic = normal_equivalent(self._log_p(at.factor.sum_of_squares, 3))
-
-        suspect = search.offset(probe, -mistake.change[probe], statistic, normal_equivalent(limit))
-        return replace(rest, suspects=(suspect, *rest.suspects))
-
-    def _told(
-        self, kind: str, words: tuple[str, ...], cure: str, at: Linearisation, limit: float
-    ) -> Refit:
-        left = at.factor.sum_of_squares
+        search, rest = found
+        left = search.sum_of_squares
         before, times = (math.sqrt(one / self.freedom) for one in (self.total, left))
-        statistic = normal_equivalent(self._log_p(left, 0))
-        return Refit(kind, words, cure, before, times, statistic, normal_equivalent(limit))
-
-    def arrangements(self) -> Diagnosis | None:
-        """Other arrangements of the axes that explain S^2; None where none does."""
-        design = self.at.design
-        model = design.model
-        if not isinstance(model, KinematicModel) or design.of(Priors).of_model.any():
-            return None
-        names: dict[object, list[str]] = {}
-        for name, arrangement in ARRANGEMENTS.items():
-            names.setdefault(arrangement, []).append(name)
-        fits = []
-        for arrangement in names:
-            if arrangement != model.arrangement:
-                at = self._refit(replace(design, model=replace(model, arrangement=arrangement)))
-                fits += [] if at is None else [(at.factor.sum_of_squares, arrangement, at)]
-        least, _, best = min(fits, key=lambda one: one[0])
-        limit = math.log(0.5 * FAMILY / len(names))
-        odds = 2.0 * LOG_ODDS_LIMIT * self._variance(least)
-        if self._log_p(least, 0) > limit or self.total - least < odds:
-            return None
-        rest = self._remainder(best)
-        if rest is None:
-            return None
-        near = sorted((one for one in fits if one[0] <= least + odds), key=lambda one: one[0])
-        words = tuple(
-            f"the arrangement of the axes is {' or '.join(names[one[1]])}" for one in near
-        )
-        cure = "correct arrangement under error_model"
-        return replace(rest, refit=self._told("arrangement", words, cure, best, limit))
+        statistics = normal_equivalent(self._log_p(left, 1)), normal_equivalent(limit)
+        return replace(rest, refit=Refit(kind, words, cure, before, times, *statistics))
 
 
 @dataclass(frozen=True)
@@ -243,7 +258,7 @@ class _Offsets:
 
 
 def _free_offsets(design: Design, x: Array, sigma_is_estimated: bool) -> _Offsets | None:
-    """S^2 as a function of a design's offsets; None where the estimate with all of them free fails."""
+    """S^2 as a function of a design's offsets; None where the estimate with free ones fails."""
     from scipy.special import chdtri
 
     stated, read = stated_offsets(design), np.unique(design.readings.probe)
