@@ -32,7 +32,8 @@ from ballplate.simulator.readings.wrong_offsets import (
 
 from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search
 from .exact_values import diagnosis_of_all
-from .leftover import HIDDEN
+from .leftover import HIDDEN, leftover
+from .patterns import patterns
 from .suspects import Diagnosis, Refit
 from .tails import log_chance, normal_equivalent
 
@@ -82,7 +83,7 @@ class _Refits:
     def offsets(self) -> Diagnosis | None:
         """A mistake in the offsets of probes; None where none explains S^2."""
         design = self.at.design
-        free = _free_offsets(design, self.x, self.estimated)
+        free = _free_offsets(design, self.x)
         if free is None:
             return None
         kinds = [
@@ -90,7 +91,7 @@ class _Refits:
             for every in (discrete_mistakes(design), free.single())
         ]
         least = min([free.least, *(left for left, _ in kinds[0])])
-        most = least + self._variance(least) * free.tolerance
+        most = min(least + self._variance(least) * free.tolerance, self.total - self._odds(least))
         limit = math.log(0.5 * FAMILY / max(sum(map(len, kinds)), 1))
         for mistakes, dimensions in zip(kinds, (1, design.dimension), strict=True):
             possible = [
@@ -257,7 +258,7 @@ class _Offsets:
         return float(rest @ rest), change
 
 
-def _free_offsets(design: Design, x: Array, sigma_is_estimated: bool) -> _Offsets | None:
+def _free_offsets(design: Design, x: Array) -> _Offsets | None:
     """S^2 as a function of a design's offsets; None where the estimate with free ones fails."""
     from scipy.special import chdtri
 
@@ -270,12 +271,12 @@ def _free_offsets(design: Design, x: Array, sigma_is_estimated: bool) -> _Offset
         return None
     exact = _exact(design, solution.state.probes, read)
     at = linearise(exact, solution.state, x, as_drawn(exact))
-    search = Search(at, x, at.degrees_of_freedom, sigma_is_estimated)
-    given, chosen = search.patterns, search.patterns.of_kind("probe")
-    columns = np.zeros((len(search.left.residual), stated.size + 1))
+    rest, given = leftover(at, x, at.degrees_of_freedom), patterns(exact, solution.state, x)
+    chosen = given.of_kind("probe")
+    columns = np.zeros((len(rest.residual), stated.size + 1))
     places = stated.shape[1] * given.subject[chosen] + given.axis[chosen]
-    columns[:, places] = search.left.of(given.matrix[:, chosen].toarray())
-    columns[:, -1] = search.left.residual
+    columns[:, places] = rest.of(given.matrix[:, chosen].toarray())
+    columns[:, -1] = rest.residual
     root = np.linalg.qr(columns, mode="r")
     priors, prior = design.of(Priors), np.zeros(stated.shape)
     rows = np.flatnonzero(priors.probe >= 0)

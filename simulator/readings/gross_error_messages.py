@@ -34,8 +34,14 @@ def refuse_gross_errors(
     :raises ExperimentError: some readings are wrong; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
-    if positions or readings:
-        _refuse_wrong_offsets(design, x, positions, readings, marks)
+    mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
+    if mistakes:
+        causes = ", or if ".join(one.words(design) for one in mistakes)
+        text = (
+            f"the readings with different probes fit one another only if {causes}: correct the"
+            " offsets under probes, or the names of probes in the readings"
+        )
+        raise marks[0].refused(text)
     if positions:
         seen = x + design.probes.offsets[design.readings.probe]
         mistaken = mistaken_positions(design, design.readings, seen)
@@ -64,28 +70,6 @@ def refuse_gross_errors(
         ]
     if messages:
         raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
-
-
-def _refuse_wrong_offsets(
-    design: Design,
-    x: Array,
-    positions: Sequence[WrongPosition],
-    readings: Sequence[WrongReading],
-    marks: Sequence[Mark],
-) -> None:
-    """Refuse readings that are wrong since one offset of a probe is, or two are exchanged.
-
-    :raises ExperimentError: one such mistake explains nearly all of what is wrong.
-    """
-    of_positions = np.isin(design.readings.position, [one.position for one in positions])
-    mistakes = wrong_offsets(design, x, int(of_positions.sum()) + len(readings))
-    if mistakes:
-        causes = ", or if ".join(one.words(design) for one in mistakes)
-        text = (
-            f"the readings with different probes fit one another only if {causes}: correct the"
-            " offsets under probes, or the names of probes in the readings"
-        )
-        raise marks[0].refused(text)
 
 
 def with_names_swapped(

@@ -13,8 +13,9 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from ..design.arrays import Design, measured, read_in_positions
+from ..design.arrays import Design, Readings, measured, read_in_positions
 from ..design.objects import Flags
+from ..design.observations.lengths import Lengths
 from ..design.observations.priors import Priors
 from ..design.observations.readings import seen_places
 from ..estimation.consensus import consensus_motion
@@ -183,21 +184,29 @@ def offset_differences(design: Design, x: Array) -> OffsetDifferences:
     )
 
 
-def wrong_offsets(design: Design, x: Array, wrong: int) -> list[WrongOffsets]:
-    """Single mistakes in the offsets that explain nearly all of `wrong` readings, of scale readings
-    x (m, d): signs and exchanges, or, where none does, one probe's offset that is off.
+def wrong_offsets(design: Design, readings: Readings, x: Array) -> list[WrongOffsets]:
+    """Single mistakes in the offsets that explain nearly all that is wrong with scale readings
+    x (m, d) of plates: signs and exchanges, or, where none does, one probe's offset that is off.
     """
+    plates = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
+    x, none = x[plates], np.zeros(0, np.int64)
+    design = replace(design, readings=readings.select(plates))
+    design = design.observed(design.of(Lengths).select(none))
     found, probes = offset_differences(design, x), len(design.probes.names)
     plain = np.abs(found.left(np.zeros((probes, design.dimension)))).max(initial=0.0)
-    pitch = float(ball_pitches(design)[design.readings.ball].min())
+    pitch = float(ball_pitches(design)[design.readings.ball].min(initial=np.inf))
     limit = min(AGAINST_READINGS * pitch, LEFT_WRONG * float(plain))
 
-    def explains(mistake: WrongOffsets) -> bool:
-        if np.abs(found.left(mistake.change)).max() > limit:
-            return False
-        positions, readings = find_gross_errors(with_offsets(design, mistake.change), x)
-        return not positions and len(readings) <= LEFT_WRONG * wrong
+    def wrong(mistake: Array) -> int:
+        positions, others = find_gross_errors(with_offsets(design, mistake), x)
+        lost = np.isin(design.readings.position, [one.position for one in positions])
+        return int(lost.sum()) + len(others)
 
+    def explains(mistake: WrongOffsets) -> bool:
+        fits = np.abs(found.left(mistake.change)).max(initial=0.0) <= limit
+        return bool(fits) and wrong(mistake.change) <= most
+
+    most = LEFT_WRONG * wrong(np.zeros_like(design.probes.offsets))
     count = np.bincount(found.probe, found.count, probes)
     shown = np.flatnonzero(count >= LEAST_READINGS).tolist()
     discrete = (one for one in discrete_mistakes(design) if set(one.probes) & set(shown))
