@@ -43,9 +43,6 @@ Made = TypeVar("Made")
 # more than all offsets free.
 TOO_LARGE = 1e-3
 
-# Offsets that a standard uncertainty of all readings does not show beyond this (m) are not.
-SMALLEST_OFFSET = 1.0
-
 # Share of S^2 below which a mistake is named although what it leaves shows more.
 NEARLY_ALL = 1e-2
 
@@ -111,7 +108,7 @@ class _Refits:
         if not first.is_off:
             words = tuple(one.words(design) for one in mistakes)
             cure = "correct the offsets under probes, or the names of probes in the readings"
-            return self._named("probe", words, cure, with_offsets(design, first.change), limit)
+            return self._named("offsets", words, cure, with_offsets(design, first.change), limit)
         exact = _exact(design, stated_offsets(design) + first.change, np.array(first.probes))
         found = self._without(exact)
         if found is None:
@@ -206,7 +203,8 @@ class _Offsets:
 
     The norm of `root` (r, l d) times the difference of offsets from those estimated, plus `side`
     (r,), is what readings leave; `prior` (l d,) are standard uncertainties of stated offsets, 0 of
-    exact ones. `tolerance` is what the right offsets leave more than the best at most.
+    exact ones, and `size` (l d,) what readings change by a change of each. `tolerance` is what the
+    right offsets leave more than the best at most.
     """
 
     design: Design
@@ -214,6 +212,7 @@ class _Offsets:
     side: Array
     estimated: Array
     prior: Array
+    size: Array
     tolerance: float
 
     @property
@@ -230,7 +229,8 @@ class _Offsets:
     def single(self) -> Iterator[WrongOffsets]:
         """Each probe as one whose offset is off, by as much as leaves least."""
         shape = self.design.probes.offsets.shape
-        for probe in np.unique(self.design.readings.probe).tolist():
+        shown = (self.root**2).sum(axis=0) > HIDDEN * self.size**2
+        for probe in np.flatnonzero(shown.reshape(shape).any(axis=1)).tolist():
             loose = np.arange(shape[0])[:, None] == probe
             loose = np.broadcast_to(loose, shape)
             _, change = self._solved(np.zeros(self.prior.shape), loose.ravel())
@@ -251,7 +251,7 @@ class _Offsets:
         )
         side = np.concatenate([side, weight * (change - stated)])
         root = np.concatenate([self.root, np.diag(weight)])[:, moving]
-        size = np.maximum(np.abs(root).max(axis=0, initial=0.0), 1.0 / SMALLEST_OFFSET)
+        size = np.maximum(self.size[moving], weight[moving])
         step = np.linalg.lstsq(root / size, -side, rcond=math.sqrt(HIDDEN))[0]
         change[moving] += step / size
         rest = side + root @ (step / size)
@@ -275,7 +275,9 @@ def _free_offsets(design: Design, x: Array) -> _Offsets | None:
     chosen = given.of_kind("probe")
     columns = np.zeros((len(rest.residual), stated.size + 1))
     places = stated.shape[1] * given.subject[chosen] + given.axis[chosen]
-    columns[:, places] = rest.of(given.matrix[:, chosen].toarray())
+    biases = given.matrix[:, chosen].toarray()
+    columns[:, places], size = rest.of(biases), np.zeros(stated.size)
+    size[places] = np.linalg.norm(biases, axis=0)
     columns[:, -1] = rest.residual
     root = np.linalg.qr(columns, mode="r")
     priors, prior = design.of(Priors), np.zeros(stated.shape)
@@ -283,7 +285,8 @@ def _free_offsets(design: Design, x: Array) -> _Offsets | None:
     prior[priors.probe[rows], priors.component[rows]] = priors.uncertainty[rows]
     change = (solution.state.probes - stated).ravel()
     tolerance = float(chdtri(stated.size, TOO_LARGE))
-    return _Offsets(design, root[:, :-1], root[:, -1], change, prior.ravel(), tolerance)
+    parts = root[:, :-1], root[:, -1], change, prior.ravel(), np.maximum(size, 1.0)
+    return _Offsets(design, *parts, tolerance)
 
 
 def _exact(design: Design, offsets: Array, probes: Integers) -> Design:

@@ -93,7 +93,7 @@ class Refit:
     """A mistake in the experiment file that an estimate without it shows: one of `causes`, in
     words, which the readings do not distinguish.
 
-    Residuals are `times` as large as stated without it, `before` with it. `kind` is probe or
+    Residuals are `times` as large as stated without it, `before` with it. `kind` is offsets or
     arrangement.
     """
 

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from itertools import combinations, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -47,7 +47,7 @@ UNCERTAIN = 2e-6
 # Three probes in each position, of oblique offsets.
 OBLIQUE = """
 title: oblique
-machine: {volume: [800 mm, 600 mm, 500 mm], repeatability: 0.4 um}
+machine: {volume: [800 mm, 600 mm, 700 mm], repeatability: 0.4 um}
 error_model: {kind: kinematic, arrangement: MB1, position_coefficients: 4, rotation_coefficients: 3}
 true_machine: {kind: random, position: 3 um, rotation: 6 urad, seed: 3}
 probes:
@@ -86,24 +86,27 @@ class Mistake:
 
 @dataclass(frozen=True)
 class Plan:
-    """A design, what of it a clean fit leaves, and the non-centrality that is detected."""
+    """A design whose offsets may be wrong."""
 
     design: Design
-    search: Search
-    least: float
+
+    @cached_property
+    def search(self) -> Search:
+        """What is left of readings without a mistake."""
+        design, x = drawn(self.design, np.zeros(self.design.probes.offsets.shape), 0)
+        at = linearised_fit(design, estimate(design, x))
+        return Search(at, x, at.degrees_of_freedom, True)
 
     def detectable(self, change: Real) -> float:
         """A change (l, d) of the offsets in minimal detectable biases."""
-        design, rows = self.design, np.zeros(len(self.search.start.residual))
-        if design.probes.free.any():
-            priors = design.of(Priors)
-            of_priors = change[priors.probe, priors.component] / priors.uncertainty
-            rows[row_places(design)["prior"]] = of_priors
-        else:
-            given, chosen = self.search.patterns, self.search.patterns.of_kind("probe")
-            rows = given.matrix[:, chosen] @ change[given.subject[chosen], given.axis[chosen]]
+        given, priors = self.search.patterns, self.design.of(Priors)
+        chosen = given.of_kind("probe")
+        rows = given.matrix[:, chosen] @ change[given.subject[chosen], given.axis[chosen]]
+        of_priors = change[priors.probe, priors.component] / priors.uncertainty
+        rows[row_places(self.design)["prior"]] += of_priors
         left = self.search.start.of(rows[:, None])[:, 0]
-        return float(np.sqrt(left @ left) / self.least)
+        least = noncentrality(0.5 * FAMILY / self.search.tests, 0.8, self.search.freedom - 1)
+        return float(np.sqrt(left @ left) / least)
 
 
 def text_of(name: str, is_uncertain: bool) -> str:
@@ -118,12 +121,8 @@ def text_of(name: str, is_uncertain: bool) -> str:
 @cache
 def plan(name: str, is_uncertain: bool, folder: Path) -> Plan:
     design = lay_out(experiment(folder, text_of(name, is_uncertain)))
-    assert design.probes.free.all() == is_uncertain
-    read, x = drawn(design, np.zeros(design.probes.offsets.shape), 0)
-    at = linearised_fit(read, estimate(read, x))
-    search = Search(at, x, at.degrees_of_freedom, True)
-    least = noncentrality(0.5 * FAMILY / search.tests, 0.8, at.degrees_of_freedom - 1)
-    return Plan(design, search, least)
+    assert design.probes.free.any() == is_uncertain
+    return Plan(design)
 
 
 def drawn(design: Design, change: Real, seed: int) -> tuple[Design, Real]:
