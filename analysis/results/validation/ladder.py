@@ -240,9 +240,7 @@ def ladder(
         faults = (*faults, unconfirmed)
     elif not (unconfirmed or faults or beaten.count):
         unsure = NO_RICHER
-    mistakes = _mistakes(
-        next(one for one in fits if one.model.words == file.words), observed.x, given
-    )
+    mistakes = _mistakes(fits, file, observed.x, given)
     scale = chosen.sigma(given)
     rungs = (
         Rung(
@@ -259,7 +257,6 @@ def ladder(
         )
         for one in fits
     )
-    lengths = uncertainties(chosen.at, scale, None, ("U6",))["U6"]
     return Ladder(
         experiment.label,
         experiment.title,
@@ -274,7 +271,7 @@ def ladder(
         _lack_of_fit(chosen.fitted, repeats),
         beaten,
         found.beyond,
-        lengths,
+        uncertainties(chosen.at, scale, None, ("U6",))["U6"],
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         tuple(filter(None, (unsure, _untested(chosen.at.design)))),
         bool(mistakes),
@@ -356,10 +353,11 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
     )
 
 
-def _mistakes(fit: RungFit, x: Array, given: bool) -> tuple[str, ...]:
-    """Mistakes in the file's offsets or arrangement that explain an S^2 that is too large, in
-    words.
+def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, given: bool) -> tuple[str, ...]:
+    """Mistakes in the file's offsets or arrangement that explain an S^2 of its own model that is
+    too large, in words.
     """
+    fit = next(one for one in fits if one.model.words == file.words)
     square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
     if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
         return ()
