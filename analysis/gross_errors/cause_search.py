@@ -360,11 +360,15 @@ class Search:
                 *one.range,
             )
 
-    def offset(self, probe: int, excess: Array, statistic: float, limit: float) -> Suspect:
-        """A probe's offset as a suspect that was stated by an `excess` (d,) larger than here."""
+    def offset(self, probe: int, excess: Array, statistic: float, limit: float) -> Suspect | None:
+        """A probe's offset as a suspect that was stated by an `excess` (d,) larger than here; None
+        where it hardly shows.
+        """
         given = self.patterns
         columns = given.of_kind("probe")
         columns = self._testable(columns[given.subject[columns] == probe])
+        if not len(columns):
+            return None
         (suspect,) = self._told([_Chosen(columns, 0.0, (-1, -1), ())])
         values = suspect.values + excess[given.axis[columns]]
         return replace(suspect, values=values, statistic=statistic, limit=limit)

@@ -32,7 +32,7 @@ from ballplate.simulator.readings.wrong_offsets import (
 
 from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search
 from .exact_values import diagnosis_of_all
-from .leftover import HIDDEN, leftover
+from .leftover import leftover
 from .patterns import patterns
 from .suspects import Diagnosis, Refit
 from .tails import log_chance, normal_equivalent
@@ -42,6 +42,10 @@ Made = TypeVar("Made")
 # Significance level of S^2 beyond which estimates are made anew, and of what a mistake may leave
 # more than all offsets free.
 TOO_LARGE = 1e-3
+
+# Part of what an offset changes that residuals have to show: with small rotations they show little
+# of one that all readings of a position have in common. No offset is off by more (m).
+SHOWN, LARGEST_CHANGE = 1e-7, 0.2
 
 # Share of S^2 below which a mistake is named although what it leaves shows more.
 NEARLY_ALL = 1e-2
@@ -109,15 +113,20 @@ class _Refits:
             words = tuple(one.words(design) for one in mistakes)
             cure = "correct the offsets under probes, or the names of probes in the readings"
             return self._named("offsets", words, cure, with_offsets(design, first.change), limit)
-        exact = _exact(design, stated_offsets(design) + first.change, np.array(first.probes))
+        (probe,) = first.probes
+        exact = _exact(design, stated_offsets(design) + first.change, np.array([probe]))
         found = self._without(exact)
         if found is None:
             return None
         search, rest = found
         log_p = self._log_p(search.sum_of_squares, design.dimension)
         statistics = normal_equivalent(log_p), normal_equivalent(limit)
-        suspect = search.offset(first.probes[0], -first.change[first.probes[0]], *statistics)
-        return replace(rest, suspects=(suspect, *rest.suspects))
+        suspect = search.offset(probe, -first.change[probe], *statistics)
+        if suspect:
+            return replace(rest, suspects=(suspect, *rest.suspects))
+        names = (design.probes.names[one.probes[0]] for one in mistakes)
+        words = tuple(f"the offset of probe {name} is another one" for name in names)
+        return self._named("offsets", words, "qualify the probe again", exact, limit)
 
     def arrangements(self) -> Diagnosis | None:
         """Other arrangements of the axes that explain S^2; None where none does."""
@@ -223,18 +232,19 @@ class _Offsets:
     def left(self, mistake: WrongOffsets) -> float:
         """What is left with the offsets as they are but for a mistake."""
         change, loose = mistake.change.ravel(), np.zeros(mistake.change.shape, bool)
-        loose[mistake.probes[0]] = mistake.is_off
+        loose[list(mistake.probes)] = mistake.is_off
         return self._solved(change, loose.ravel())[0]
 
     def single(self) -> Iterator[WrongOffsets]:
         """Each probe as one whose offset is off, by as much as leaves least."""
         shape = self.design.probes.offsets.shape
-        shown = (self.root**2).sum(axis=0) > HIDDEN * self.size**2
+        shown = np.sqrt((self.root**2).sum(axis=0)) > SHOWN * self.size
         for probe in np.flatnonzero(shown.reshape(shape).any(axis=1)).tolist():
             loose = np.arange(shape[0])[:, None] == probe
             loose = np.broadcast_to(loose, shape)
             _, change = self._solved(np.zeros(self.prior.shape), loose.ravel())
-            yield WrongOffsets((probe,), np.where(loose, change.reshape(shape), 0.0))
+            if np.abs(change).max() <= LARGEST_CHANGE:
+                yield WrongOffsets((probe,), np.where(loose, change.reshape(shape), 0.0))
 
     def _solved(self, stated: Array, loose: Array) -> tuple[float, Array]:
         """The least that is left with offsets as `stated` (l d,) but for those that are `loose`
@@ -252,7 +262,7 @@ class _Offsets:
         side = np.concatenate([side, weight * (change - stated)])
         root = np.concatenate([self.root, np.diag(weight)])[:, moving]
         size = np.maximum(self.size[moving], weight[moving])
-        step = np.linalg.lstsq(root / size, -side, rcond=math.sqrt(HIDDEN))[0]
+        step = np.linalg.lstsq(root / size, -side, rcond=SHOWN)[0]
         change[moving] += step / size
         rest = side + root @ (step / size)
         return float(rest @ rest), change
@@ -279,14 +289,14 @@ def _free_offsets(design: Design, x: Array) -> _Offsets | None:
     columns[:, places], size = rest.of(biases), np.zeros(stated.size)
     size[places] = np.linalg.norm(biases, axis=0)
     columns[:, -1] = rest.residual
-    root = np.linalg.qr(columns, mode="r")
+    root: Array = np.linalg.qr(columns, mode="r")
     priors, prior = design.of(Priors), np.zeros(stated.shape)
     rows = np.flatnonzero(priors.probe >= 0)
     prior[priors.probe[rows], priors.component[rows]] = priors.uncertainty[rows]
     change = (solution.state.probes - stated).ravel()
     tolerance = float(chdtri(stated.size, TOO_LARGE))
-    parts = root[:, :-1], root[:, -1], change, prior.ravel(), np.maximum(size, 1.0)
-    return _Offsets(design, *parts, tolerance)
+    size = np.maximum(size, 1.0)
+    return _Offsets(design, root[:, :-1], root[:, -1], change, prior.ravel(), size, tolerance)
 
 
 def _exact(design: Design, offsets: Array, probes: Integers) -> Design:
