@@ -122,10 +122,15 @@ class _Refits:
         log_p = self._log_p(search.sum_of_squares, design.dimension)
         statistics = normal_equivalent(log_p), normal_equivalent(limit)
         suspect = search.offset(probe, -first.change[probe], *statistics)
+        names = {one.probes[0]: design.probes.names[one.probes[0]] for one in mistakes}
         if suspect:
+            given = suspect.patterns
+            every = np.array([one[0] for one in (suspect.columns, *suspect.alternatives)])
+            told = given.subject[every[given.kind[every] == "probe"]]
+            others = (f"offset of probe {name}" for k, name in names.items() if k not in told)
+            suspect = replace(suspect, of_model=(*others, *suspect.of_model))
             return replace(rest, suspects=(suspect, *rest.suspects))
-        names = (design.probes.names[one.probes[0]] for one in mistakes)
-        words = tuple(f"the offset of probe {name} is another one" for name in names)
+        words = tuple(f"the offset of probe {name} is another one" for name in names.values())
         return self._named("offsets", words, "qualify the probe again", exact, limit)
 
     def arrangements(self) -> Diagnosis | None:

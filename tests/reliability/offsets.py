@@ -103,7 +103,7 @@ class Plan:
         chosen = given.of_kind("probe")
         rows = given.matrix[:, chosen] @ change[given.subject[chosen], given.axis[chosen]]
         of_priors = change[priors.probe, priors.component] / priors.uncertainty
-        rows[row_places(self.design)["prior"]] += of_priors
+        rows[row_places(self.search.design)["prior"]] += of_priors
         left = self.search.start.of(rows[:, None])[:, 0]
         least = noncentrality(0.5 * FAMILY / self.search.tests, 0.8, self.search.freedom - 1)
         return float(np.sqrt(left @ left) / least)
