@@ -15,6 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import as_drawn, estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
@@ -245,13 +246,12 @@ class _Offsets:
         shape = self.design.probes.offsets.shape
         shown = np.sqrt((self.root**2).sum(axis=0)) > SHOWN * self.size
         for probe in np.flatnonzero(shown.reshape(shape).any(axis=1)).tolist():
-            loose = np.arange(shape[0])[:, None] == probe
-            loose = np.broadcast_to(loose, shape)
+            loose = np.broadcast_to(np.arange(shape[0])[:, None] == probe, shape)
             _, change = self._solved(np.zeros(self.prior.shape), loose.ravel())
             if np.abs(change).max() <= LARGEST_CHANGE:
                 yield WrongOffsets((probe,), np.where(loose, change.reshape(shape), 0.0))
 
-    def _solved(self, stated: Array, loose: Array) -> tuple[float, Array]:
+    def _solved(self, stated: Array, loose: Flags) -> tuple[float, Array]:
         """The least that is left with offsets as `stated` (l d,) but for those that are `loose`
         (l d,), and these offsets (l d,), all as changes of those in the file.
         """
@@ -294,7 +294,7 @@ def _free_offsets(design: Design, x: Array) -> _Offsets | None:
     columns[:, places], size = rest.of(biases), np.zeros(stated.size)
     size[places] = np.linalg.norm(biases, axis=0)
     columns[:, -1] = rest.residual
-    root: Array = np.linalg.qr(columns, mode="r")
+    root = np.asarray(np.linalg.qr(columns, mode="r"))
     priors, prior = design.of(Priors), np.zeros(stated.shape)
     rows = np.flatnonzero(priors.probe >= 0)
     prior[priors.probe[rows], priors.component[rows]] = priors.uncertainty[rows]

@@ -521,7 +521,8 @@ class Fit(FitResult):
             )
             if has_exact_values(self.design):
                 cure += "; several values that are stated as exact may be wrong, too"
-            if self.diagnosis and not self.diagnosis.unexplained:
+            shown = self.diagnosis
+            if shown.suspects or shown.scatter or shown.refit:
                 cure = "see what is suspected"
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
         if self.without_scatter:

@@ -53,7 +53,7 @@ class WrongOffsets:
         """What is wrong."""
         names = [design.probes.names[k] for k in self.probes]
         if len(names) > 1:
-            return f"the offsets of probes {listing(names)} are exchanged"
+            return f"the offsets of probes {' and '.join(names)} are exchanged"
         offset = stated_offsets(design)[self.probes[0]]
         if self.axes:
             letters = listing(AXIS_NAMES[k] for k in self.axes)

@@ -163,7 +163,7 @@ def mistakes(design: Design) -> Iterator[Mistake]:
     for one, other in combinations(range(len(names)), 2):
         change = np.zeros_like(offsets)
         change[one], change[other] = offsets[other] - offsets[one], offsets[one] - offsets[other]
-        exchanged = (f"the offsets of probes {names[one]}, {names[other]} are exchanged",)
+        exchanged = (f"the offsets of probes {names[one]} and {names[other]} are exchanged",)
         yield Mistake(f"{names[one]} and {names[other]}", change, exchanged, "exchange")
 
 
