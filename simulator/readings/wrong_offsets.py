@@ -212,3 +212,13 @@ def wrong_offsets(design: Design, readings: Readings, x: Array) -> list[WrongOff
     discrete = (one for one in discrete_mistakes(design) if set(one.probes) & set(shown))
     single = (WrongOffsets((k,), found.shift_of(k, probes)) for k in shown)
     return list(filter(explains, discrete)) or list(filter(explains, single))
+
+
+def only_position(design: Design, probe: int) -> int:
+    """The one position of a plate that was read with a probe and with others; -1 where there are
+    several, or none.
+    """
+    position, probes = design.readings.position, design.readings.probe
+    mine = np.unique(position[probes == probe])
+    shared = [k for k in mine.tolist() if len(np.unique(probes[position == k])) > 1]
+    return shared[0] if len(shared) == 1 else -1

@@ -14,6 +14,7 @@ from ballplate.gross_errors.refits import diagnosis_with_refits
 from ballplate.gross_errors.wording import diagnosis_words
 from ballplate.results.validation.ladder import ladder
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.readings.wrong_offsets import (
     WrongOffsets,
@@ -96,6 +97,19 @@ def test_differences_of_offsets_are_those_of_the_readings(folder: Path) -> None:
     shifts = found.shifts(len(change))
     np.testing.assert_allclose(shifts - shifts.mean(axis=0), expected, atol=1e-4)
     assert np.abs(found.left(change)).max() < 1e-4 < 0.01 < np.abs(found.left(0.0 * change)).max()
+
+
+def test_a_probe_of_one_position_may_be_an_artefact_that_moved(folder: Path) -> None:
+    both = "quarter_turns: 1, probes: [right, left]"
+    assert DESIGNS["few balls"].count("probes: [right, left]") == 2
+    text = DESIGNS["few balls"].replace("probes: [right, left]", "probes: [right]")
+    text = text.replace("quarter_turns: 1, probes: [right]", both)
+    given = Plan(lay_out(experiment(folder, text)))
+    (said,) = sentences(given, mistake(given, "x of left by 10 mm"), 7)
+    assert "the offset of probe left is another one (x is -40 mm, not -50 mm)" in said
+    assert said.endswith(
+        "; or the artefact moved in position near between the probes: read it again"
+    )
 
 
 def test_nothing_is_estimated_anew_where_nothing_is_unexplained(
