@@ -126,7 +126,7 @@ class _Refits:
         names = {one.probes[0]: design.probes.names[one.probes[0]] for one in mistakes}
         if suspect:
             given = suspect.patterns
-            every = np.array([one[0] for one in (suspect.columns, *suspect.alternatives)])
+            every = np.array([suspect.columns[0], *(one[0] for one in suspect.alternatives)])
             told = given.subject[every[given.kind[every] == "probe"]]
             others = (f"offset of probe {name}" for k, name in names.items() if k not in told)
             suspect = replace(suspect, of_model=(*others, *suspect.of_model))
