@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -374,6 +374,19 @@ class Search:
                 ),
                 *one.range,
             )
+
+    def offset(self, probe: int, excess: Array, statistic: float, limit: float) -> Suspect | None:
+        """A probe's offset as a suspect that was stated by an `excess` (d,) larger than here; None
+        where it hardly shows.
+        """
+        given = self.patterns
+        columns = given.of_kind("probe")
+        columns = self._testable(columns[given.subject[columns] == probe])
+        if not len(columns):
+            return None
+        (suspect,) = self._told([_Chosen(columns, 0.0, (-1, -1), ())])
+        values = suspect.values + excess[given.axis[columns]]
+        return replace(suspect, values=values, statistic=statistic, limit=limit)
 
     def _alternatives(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
         """Patterns of other causes that leave the same residuals."""

@@ -89,16 +89,36 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class Refit:
+    """A mistake in the experiment file that an estimate without it shows: one of `causes`, in
+    words, which the readings do not distinguish.
+
+    Residuals are `times` as large as stated without it, `before` with it. `kind` is offsets or
+    arrangement.
+    """
+
+    kind: str
+    causes: tuple[str, ...]
+    cure: str
+    before: float
+    times: float
+    statistic: float
+    limit: float
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """What the residuals show: mistakes, readings that scatter more, or that no single gross error
     explains them.
 
-    Readings may scatter more beside mistakes, or beside what no single gross error explains.
+    Readings may scatter more beside mistakes, or beside what no single gross error explains. With a
+    `refit` all else is what that leaves.
     """
 
     suspects: tuple[Suspect, ...] = ()
     scatter: MoreScatter | None = None
     unexplained: Unexplained | None = None
+    refit: Refit | None = None
 
     def __bool__(self) -> bool:
-        return bool(self.suspects or self.scatter or self.unexplained)
+        return bool(self.suspects or self.scatter or self.unexplained or self.refit)

@@ -20,7 +20,7 @@ from ..rank.proposed_bars import listed
 from .cause_search import FAMILY, MOST
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
-from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
+from .suspects import Diagnosis, MoreScatter, Refit, Suspect, Unexplained
 
 # A direction of a cause is told from so many standard uncertainties on.
 CLEAR = 3.0
@@ -40,7 +40,8 @@ def diagnosis_lines(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[st
 
 def diagnosis_words(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
     """What is suspected, mistakes first."""
-    words = [suspect_words(one, marks) for one in diagnosis.suspects]
+    words = [refit_words(diagnosis.refit)] if diagnosis.refit else []
+    words += [suspect_words(one, marks) for one in diagnosis.suspects]
     words += [scatter_words(diagnosis.scatter)] if diagnosis.scatter else []
     return words + ([unexplained_words(diagnosis.unexplained)] if diagnosis.unexplained else [])
 
@@ -54,6 +55,16 @@ def suspect_words(suspect: Suspect, marks: Sequence[Mark] = ()) -> str:
     ]
     told = f"; it cannot be distinguished from {listing(others)}" if others else ""
     return f"{what} {_significance(suspect)}{told}; {cure}"
+
+
+def refit_words(refit: Refit) -> str:
+    """Which mistakes in the file explain the residuals, and what to do."""
+    told = "; the readings do not distinguish these" if len(refit.causes) > 1 else ""
+    return (
+        f"{', or '.join(refit.causes)}: then the residuals are {number(refit.times, 3)} times as"
+        f" large as stated, not {number(refit.before, 3)} {_significance(refit)}{told};"
+        f" {refit.cure}"
+    )
 
 
 def scatter_words(scatter: MoreScatter) -> str:
@@ -91,7 +102,7 @@ def _scatter_place(scatter: MoreScatter) -> str:
     return f"with probe {scatter.design.probes.names[scatter.of.probe]}"
 
 
-def _significance(cause: Suspect | MoreScatter | Unexplained) -> str:
+def _significance(cause: Suspect | MoreScatter | Unexplained | Refit) -> str:
     return f"(statistic {number(cause.statistic, 3)}, limit {number(cause.limit, 3)})"
 
 
@@ -101,6 +112,8 @@ def _cause_name(given: Patterns, columns: Sequence[int]) -> str:
     if given.kind[columns[0]] == "distance" and len(columns) > 1:
         ball = common_ball(given.design, given.subject[list(columns)])
         return f"all certified distances of ball {given.design.ball_label(ball)}"
+    if given.kind[columns[0]] == "probe" and len(columns) > 1:
+        return f"offset of probe {given.design.probes.names[given.subject[columns[0]]]}"
     return told if len(columns) == 1 else told.rpartition(", ")[0]
 
 
@@ -296,7 +309,12 @@ def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
 
 def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
     """What is suspected as plain data in metres, radians and ratios."""
-    told = [_suspect_data(one, marks) for one in diagnosis.suspects]
+    told = []
+    if diagnosis.refit:
+        refit = diagnosis.refit
+        told.append(_other_data(refit.causes[0], refit.kind, refit, refit_words(refit)))
+        told[0]["alternatives"] = list(refit.causes[1:])
+    told += [_suspect_data(one, marks) for one in diagnosis.suspects]
     if diagnosis.scatter:
         what = f"scatter of the readings {_scatter_place(diagnosis.scatter)}"
         told.append(
@@ -342,7 +360,7 @@ def _suspect_data(suspect: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
 
 
 def _other_data(
-    what: str, kind: str, cause: MoreScatter | Unexplained, words: str
+    what: str, kind: str, cause: MoreScatter | Unexplained | Refit, words: str
 ) -> dict[str, Any]:
     return {
         "name": what,

@@ -548,7 +548,8 @@ class Fit(FitResult):
             )
             if has_exact_values(self.design):
                 cure += "; several values that are stated as exact may be wrong, too"
-            if self.diagnosis.suspects or self.diagnosis.scatter:
+            shown = self.diagnosis
+            if shown.suspects or shown.scatter or shown.refit:
                 cure = "see what is suspected"
             times = self.lack_of_fit.times
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")

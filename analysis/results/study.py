@@ -116,8 +116,8 @@ def fit(
     # Loaded only now, so that what plans and checks need not load answers sooner.
     from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 
-    from ..gross_errors.exact_values import diagnosis_of_all
     from ..gross_errors.leftover import too_many_entries
+    from ..gross_errors.refits import diagnosis_with_refits
     from ..gross_errors.suspects import Diagnosis
     from .campaign_sigmas import campaign_sigmas
     from .estimates import estimated_functions, parameter_estimates
@@ -142,7 +142,7 @@ def fit(
     scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
     untested, diagnosis = too_many_entries(design), Diagnosis()
     if not untested:
-        diagnosis = diagnosis_of_all(at, observed.x, own, estimated)
+        diagnosis = diagnosis_with_refits(at, observed.x, own, estimated)
     found = None
     if components is not None:
         found = _variance_components(experiment, at, observed.x, components)

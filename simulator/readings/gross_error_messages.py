@@ -18,6 +18,7 @@ from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
+from .wrong_offsets import only_position, wrong_offsets
 
 
 def refuse_gross_errors(
@@ -33,6 +34,18 @@ def refuse_gross_errors(
     :raises ExperimentError: some readings are wrong; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
+    mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
+    if mistakes:
+        causes = ", or if ".join(one.words(design) for one in mistakes)
+        text = (
+            f"the readings with different probes fit one another only if {causes}: correct the"
+            " offsets under probes, or the names of probes in the readings"
+        )
+        only = only_position(design, mistakes[0].probes[0])
+        if mistakes[0].is_off and only >= 0:
+            name = design.positions.names[only]
+            text += f"; or the artefact moved in position {name} between the probes: read it again"
+        raise marks[0].refused(text)
     if positions:
         seen = x + design.probes.offsets[design.readings.probe]
         mistaken = mistaken_positions(design, design.readings, seen)

@@ -22,6 +22,7 @@ from ..machines.protocol import Array
 from .common_causes import TURNED, poses_found
 from .coordinate_kinds import controller_offsets
 from .gross_errors import AGAINST_DRAWING, ball_pitches
+from .wrong_offsets import wrong_offsets
 
 # One hypothesis is right and another wrong if the readings scatter so many times more with the
 # latter, and by so many repeatabilities.
@@ -174,6 +175,9 @@ def doubt_about_offsets(
             text += (
                 "; or write part instead, since the artefact stands turned against the plan in them"
             )
+    if taken == HYPOTHESES[0].name:
+        mistakes = wrong_offsets(design, readings, x)
+        text += "".join(f"; or {one.words(design)}" for one in mistakes)
     raise mark.refused(text)
 
 

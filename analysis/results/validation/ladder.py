@@ -25,6 +25,8 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ...gross_errors.exact_values import diagnosis_of_all
 from ...gross_errors.leftover import too_many_entries
+from ...gross_errors.refits import diagnosis_with_refits
+from ...gross_errors.wording import refit_words, suspect_words
 from ...uncertainty.summaries import uncertainties
 from .lack_of_fit import PureError, chance_of, chance_words, pure_error
 from .ladder_result import Ladder, LengthChange, Rung
@@ -238,6 +240,7 @@ def ladder(
         faults = (*faults, unconfirmed)
     elif not (unconfirmed or faults or beaten.count):
         unsure = NO_RICHER
+    mistakes = _mistakes(fits, file, observed.x, given)
     scale = chosen.sigma(given)
     rungs = (
         Rung(
@@ -254,7 +257,6 @@ def ladder(
         )
         for one in fits
     )
-    lengths = uncertainties(chosen.at, scale, None, ("U6",))["U6"]
     return Ladder(
         experiment.label,
         experiment.title,
@@ -262,16 +264,17 @@ def ladder(
         tuple(rungs),
         chosen.model.words,
         chosen.model.settings.model_dump(mode="json", exclude_unset=True, exclude_none=True),
-        faults,
+        mistakes or faults,
         given,
         scale,
         repeats,
         _lack_of_fit(chosen.fitted, repeats),
         beaten,
         found.beyond,
-        lengths,
+        uncertainties(chosen.at, scale, None, ("U6",))["U6"],
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         tuple(filter(None, (unsure, _untested(chosen.at.design)))),
+        bool(mistakes),
     )
 
 
@@ -348,6 +351,20 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
     return chance_of(
         left, dimensions, max(repeats.sum_of_squares, least), repeats.degrees_of_freedom, False
     )
+
+
+def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, given: bool) -> tuple[str, ...]:
+    """Mistakes in the file's offsets or arrangement that explain an S^2 of its own model that is
+    too large, in words.
+    """
+    fit = next(one for one in fits if one.model.words == file.words)
+    square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
+    if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
+        return ()
+    found = diagnosis_with_refits(fit.at, x, freedom, not given)
+    suspects = (one for one in found.suspects if one.patterns.kind[one.pattern] == "probe")
+    words = [refit_words(found.refit)] if found.refit else []
+    return (*words, *map(suspect_words, suspects))
 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, given: bool) -> tuple[str, ...]:

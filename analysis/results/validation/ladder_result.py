@@ -60,8 +60,9 @@ class Ladder(FitResult):
     """Error models on the same readings, and the one that these call for.
 
     `recommended` is the poorest that no richer one beats, and `error_model` what a file states for
-    it. `faults` are what even the richest leaves unexplained; with any of them none is recommended,
-    and changes of lengths are from the one that would be. `sigma` multiplies stated uncertainties.
+    it. `faults` are what even the richest leaves unexplained, or, where that `is_mistake`, mistakes
+    in the file that explain it; with any of them none is recommended, and changes of lengths are
+    from the one that would be. `sigma` multiplies stated uncertainties.
     `lack_of_fit` is the chance of the recommended model's residuals beside the scatter of
     `repeats`, NaN without any. `beyond` are models that the design leaves undetermined. `lengths`
     are the standard uncertainties U6 with the recommended model.
@@ -83,6 +84,7 @@ class Ladder(FitResult):
     lengths: Quantity
     coverage_factor: float
     unsure: tuple[str, ...] = ()
+    is_mistake: bool = False
 
     @property
     def cautions(self) -> tuple[str, ...]:
@@ -99,6 +101,8 @@ class Ladder(FitResult):
 
     def verdict(self) -> list[str]:
         """What to do, in words."""
+        if self.is_mistake:
+            return [f"none of these before the file is corrected: {'; '.join(self.faults)}"]
         if self.is_none:
             return [
                 (f"none of these: {'; '.join(self.faults)}"),
@@ -257,6 +261,8 @@ class Ladder(FitResult):
 
     @property
     def complaint(self) -> str:
+        if self.is_mistake:
+            return "a mistake in the file explains the readings, and no error model does"
         return "none of the error models explains the readings" if self.is_none else ""
 
 

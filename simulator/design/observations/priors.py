@@ -50,15 +50,14 @@ class Priors(Observations):
         """Which (m,) are about the error model."""
         return (self.position < 0) & (self.probe < 0) & (self.of_influence < 0)
 
-    def select(self, chosen: Flags) -> Priors:
+    def select(self, chosen: Integers | Flags) -> Priors:
         """Some of them."""
-        names = tuple(name for name, is_kept in zip(self.names, chosen, strict=True) if is_kept)
-        units = tuple(unit for unit, is_kept in zip(self.units, chosen, strict=False) if is_kept)
+        rows = np.arange(len(self))[chosen]
         arrays = {
-            name: array[chosen]
-            for name, array in vars(self).items()
-            if isinstance(array, np.ndarray)
+            name: array[rows] for name, array in vars(self).items() if isinstance(array, np.ndarray)
         }
+        names = tuple(self.names[k] for k in rows)
+        units = tuple(self.units[k] for k in rows if k < len(self.units))
         return replace(self, names=names, units=units, **arrays)
 
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
