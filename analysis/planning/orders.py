@@ -56,7 +56,8 @@ def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder
     if order.name == "blocks":
         return with_probes(_blocks(list(kinds.values()), order.seed), changes)
     visits = cheapest([(kind, len(some)) for kind, some in kinds.items()], changes).visits
-    return with_probes(_mirrored([kinds[visit.kind] for visit in visits]), changes)
+    groups = [kinds[kind] for kind in dict.fromkeys(visit.kind for visit in visits)]
+    return with_probes(_mirrored(groups), changes)
 
 
 def _mirrored(groups: Sequence[Sequence[Candidate]]) -> list[Candidate]:
