@@ -26,7 +26,7 @@ from ...rank.verdict import Verdict
 from ...results.study import check
 from .changes import apply_all
 from .repair_search import Repair, Repairs
-from .written import Edit, edits, position_settings
+from .written import Edit, edits, lacks_probes, position_settings
 
 PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
@@ -129,12 +129,26 @@ def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextC
     """What the experiment's own file would have to say otherwise, of a variant's its tree."""
     said = to_python(experiment.tree)
     places = {place.name: place for place in experiment.positions}
+    needed = tuple(needed)
+    if len(experiment.probes) == 1 and any(edit.steps[0] == "probes" for edit in needed):
+        # With more probes than one, what a pool offers has to name its own, too.
+        offered = (said.get("pool") or {}).get("candidates") or ()
+        for k, one in enumerate(offered):
+            for i, group in enumerate(one.get("readings", [one])):
+                if "probes" not in group:
+                    inner = ("readings", i) if "readings" in one else ()
+                    yield TextChange(
+                        ("pool", "candidates", k, *inner, "probes"), [*experiment.probes]
+                    )
     for edit in needed:
         if edit.steps[0] == "positions" and not edit.is_new:
             name = str(edit.steps[1])
             at = next(i for i, one in enumerate(said["positions"]) if str(one["name"]) == name)
             settings = position_settings(experiment, places[name])
             steps: Steps = ("positions", at)
+            if lacks_probes(said["positions"][at]):
+                for group in settings.get("readings", [settings]):
+                    group.pop("probes", None)
             yield from _of_position(steps, said["positions"][at], settings, edit.value)
         else:
             yield TextChange(edit.steps, edit.value, "append" if edit.is_new else "set")
