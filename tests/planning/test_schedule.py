@@ -186,7 +186,7 @@ def test_random_positions_in_every_order(plane: float) -> None:
     """Times with which places are worth coming back to, and times with which they are not."""
     generator = np.random.default_rng(int(plane))
     changes = ChangeTimes(120.0, plane)
-    for _ in range(50):
+    for _ in range(25):
         members = random_members(generator, 6)
         assert changeover(members, changes) == least_of_all(members, changes), members
 
