@@ -201,8 +201,8 @@ def check(
 
 
 def repair(path: PathLike, variant: str | None = None) -> str:
-    """The text of an experiment file after the cheapest changes that determine everything, of one
-    variant or of each; the rest of it is as it was, line ends included.
+    """The text of an experiment file after the first changes of `check --suggest` that determine
+    everything, of one variant or of each; the rest of it is as it was, line ends included.
 
     The text of a file that leaves nothing undetermined is returned as it is. Nothing is written.
 

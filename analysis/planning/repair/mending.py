@@ -62,6 +62,7 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
         if experiment.expected_rank_deficiency
         else []
     )
+    extra += _taken_from_pool(experiment, repair)
     new = with_experiment(text, source, experiment, changed, repair.edits, extra)
     (checked,) = (one for one in load(source, text=new) if one.name == variant)
     verdict = check(checked).verdict
@@ -69,6 +70,21 @@ def mended(text: str, source: Path, variant: str | None, repair: Repair) -> str:
         text = "the repaired file does not have the rank that was found; nothing is changed"
         raise experiment.refused((), text)
     return new
+
+
+def _taken_from_pool(experiment: Experiment, repair: Repair) -> Iterator[TextChange]:
+    """What the pool no longer offers, as it is in the experiment now."""
+    said, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
+    indices = [change.candidate for change in repair.changes if change.candidate >= 0]
+    taken = {pool.candidates[k].name for k in indices} if pool is not None else set()
+    for key in ("candidates", "calibration"):
+        entries = said.get(key) or ()
+        gone = [k for k, one in enumerate(entries) if str(one.get("name")) in taken]
+        if gone and len(gone) == len(entries):
+            yield TextChange(("pool", key), [])
+            continue
+        for k in reversed(gone):
+            yield TextChange(("pool", key, k), kind="remove")
 
 
 def with_experiment(
