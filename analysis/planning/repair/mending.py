@@ -112,7 +112,8 @@ def with_experiment(
             *changes_of(experiment, edits(experiment, changed) if needed is None else needed),
             *extra,
         ],
-        key=lambda one: len(one.steps),
+        # What the pool no longer offers is left out last, so that the others keep their numbers.
+        key=lambda one: (one.steps[0] == "pool" and len(one.steps) < 4, len(one.steps)),
     )
     new = with_text_changes(text, source, experiment.name, changes)
     after = {one.name: one for one in load(source, planning=True, text=new)}
