@@ -242,7 +242,8 @@ class _Task:
     def within(self) -> list[Array]:
         """By place what it costs from arriving with a probe to leaving with one, (probe, probe)."""
         size = len(self.names)
-        return [self.changes.probe * _probe_changes(one, size) for one in self.contents]
+        every = [_probe_changes(one, size) for one in self.contents]
+        return [np.asarray(self.changes.probe * changed, float) for changed in every]
 
     @cached_property
     def ahead(self) -> dict[int, Array]:

@@ -188,14 +188,15 @@ def _ways(
     own: Sequence[Candidate], told: Blocks, names: Sequence[str], changes: ChangeTimes
 ) -> _Ways:
     """All ways to read the positions that blocks are of."""
-    each = [(k, probes) for k, one in enumerate(own) for probes in permutations(one.item.probes)]
+    items = [one.item for one in own if isinstance(one.item, Position)]
+    each = [(k, probes) for k, item in enumerate(items) for probes in permutations(item.probes)]
     middles = np.zeros((len(each), len(told.weight)))
     is_own = told.position == np.array([k for k, _ in each])[:, None]
     for row, (k, probes) in enumerate(each):
-        (first,) = first_readings([(own[k], probes)], changes)
+        (first,) = first_readings(((own[k], probes),), changes)
         # Probes of several groups stay in the order of the groups.
         middle = told.middle[told.position == k]
-        if len(own[k].item.readings) == 1:
+        if len(items[k].readings) == 1:
             middle = told.hours(k, probes, names, changes.probe / HOUR)
         middles[row, is_own[row]] = first / HOUR + middle
     begun, ended = (np.array([probes[end] for _, probes in each]) for end in (0, -1))
