@@ -63,8 +63,7 @@ def _worth(repair: Repair, judged: Verdict) -> str:
     else:
         words += ", and nothing is weakly determined"
     u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
-    if repair.rests_on_offsets:
-        words += "; scale rests on probe offsets taken as exact"
+    words += caveat(repair)
     if u6 is not None:
         words += f"; average U6 {number(1e6 * u6.average)} µm{_with_offsets(repair)}"
     minutes = f"{duration(repair.seconds)} more" if repair.seconds else "no time more"
@@ -72,6 +71,11 @@ def _worth(repair: Repair, judged: Verdict) -> str:
     if repair.removes:
         words += f"; removes {_directions(repair, judged)}"
     return f"{words}; smallest singular value {repair.smallest:.3g}"
+
+
+def caveat(repair: Repair) -> str:
+    """That scale rests on offsets taken as exact after a repair; empty where it does not."""
+    return "; scale rests on probe offsets taken as exact" if repair.rests_on_offsets else ""
 
 
 def _with_offsets(repair: Repair) -> str:
