@@ -10,6 +10,7 @@ from time import process_time
 import numpy as np
 import pytest
 from ballplate.planning.changeover import MOST_PLACES, Setup, changeover, cheapest
+from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.schedule import ordered, run_sheet
 from ballplate.planning.sheet_words import summary
 from ballplate.simulator.experiment.load import load
@@ -179,6 +180,12 @@ def test_set_ups_of_two_probes_on_both_sides_of_those_of_one() -> None:
     assert cost(sequence, CHANGES) == 0.0 == changeover([both, both, down, down], CHANGES)
     ends = [across, both, both, down, across]
     assert changeover(ends, CHANGES) == least_of_all(ends, CHANGES) == 1800.0
+    # A choice that just fits the hours is allowed, and no less.
+    own = [position(kind, str(k)) for k, kind in enumerate(ends)]
+    for seconds, is_allowed in ((5 * 600.0 + 1800.0, True), (5 * 600.0 + 1799.0, False)):
+        limits = constraints(own, CHANGES, Budget(seconds))
+        assert limits.allows(range(5)) == is_allowed
+        assert (2 in limits.additions([0, 1, 3, 4])) == is_allowed
 
 
 @pytest.mark.parametrize("plane", [0.0, 60.0, 150.0, 240.0, 1800.0])
