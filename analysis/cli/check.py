@@ -48,8 +48,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--suggest",
         action="store_true",
         help=(
-            "suggest the cheapest changes that leave nothing undetermined or weakly determined,"
-            " each verified"
+            "suggest changes that leave nothing undetermined or weakly determined, each verified,"
+            " ranked by U6 with uncertain probe offsets"
         ),
     )
     parser.add_argument(

@@ -8,7 +8,7 @@ from pathlib import Path
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
 from ..planning.repair.checked_files import CheckedDesign, CheckedFile
-from ..results.parts import scale_lines, target_lines, verdict_lines
+from ..results.parts import scale_lines, scale_warnings, target_lines, verdict_lines
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:
@@ -41,6 +41,7 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
         *verdict_lines(prediction.verdict, lengths=prediction.lengths),
         *target_lines(prediction.lengths),
         *scale_lines(prediction.scale),
+        *scale_warnings(prediction.scale),
     ]
     advice = prediction.advice
     suggested = () if advice is None else advice.lines

@@ -268,8 +268,8 @@ def _orders(
     own = [one for one in chosen if isinstance(one.item, Position)]
     found = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
     if is_of_plates(experiment, own):
-        names = least_drift(experiment, chosen, pool.changes, request.seed)
-        return [*found, ReadingOrder("least-drift", request.seed, names)]
+        sequence = least_drift(experiment, chosen, pool.changes, request.seed)
+        return [*found, ReadingOrder("least-drift", request.seed, sequence)]
     if request.order == "least-drift":
         text = "has length standards, whose drift is not followed; ask for another --order"
         raise _impossible(experiment, "pool", text)

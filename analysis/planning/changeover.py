@@ -1,31 +1,39 @@
 """Order of positions with the least change-over of planes, artefacts and probes.
 
-Going on to another plane or artefact takes `ChangeTimes.plane`; if the last probe of a position is
-not the first of the next, `ChangeTimes.probe` comes on top. The probes of a position are read one
-after the other in any order, and nothing is changed before the first position. Positions of equal
-kind stand together, so that the order of kinds is what is sought: dynamic programming over sets of
-kinds (Held and Karp, J. SIAM 10 (1962) 196), with the last probe and the last place as what the
-rest depends on. Up to twelve kinds that is exact; of more, only the `MOST_SETS` cheapest sets of
-each size are followed.
+Going on to another plane or artefact, here a place, takes `ChangeTimes.plane`; if the last probe of
+a position is not the first of the next, `ChangeTimes.probe` comes on top. The probes of a position
+are read one after the other in any order, and nothing is changed before the first position.
+
+In one place, positions are edges of a graph of probes, from their first to their last probe, and a
+change of probe is an edge more: the fewest that make one route of all edges follow from the nodes
+of odd degree and the connected parts (Euler). Places in their turn are ordered by dynamic
+programming over sets (Held and Karp, J. SIAM 10 (1962) 196). That is exact for any number of
+positions where no place is worth coming back to: a second visit costs `plane` and saves two changes
+of probe at most. Where `plane` is shorter, sets of positions are gone through, up to
+`MOST_POSITIONS`; of more positions, as of more places than `MOST_PLACES`, the order is one that
+comes near, with a lower bound.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
+from itertools import combinations, permutations
 
+import numpy as np
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
+from ballplate.simulator.machines.protocol import Array, Integers
 
-# Sets of kinds that are followed for each size, where there are more than so many kinds.
-MOST_EXACT = 12
-MOST_SETS = 500
+# Positions of which all sets are gone through, and places; of more places only so many sets of each
+# size are followed.
+MOST_POSITIONS, MOST_PLACES, MOST_SETS = 12, 12, 500
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What the change-over depends on: positions of equal kind follow one another without any."""
+    """What the change-over depends on."""
 
     artefact: str
     plane: str
@@ -34,11 +42,23 @@ class Setup:
 
 @dataclass(frozen=True)
 class Visit:
-    """A kind in its turn, the first probe that is read with, and the last."""
+    """A position of a kind in its turn, the first probe that is read with, and the last."""
 
     kind: Setup
     first: str
     last: str
+
+
+@dataclass(frozen=True)
+class Order:
+    """The cheapest order of positions found, what it costs in `seconds`, the `bound` that no order
+    falls below, and the probe that is left from before, if any.
+    """
+
+    seconds: float
+    bound: float
+    visits: tuple[Visit, ...]
+    before: str | None
 
 
 def kind_of(candidate: Candidate) -> Setup:
@@ -61,48 +81,46 @@ def changeover(kinds: Collection[Setup], changes: ChangeTimes, first: Setup | No
     >>> changeover([down, side, down], ChangeTimes(probe=120.0, plane=1800.0))
     120.0
     """
-    return _least(_counted(kinds), changes, first)
+    counted = frozenset(
+        (kind, _enough(len(kind.probes), count, _comes_back(changes)))
+        for kind, count in Counter(kinds).items()
+    )
+    return _least(counted, changes, first)
 
 
 @lru_cache(maxsize=100_000)
 def _least(kinds: frozenset[tuple[Setup, int]], changes: ChangeTimes, first: Setup | None) -> float:
-    return cheapest(kinds, changes, first, is_paid=True).seconds
+    return _task(kinds, changes, first, is_paid=True).seconds
 
 
-def _counted(kinds: Iterable[Setup]) -> frozenset[tuple[Setup, int]]:
-    """Kinds with the least number of positions that leaves the same choice of first and last
-    probes.
+def _comes_back(changes: ChangeTimes) -> bool:
+    """Whether an order may come back to a place because that saves changes of probe."""
+    return 0.0 < changes.plane <= 2.0 * changes.probe
 
-    A position of two probes ends with the one that it has not begun with, two positions end with
-    that they have begun with, three are like one. Of more probes, two positions can begin and end
-    with any.
+
+def _enough(probes: int, count: int, comes_back: bool) -> int:
+    """The number of positions of a kind that costs as much as `count`.
+
+    Positions of one probe are read together. Of two probes, two positions in the same place lead
+    back to the first probe. Of more, so many can connect and pair all probes, and others lead back
+    or make a detour.
     """
-    found = []
-    for kind, count in Counter(kinds).items():
-        probes = len(kind.probes)
-        found.append((kind, 1 if probes == 1 else 2 - count % 2 if probes == 2 else min(count, 2)))
-    return frozenset(found)
+    if probes == 1:
+        return 1
+    if comes_back:
+        return count
+    return 2 - count % 2 if probes == 2 else min(count, probes - 1 + probes // 2)
 
 
-# By what has been visited: by the last probe and the last artefact and plane, the cost so far and
-# where it came from.
-_Last = tuple[int, int]
-_Came = tuple[int, _Last, int, int]
-_States = dict[_Last, tuple[float, _Came]]
-_NOWHERE: _Came = (0, (-1, -1), -1, -1)
+# Sets of probes, each with the number of positions that are read with it.
+_Content = tuple[tuple[tuple[int, ...], int], ...]
+# A position: place, set of probes, first and last probe.
+_Step = tuple[int, tuple[int, ...], int, int]
+# The connected part that each probe belongs to, -1 where nothing is read with it, and the probes of
+# odd degree as binary digits.
+_Graph = tuple[tuple[int, ...], int]
 # Weight of what is only to decide between orders that cost the same.
 TIE = 1e-9
-
-
-@dataclass(frozen=True)
-class Order:
-    """The cheapest order of kinds, what it costs in `seconds`, and the probe that is left from
-    before, if any.
-    """
-
-    seconds: float
-    visits: tuple[Visit, ...]
-    before: str | None
 
 
 def cheapest(
@@ -111,134 +129,301 @@ def cheapest(
     after: Setup | None = None,
     is_paid: bool = False,
 ) -> Order:
-    """The cheapest order of kinds with their numbers of positions.
+    """The cheapest order of positions, of kinds with their numbers.
 
     It begins after a position of the kind `after`, which may end with any of its probes. Unless
     going on from there `is_paid`, that only decides between orders that cost the same.
     """
-    # The order of a set differs from run to run.
-    todo = sorted(
-        kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes), one[1])
-    )
-    every = [kind for kind, _ in todo] + ([] if after is None else [after])
-    probe_names = sorted({probe for kind in every for probe in kind.probes})
-    places = list(dict.fromkeys((kind.artefact, kind.plane) for kind in every))
-    stops = [
-        _Stop(
-            places.index((kind.artefact, kind.plane)),
-            tuple(probe_names.index(probe) for probe in sorted(kind.probes)),
-            count,
-        )
-        for kind, count in todo
-    ]
-    start: _States = {}
-    if after is not None:
-        here = places.index((after.artefact, after.plane))
-        start = {(probe_names.index(probe), here): (0.0, _NOWHERE) for probe in after.probes}
-    # One layer for each number of kinds visited.
-    layers: list[dict[int, _States]] = [{0: start}]
-    paid = changes if is_paid else ChangeTimes(TIE * changes.probe, TIE * changes.plane)
-    for _ in stops:
-        found: dict[int, _States] = {}
-        for visited, states in layers[-1].items():
-            known = _Known(states) if states else None
-            for i, stop in enumerate(stops):
-                if not visited >> i & 1:
-                    _go_on(found.setdefault(visited | 1 << i, {}), stop, i, visited, known, paid)
-        if len(todo) > MOST_EXACT and len(found) > MOST_SETS:
-            costs = sorted((min(states.values())[0], visited) for visited, states in found.items())
-            found = {visited: found[visited] for _, visited in costs[:MOST_SETS]}
-        layers.append(found)
-        paid = changes
-    if not stops:
-        return Order(0.0, (), None)
-    ((visited, states),) = layers[-1].items()
-    last = min(states, key=lambda one: states[one])
-    visits: list[Visit] = []
-    for layer in reversed(layers[1:]):
-        _, (visited, before_that, first, i) = layer[visited][last]
-        visits.append(Visit(todo[i][0], probe_names[first], probe_names[last[0]]))
-        last = before_that
-    visits.reverse()
-    seconds = sum(
-        _between(one, other, changes) for one, other in zip(visits, visits[1:], strict=False)
-    )
-    if after is None:
-        return Order(seconds, tuple(visits), None)
-    probe = probe_names[last[0]]
-    if is_paid:
-        seconds += _between(Visit(after, probe, probe), visits[0], changes)
-    return Order(seconds, tuple(visits), probe)
+    task = _task(kinds, changes, after, is_paid)
+    visits = tuple(task.visits())
+    seconds = sum(map(partial(_between, changes), visits, visits[1:]))
+    before = None
+    if after is not None and visits:
+        begun = visits[0].first
+        before = begun if begun in after.probes else min(after.probes)
+        if is_paid:
+            seconds += _between(changes, Visit(after, before, before), visits[0])
+    return Order(seconds, seconds if task.is_exact else min(task.bound, seconds), visits, before)
 
 
-def _between(one: Visit, other: Visit, changes: ChangeTimes) -> float:
+def _between(changes: ChangeTimes, one: Visit, other: Visit) -> float:
     is_moved = (one.kind.artefact, one.kind.plane) != (other.kind.artefact, other.kind.plane)
     return changes.plane * is_moved + changes.probe * (one.last != other.first)
 
 
-@dataclass(frozen=True)
-class _Stop:
-    place: int
-    probes: tuple[int, ...]
-    count: int
+def _task(
+    kinds: Iterable[tuple[Setup, int]], changes: ChangeTimes, after: Setup | None, is_paid: bool
+) -> _Task:
+    # The order of a set differs from run to run.
+    todo = sorted(kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes)))
+    every = [kind for kind, _ in todo] + ([] if after is None else [after])
+    names = tuple(sorted({probe for kind in every for probe in kind.probes}))
+    members: dict[tuple[str, str], dict[tuple[int, ...], list[Setup]]] = {}
+    for kind, count in todo:
+        probes = tuple(k for k, name in enumerate(names) if name in kind.probes)
+        own = members.setdefault(_place(kind, changes), {})
+        own.setdefault(probes, []).extend([kind] * count)
+    begin, entry = np.zeros(len(names)), np.zeros(len(members))
+    if after is not None:
+        weight = 1.0 if is_paid else TIE
+        begin += [weight * changes.probe * (name not in after.probes) for name in names]
+        here = _place(after, changes)
+        entry += [weight * changes.plane * (place != here) for place in members]
+    return _Task(names, tuple(members.values()), changes, begin, entry)
 
 
-class _Known:
-    """The cheapest states of a set of kinds: of all, by place, by probe, and by both."""
-
-    def __init__(self, states: _States) -> None:
-        self.both = states
-        self.by_place: dict[int, tuple[float, _Last]] = {}
-        self.by_probe: dict[int, tuple[float, _Last]] = {}
-        for last, (cost, _) in states.items():
-            probe, place = last
-            if place not in self.by_place or cost < self.by_place[place][0]:
-                self.by_place[place] = (cost, last)
-            if probe not in self.by_probe or cost < self.by_probe[probe][0]:
-                self.by_probe[probe] = (cost, last)
-        self.cheapest = min(self.by_place.values())
-
-    def with_any_probe(self, place: int, change: float) -> tuple[float, _Last]:
-        """The least cost to be at a place."""
-        cost, last = self.cheapest
-        return min(self.by_place.get(place, (cost + change, last)), (cost + change, last))
-
-    def with_probe(self, probe: int, place: int, change: float) -> tuple[float, _Last] | None:
-        """The least cost to be at a place with a probe, None where that was not the last."""
-        if probe not in self.by_probe:
-            return None
-        cost, last = self.by_probe[probe]
-        here = self.both.get((probe, place))
-        if here is not None and here[0] <= cost + change:
-            return here[0], (probe, place)
-        return cost + change, last
+def _place(kind: Setup, changes: ChangeTimes) -> tuple[str, str]:
+    """Artefact and plane, alike where changing them takes no time."""
+    return (kind.artefact, kind.plane) if changes.plane else ("", "")
 
 
-def _go_on(
-    states: _States, stop: _Stop, i: int, visited: int, known: _Known | None, changes: ChangeTimes
-) -> None:
-    """Add what going on to a stop leads to, whichever of its probes comes first and last."""
-    paid, origin = (
-        (0.0, (-1, -1)) if known is None else known.with_any_probe(stop.place, changes.plane)
-    )
-    for first in stop.probes:
-        arrived = (paid + (0.0 if known is None else changes.probe), origin)
-        if known is not None:
-            free = known.with_probe(first, stop.place, changes.plane)
-            arrived = arrived if free is None or arrived[0] < free[0] else free
-        for last in stop.probes:
-            if _can_end(len(stop.probes), stop.count, first == last):
-                old = states.get((last, stop.place))
-                if old is None or arrived[0] < old[0]:
-                    states[last, stop.place] = (arrived[0], (visited, arrived[1], first, i))
-
-
-def _can_end(probes: int, count: int, where_begun: bool) -> bool:
-    """Whether positions of one kind can end with the probe they have begun with, or with
-    another.
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """Kinds of positions by place and by sets of probes, which are indices of `names`; what it
+    costs to `begin` with a probe, (probe,), and in a place, `entry` (place,).
     """
-    if probes == 1:
-        return where_begun
-    if probes == 2:
-        return where_begun == (count % 2 == 0)
-    return count > 1 or not where_begun
+
+    names: tuple[str, ...]
+    members: tuple[dict[tuple[int, ...], list[Setup]], ...]
+    changes: ChangeTimes
+    begin: Array
+    entry: Array
+
+    @cached_property
+    def contents(self) -> list[_Content]:
+        """What there is to read in each place."""
+        return [tuple((some, len(kinds)) for some, kinds in one.items()) for one in self.members]
+
+    @cached_property
+    def positions(self) -> list[tuple[int, tuple[int, ...]]]:
+        """Place and probes of each position, those of one probe that are read together once."""
+        return [
+            (place, probes)
+            for place, content in enumerate(self.contents)
+            for probes, count in content
+            for _ in range(_enough(len(probes), count, comes_back=True))
+        ]
+
+    @cached_property
+    def comes_back(self) -> bool:
+        """Whether an order that comes back to a place may be cheaper than all others."""
+        is_possible = len(self.contents) > 1 and _comes_back(self.changes)
+        return is_possible and self.by_places > self.bound
+
+    @property
+    def is_small(self) -> bool:
+        return len(self.positions) <= MOST_POSITIONS
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether no order is cheaper than the best one found."""
+        return self.is_small if self.comes_back else len(self.contents) <= MOST_PLACES
+
+    @cached_property
+    def bound(self) -> float:
+        """The seconds that no order falls below: of the changes of probe, all places are one."""
+        together: Counter[tuple[int, ...]] = Counter()
+        for content in self.contents:
+            together.update(dict(content))
+        changed = _probe_changes(tuple(sorted(together.items())), len(self.names))
+        least = float((self.begin[:, None] + self.changes.probe * changed).min(initial=np.inf))
+        # The first place may be the one where it begins.
+        return least + self.changes.plane * (len(self.contents) - 1) + float(self.entry.min())
+
+    @property
+    def seconds(self) -> float:
+        """What the best order costs."""
+        if not self.contents:
+            return 0.0
+        is_single = self.comes_back and self.is_small
+        return float(self.by_positions[0][-1].min()) if is_single else self.by_places
+
+    @cached_property
+    def within(self) -> list[Array]:
+        """By place what it costs from arriving with a probe to leaving with one, (probe, probe)."""
+        size = len(self.names)
+        every = [_probe_changes(one, size) for one in self.contents]
+        return [np.asarray(self.changes.probe * changed, float) for changed in every]
+
+    @cached_property
+    def ahead(self) -> dict[int, Array]:
+        """By the set of places that are to come, as binary digits, the least cost after leaving
+        another place with each probe, where each place is visited once.
+        """
+        layer = found = {0: np.zeros(len(self.names))}
+        for _ in self.contents[1:]:
+            following: dict[int, Array] = {}
+            for rest, later in layer.items():
+                for k, within in enumerate(self.within):
+                    if not rest >> k & 1:
+                        cost = self.changes.plane + (within + later).min(axis=1)
+                        known = following.get(rest | 1 << k, cost)
+                        following[rest | 1 << k] = np.minimum(known, cost)
+            layer = following
+            if len(self.contents) > MOST_PLACES:
+                order = sorted(layer, key=lambda one: (layer[one].min(), one))
+                layer = {rest: layer[rest] for rest in order[:MOST_SETS]}
+            found = found | layer
+        return found
+
+    def next_place(self, rest: int, begin: Array, entry: Array) -> tuple[float, int, int, int]:
+        """The least cost of the rest of the places, the next of them, and the probes with which it
+        is begun and left.
+        """
+        options = []
+        for k, within in enumerate(self.within):
+            later = self.ahead.get(rest & ~(1 << k))
+            if rest >> k & 1 and later is not None:
+                cost = entry[k] + begin[:, None] + within + later
+                first, last = divmod(int(cost.argmin()), len(begin))
+                options.append((float(cost.min()), k, first, last))
+        return min(options)
+
+    @cached_property
+    def by_places(self) -> float:
+        """The least cost where each place is visited once."""
+        return self.next_place((1 << len(self.contents)) - 1, self.begin, self.entry)[0]
+
+    @cached_property
+    def by_positions(self) -> tuple[Array, Array]:
+        """By the set of positions read: the least cost to end in a place with a probe, and to begin
+        there with what comes next, (sets, places x probes).
+        """
+        size, count = len(self.names), len(self.positions)
+        ended = np.full((1 << count, len(self.contents) * size), np.inf)
+        reached = ended.copy()
+        reached[0] = (self.begin + self.entry[:, None]).ravel()
+        sets = np.arange(1 << count)
+        sizes = np.array([one.bit_count() for one in range(1 << count)])
+        for taken in range(count + 1):
+            own = sets[sizes == taken]
+            if taken:
+                reached[own] = (ended[own, :, None] + self.between).min(axis=1)
+            for k, (place, probes) in enumerate(self.positions):
+                before = own[own >> k & 1 == 0]
+                for first, last in _ends(probes):
+                    at, after = place * size + last, before | 1 << k
+                    cost = reached[before, place * size + first]
+                    ended[after, at] = np.minimum(ended[after, at], cost)
+        return ended, reached
+
+    @cached_property
+    def between(self) -> Array:
+        """What it costs to go from a place and probe to others."""
+        place, probe = np.divmod(np.arange(len(self.contents) * len(self.names)), len(self.names))
+        return np.asarray(
+            self.changes.plane * (place[:, None] != place)
+            + self.changes.probe * (probe[:, None] != probe)
+        )
+
+    def visits(self) -> Iterator[Visit]:
+        """The positions of the best order one by one."""
+        if not self.contents:
+            return
+        is_single = self.comes_back and self.is_small
+        left = [{probes: [*kinds] for probes, kinds in one.items()} for one in self.members]
+        for place, probes, first, last in self.traced() if is_single else self.followed():
+            kinds = left[place][probes]
+            # Of one probe, all are read together.
+            for _ in range(len(kinds) if is_single and len(probes) == 1 else 1):
+                yield Visit(kinds.pop(0), self.names[first], self.names[last])
+
+    def followed(self) -> Iterator[_Step]:
+        """The best order that visits each place once."""
+        rest, begin, entry = (1 << len(self.contents)) - 1, self.begin, self.entry
+        while rest:
+            _, place, first, last = self.next_place(rest, begin, entry)
+            for step in _route(self.contents[place], first, last, len(begin)):
+                yield place, *step
+            rest &= ~(1 << place)
+            begin = np.where(np.arange(len(begin)) == last, 0.0, np.inf)
+            entry = np.full(len(entry), self.changes.plane)
+
+    def traced(self) -> Iterator[_Step]:
+        """The best order of single positions, found from its end."""
+        ended, reached = self.by_positions
+        size, taken, steps = len(self.names), len(ended) - 1, []
+        at = int(ended[taken].argmin())
+        while taken:
+            k, first = next(
+                (k, first)
+                for k, (place, probes) in enumerate(self.positions)
+                for first, last in _ends(probes)
+                if taken >> k & 1
+                and place * size + last == at
+                and reached[taken & ~(1 << k), place * size + first] == ended[taken, at]
+            )
+            place, probes = self.positions[k]
+            steps.append((place, probes, first, at % size))
+            taken &= ~(1 << k)
+            at = int((ended[taken] + self.between[:, place * size + first]).argmin())
+        yield from reversed(steps)
+
+
+def _route(
+    content: _Content, probe: int, last: int, size: int
+) -> Iterator[tuple[tuple[int, ...], int, int]]:
+    """Positions in one place, from arriving with a probe to leaving with another, with the fewest
+    changes; of equal orders, those that stay with a set of probes.
+    """
+    rest, before = dict(content), None
+    while rest:
+        options = []
+        for probes in rest:
+            left = {some: count - (some == probes) for some, count in rest.items()}
+            following = tuple((some, count) for some, count in sorted(left.items()) if count)
+            ahead = _probe_changes(following, size)[:, last]
+            options += [
+                (int(probe != first) + int(ahead[end]), probes != before, probes, first, end)
+                for first, end in _ends(probes)
+            ]
+        *_, before, first, probe = min(options)
+        rest = {some: count - (some == before) for some, count in rest.items()}
+        rest = {some: count for some, count in rest.items() if count}
+        yield before, first, probe
+
+
+def _ends(probes: tuple[int, ...]) -> list[tuple[int, int]]:
+    """First and last probe that a position can be read with."""
+    return list(permutations(probes, 2)) or [(probes[0], probes[0])]
+
+
+@lru_cache(maxsize=100_000)
+def _probe_changes(content: _Content, size: int) -> Integers:
+    """The fewest changes of probe from arriving in a place with a probe to leaving with another,
+    (size, size), where these positions are read in between.
+    """
+    graphs: set[_Graph] = {((-1,) * size, 0)}
+    for probes, count in content:
+        pairs = list(combinations(probes, 2)) or [(probes[0], probes[0])]
+        for _ in range(_enough(len(probes), count, comes_back=False)):
+            graphs = {_joined(graph, *pair) for graph in graphs for pair in pairs}
+    found = np.empty((size, size), np.int64)
+    for first in range(size):
+        for last in range(first, size):
+            # What comes next leads from the last probe back to the first.
+            least = min(_missing(_joined(graph, first, last)) for graph in graphs)
+            found[first, last] = found[last, first] = least
+    return found
+
+
+def _joined(graph: _Graph, one: int, other: int) -> _Graph:
+    """A graph with an edge more."""
+    parts, odd = graph
+    new, old = sorted(parts[k] if parts[k] >= 0 else k for k in (one, other))
+    joined = tuple(
+        new if k in (one, other) or part == old else part for k, part in enumerate(parts)
+    )
+    return joined, odd ^ 1 << one ^ 1 << other
+
+
+def _missing(graph: _Graph) -> int:
+    """The fewest edges that make one closed route of all edges of a graph: all probes of odd degree
+    are paired, and no part is left alone.
+    """
+    parts, odd = graph
+    ends = Counter({part: 0 for part in parts if part >= 0})
+    for k, part in enumerate(parts):
+        ends[part] += odd >> k & 1
+    ends.pop(-1, None)
+    return sum(ends.values()) // 2 if len(ends) == 1 else sum(max(1, n // 2) for n in ends.values())

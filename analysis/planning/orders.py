@@ -25,13 +25,13 @@ ORDERS: Mapping[OrderName, str] = {
 
 @dataclass(frozen=True)
 class ReadingOrder:
-    """An order by name; `seed` is that of random ones, and `sequence` are the names of positions of
-    one that was searched for.
+    """An order by name; `seed` is that of random ones, and `sequence` are the names of positions,
+    with their probes in order, of one that was searched for.
     """
 
     name: OrderName = "change-over"
     seed: int = 1
-    sequence: tuple[str, ...] = ()
+    sequence: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 LEAST_CHANGE_OVER = ReadingOrder()
@@ -41,22 +41,24 @@ Sequenced = tuple[tuple[Candidate, tuple[str, ...]], ...]
 
 
 def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder) -> Sequenced:
-    """Positions mirrored, random in blocks or in a stated sequence, their probes in the order that
-    costs least.
+    """Positions mirrored or random in blocks, their probes in the order that costs least, or all in
+    a stated sequence.
 
     A mirrored order goes through the kinds of positions with the least change-over, reads half of
     each, and goes back with the other half; what is single stands in the middle. A block has one
     position of each kind that is left, in random order.
     """
     if order.sequence:
-        return with_probes(sorted(own, key=lambda one: order.sequence.index(one.name)), changes)
+        by_name = {candidate.name: candidate for candidate in own}
+        return tuple((by_name[name], probes) for name, probes in order.sequence)
     kinds: dict[Setup, list[Candidate]] = {}
     for candidate in own:
         kinds.setdefault(kind_of(candidate), []).append(candidate)
     if order.name == "blocks":
         return with_probes(_blocks(list(kinds.values()), order.seed), changes)
     visits = cheapest([(kind, len(some)) for kind, some in kinds.items()], changes).visits
-    return with_probes(_mirrored([kinds[visit.kind] for visit in visits]), changes)
+    groups = [kinds[kind] for kind in dict.fromkeys(visit.kind for visit in visits)]
+    return with_probes(_mirrored(groups), changes)
 
 
 def _mirrored(groups: Sequence[Sequence[Candidate]]) -> list[Candidate]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.inputs.settings import listing
 
-from .changeover import Visit, cheapest, kind_of
+from .changeover import Setup, cheapest, kind_of
 from .orders import LEAST_CHANGE_OVER, ReadingOrder, Sequenced, in_order
 from .short_names import with_short_name
 
@@ -89,13 +89,15 @@ class RunSheet:
     """Positions in the order to read them, those done first, and items of calibration with their
     price in seconds.
 
-    Where no times are stated it is not `timed`, and all times are zero.
+    Where no times are stated it is not `timed`, and all times are zero. An order of least
+    change-over takes at most `gap` seconds more than any other.
     """
 
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
     timed: bool = True
     changes: ChangeTimes = ChangeTimes(0.0, 0.0)
+    gap: float = 0.0
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -167,9 +169,10 @@ def run_sheet(
     ]
     first = None if completed is None else completed.rest
     if order.name == "change-over":
-        sequence = ordered(positions, changes, before, first)
+        sequence, gap = ordered(positions, changes, before, first)
     else:
-        sequence = (*ordered((), changes, before, first), *in_order(positions, changes, order))
+        begun, gap = ordered((), changes, before, first)
+        sequence = (*begun, *in_order(positions, changes, order))
     steps: list[Step] = []
     elapsed = 0.0
     for k, (candidate, probes) in enumerate(sequence):
@@ -206,6 +209,7 @@ def run_sheet(
         tuple(steps),
         tuple(one for one in chosen if not isinstance(one.item, Position)),
         changes=changes,
+        gap=gap,
     )
 
 
@@ -298,9 +302,9 @@ def ordered(
     changes: ChangeTimes,
     done: Sequence[Candidate] = (),
     first: Candidate | None = None,
-) -> tuple[tuple[Candidate, tuple[str, ...]], ...]:
+) -> tuple[Sequenced, float]:
     """Positions, those `done` first, in the order that costs least change-over, each with the order
-    of its probes.
+    of its probes; and the seconds that another order may be cheaper by at most.
 
     Positions of equal kind keep the order they are given in. Of those that are not done, one may
     have to be `first`.
@@ -316,26 +320,13 @@ def ordered(
     found = [(one, one.item.probes) for one in done if isinstance(one.item, Position)]
     if first is not None:
         found.append((first, _ending_with(first, order.before)))
+    members: dict[Setup, Iterator[Candidate]] = {
+        kind: iter([one for one in own if kind_of(one) == kind]) for kind in set(map(kind_of, own))
+    }
     for visit in order.visits:
-        members = [candidate for candidate in own if kind_of(candidate) == visit.kind]
-        begun = visit.first
-        for k, candidate in enumerate(members):
-            last = (
-                visit.last if k == len(members) - 1 else _handed_on(visit, begun, len(members) - k)
-            )
-            found.append((candidate, _sequence(candidate, begun, last)))
-            begun = last
-    return tuple(found)
-
-
-def _handed_on(visit: Visit, first: str, left: int) -> str:
-    """The last probe of a position, which the next of the same kind begins with; `left` positions
-    are to come.
-    """
-    others = sorted(visit.kind.probes - {first}) or [first]
-    # The last position must not begin with the probe that it is to end with.
-    suited = [probe for probe in others if probe != visit.last] if left == 2 else others
-    return (suited or others)[0]
+        candidate = next(members[visit.kind])
+        found.append((candidate, _sequence(candidate, visit.first, visit.last)))
+    return tuple(found), order.seconds - order.bound
 
 
 def _ending_with(candidate: Candidate, last: str | None) -> tuple[str, ...]:

@@ -185,6 +185,7 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
         ],
         "calibration": [{"name": one.name, "seconds": one.seconds} for one in sheet.calibration],
         "seconds": sheet.seconds if sheet.timed else None,
+        "above_least_change_seconds": sheet.gap if sheet.timed else None,
     }
 
 

@@ -8,6 +8,7 @@ from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.settings import number_of
 
+from .constraints import SLACK
 from .schedule import RunSheet, Step
 
 
@@ -27,6 +28,8 @@ def summary(sheet: RunSheet) -> str:
         text += f": {sheet.hours:.2f} h"
         change = sum(step.change_seconds for step in todo)
         text += f", including change-over {change / 3600.0:.2f} h" if change else ""
+        more = f" (at most {sheet.gap / 60.0:.1f} min more than the least of any order)"
+        text += more if sheet.gap > SLACK else ""
     return f"{text}; {number_of(done, 'position')} done before" if done else text
 
 

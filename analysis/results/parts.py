@@ -217,9 +217,7 @@ def target_lines(lengths: Quantity | None) -> list[str]:
 
 
 def scale_lines(scale: Scale | None) -> list[str]:
-    """What carries scale as lines of text, and a warning where it rests on offsets that are held
-    exact.
-    """
+    """What carries scale as a line of text; nothing where it is undetermined."""
     if scale is None:
         return []
     if all(one.without is None for one in scale.carriers):
@@ -234,9 +232,13 @@ def scale_lines(scale: Scale | None) -> list[str]:
             "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
         )
         told.append(f"{one.words} ({without} without)")
-    lines = [f"scale known to {number(1e6 * scale.uncertainty, 3)} ppm from {' and '.join(told)}"]
-    if not scale.rests_on_offsets:
-        return lines
+    return [f"scale known to {number(1e6 * scale.uncertainty, 3)} ppm from {' and '.join(told)}"]
+
+
+def scale_warnings(scale: Scale | None) -> list[str]:
+    """A warning where scale rests on offsets that are held exact, else nothing."""
+    if scale is None or not scale.rests_on_offsets:
+        return []
     warning = "warning: the scale rests on probe offsets that are held exact"
     if scale.loosened is not None:
         loose = scale.loosened
@@ -248,10 +250,7 @@ def scale_lines(scale: Scale | None) -> list[str]:
             f" one, U6 would be {average} µm on average and {most} µm at most instead of"
             f" {before} µm on average"
         )
-    return [
-        *lines,
-        f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets",
-    ]
+    return [f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets"]
 
 
 def scale_data(scale: Scale | None) -> dict[str, Any] | None:

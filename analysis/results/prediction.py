@@ -25,6 +25,7 @@ from .parts import (
     quantity_data,
     scale_data,
     scale_lines,
+    scale_warnings,
     target_lines,
     task_data,
     task_table,
@@ -95,10 +96,8 @@ class Prediction(Result):
 
     def table_lines(self) -> list[str]:
         """The same without replicates: title, verdict and table."""
-        lines = [
-            f"{self.label}: {self.title}",
-            *verdict_lines(self.verdict, with_values=True, lengths=self.lengths),
-        ]
+        rank, *others = verdict_lines(self.verdict, with_values=True, lengths=self.lengths)
+        lines = [f"{self.label}: {self.title}", rank, *scale_warnings(self.scale), *others]
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []

@@ -22,7 +22,7 @@ from ..planning.repair.written import plane_of
 from ..presentation.formatting import finite
 from ..rank.motions import moved_balls, moved_points, null_motions, weak_motions
 from ..rank.verdict import Verdict, verdict
-from ..results.parts import scale_lines, target_lines
+from ..results.parts import scale_lines, scale_warnings, target_lines
 from ..results.prediction import length_headline, rank_words
 from ..uncertainty.error_map import point_map
 from ..uncertainty.scale import scale_of
@@ -77,7 +77,8 @@ def scale_answer(experiment: Experiment) -> list[str]:
     """What carries the scale of a design, in words: it is told after the rest, since the design is
     evaluated once more without each of those that may.
     """
-    return scale_lines(scale_of(experiment, linearise(lay_out(experiment))))
+    scale = scale_of(experiment, linearise(lay_out(experiment)))
+    return [*scale_lines(scale), *scale_warnings(scale)]
 
 
 def _row(quantity: Quantity) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ..planning.repair.changes import ChangeKind, apply_all
 from ..planning.repair.offers import offers
 from ..planning.repair.repair_search import Repair, repairs
-from ..planning.repair.repair_tables import changes_in_words
+from ..planning.repair.repair_tables import caveat, changes_in_words
 from ..planning.repair.written import Edit, position_settings
 from ..results.study import planned_uncertainty
 from .answers import place_data
@@ -44,7 +44,7 @@ def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
     places = [one for one in after.positions if before.get(one.name) is not one]
     lengths = None if repair.prediction is None else repair.prediction.lengths
     return {
-        "words": changes_in_words(repair),
+        "words": changes_in_words(repair) + caveat(repair),
         "faint": repair.is_faint,
         "weak": repair.weak,
         "average": None if lengths is None else lengths.average,

@@ -265,11 +265,20 @@ def _candidate(
         _or(getattr(own, key, None), _or(getattr(times, key), default))
         for key, default in (("set_up", SET_UP), ("reading", READING))
     )
-    changes = (len(position.probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
-    seconds = set_up + position.count * reading + changes
+    seconds = seconds_of(position, set_up, reading, _or(times.probe_change, PROBE_CHANGE))
     across = "" if plane is None or references.dimension == 2 else plane
     stated = {key: value for key, value in stated.items() if key != "times"}
     return Candidate(position.name, position, seconds, across, group, drawn, stated, reading)
+
+
+def seconds_of(
+    position: Position,
+    set_up: float = SET_UP,
+    reading: float = READING,
+    probe_change: float = PROBE_CHANGE,
+) -> float:
+    """Time that a position takes by itself, in seconds; the usual one where none is stated."""
+    return set_up + position.count * reading + (len(position.probes) - 1) * probe_change
 
 
 def _or(value: float | None, default: float) -> float:

@@ -32,8 +32,10 @@ positions:
     corner: {x: 250 mm, y: 250 mm}   # the corner of the table
   - {name: shifted, corner: {x: 350 mm, y: 300 mm}}
 """
-COMMENTED = SHIFTED.replace(
-    "corner: {x: 250 mm, y: 250 mm}   #", "pose: {origin: [250 mm, 250 mm]}   #"
+# Where a pool is, no other positions are added, and one that is there is turned.
+COMMENTED = (
+    SHIFTED.replace("corner: {x: 250 mm, y: 250 mm}   #", "pose: {origin: [250 mm, 250 mm]}   #")
+    + "pool: {}\n"
 )
 
 

@@ -43,7 +43,7 @@ def shifted(**changed: Any) -> dict[str, Any]:
 
 
 def experiment(text: str, variant: str | None = None) -> Experiment:
-    return next(one for one in load(SOURCE, text=text) if one.name == variant)
+    return next(one for one in load(SOURCE, planning=True, text=text) if one.name == variant)
 
 
 def first_repair(text: str, variant: str | None = None) -> Repair:
@@ -212,7 +212,8 @@ variants:
 def test_what_others_share_is_refused(
     positions: str, variant: str | None, place: str, words: str
 ) -> None:
-    text = SHARED + positions
+    # Where a pool is, no other positions are added, and one that is there is turned.
+    text = f"{SHARED}{positions}pool: {{}}\n"
     repair = first_repair(text, variant)
     if "corner, which" in words:
         # As where the position is moved, too.

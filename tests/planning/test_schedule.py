@@ -9,8 +9,10 @@ from time import process_time
 
 import numpy as np
 import pytest
-from ballplate.planning.changeover import MOST_EXACT, Setup, changeover, cheapest
+from ballplate.planning.changeover import MOST_PLACES, Setup, changeover, cheapest
+from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.schedule import ordered, run_sheet
+from ballplate.planning.sheet_words import summary
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import Pose
@@ -54,27 +56,45 @@ def cost(sequence: Sequence[tuple[Candidate, Sequence[str]]], changes: ChangeTim
 
 
 def every_order(members: Sequence[Setup]) -> Iterator[list[tuple[Setup, tuple[str, ...]]]]:
-    """Every order of positions and of probes within them, positions of equal kind together."""
-    for order in permutations(dict.fromkeys(members)):
-        sequence = [kind for kind in order for _ in range(members.count(kind))]
-        for probes in product(*(permutations(sorted(kind.probes)) for kind in sequence)):
-            yield list(zip(sequence, probes, strict=True))
+    """Every order of positions, and of the first and last probe within them."""
+    for order in set(permutations(members)):
+        ways = [
+            list(permutations(sorted(kind.probes), 2)) or [tuple(kind.probes)] for kind in order
+        ]
+        for probes in product(*ways):
+            yield list(zip(order, probes, strict=True))
 
 
-def least_of_all(members: Sequence[Setup], changes: ChangeTimes) -> float:
-    return min(
-        cost([(position(kind, "p"), probes) for kind, probes in order], changes)
-        for order in every_order(members)
-    )
+def least_of_all(
+    members: Sequence[Setup], changes: ChangeTimes, first: Setup | None = None
+) -> float:
+    """The least cost of every order of positions, after one of the kind `first`; of each order the
+    cheapest probes are known from the least cost to come so far with each of them.
+    """
+    least = float("inf")
+    for order in set(permutations(members)):
+        costs, place = dict[str, float](), None
+        for kind in [*([] if first is None else [first]), *order]:
+            moved = changes.plane * (place not in (None, (kind.artefact, kind.plane)))
+            place, begun = (kind.artefact, kind.plane), costs
+            costs = {}
+            for one, other in permutations(sorted(kind.probes) * 2, 2):
+                if (one == other) == (len(kind.probes) == 1):
+                    so_far = [cost + changes.probe * (p != one) for p, cost in begun.items()]
+                    cost = min(so_far, default=0.0) + moved
+                    costs[other] = min(cost, costs.get(other, cost))
+        least = min(least, *costs.values()) if costs else 0.0
+    return least
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.lists(kinds, min_size=1, max_size=4), change_times)
+@settings(max_examples=60, deadline=None)
+@given(st.lists(kinds, min_size=1, max_size=5), change_times)
 def test_least_change_over_of_all_orders(members: list[Setup], changes: ChangeTimes) -> None:
     least = least_of_all(members, changes)
     assert changeover(members, changes) == least
-    sequence = ordered([position(kind, str(k)) for k, kind in enumerate(members)], changes)
-    assert cost(sequence, changes) == least
+    own = [position(kind, str(k)) for k, kind in enumerate(members)]
+    sequence, gap = ordered(own, changes)
+    assert cost(sequence, changes) == least and gap == 0.0
     assert sorted(one.name for one, _ in sequence) == [str(k) for k in range(len(members))]
     for one, probes in sequence:
         assert sorted(probes) == sorted(
@@ -89,7 +109,7 @@ def test_of_the_cheapest_orders_that_which_goes_on_from_what_is_done(
 ) -> None:
     done = position(before, "done")
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
-    (first, _), *sequence = ordered(own, changes, [done])
+    ((first, _), *sequence), _ = ordered(own, changes, [done])
     assert first is done
     least = least_of_all(members, changes)
     assert cost(sequence, changes) == least
@@ -110,13 +130,9 @@ def test_going_on_from_what_still_stands_is_paid(
 ) -> None:
     rest = position(standing, "rest")
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
-    sequence = ordered(own, changes, [], rest)
+    sequence, _ = ordered(own, changes, [], rest)
     assert sequence[0][0] is rest and sorted(sequence[0][1]) == sorted(standing.probes)
-    least = min(
-        cost([(rest, probes), *((position(kind, "p"), some) for kind, some in order)], changes)
-        for order in every_order(members)
-        for probes in permutations(sorted(standing.probes))
-    )
+    least = least_of_all(members, changes, standing)
     assert cost(sequence, changes) == least == changeover(members, changes, standing)
 
 
@@ -138,7 +154,97 @@ def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
     assert changeover([], CHANGES) == 0.0
 
 
-def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
+def random_members(generator: np.random.Generator, count: int) -> list[Setup]:
+    """Positions of a few kinds that share planes and probes, so that the order matters."""
+    names = ["down", "left", "right", "back"]
+    some = [
+        Setup(
+            ["plate", "bar"][int(generator.integers(4)) // 3],
+            "xyz"[int(generator.integers(3))],
+            frozenset(
+                generator.choice(names, int(generator.choice([1, 1, 2, 2, 3])), False).tolist()
+            ),
+        )
+        for _ in range(int(generator.integers(2, 7)))
+    ]
+    return [some[int(k)] for k in generator.integers(len(some), size=count)]
+
+
+def test_set_ups_of_two_probes_on_both_sides_of_those_of_one() -> None:
+    """The cheapest order parts two positions of one kind."""
+    both, down = (Setup("plate", "z", frozenset(some)) for some in (["right", "down"], ["down"]))
+    across = Setup("plate", "x", frozenset(["right"]))
+    sequence, _ = ordered(
+        [position(kind, str(k)) for k, kind in enumerate((both, both, down, down))], CHANGES
+    )
+    assert cost(sequence, CHANGES) == 0.0 == changeover([both, both, down, down], CHANGES)
+    ends = [across, both, both, down, across]
+    assert changeover(ends, CHANGES) == least_of_all(ends, CHANGES) == 1800.0
+    # A choice that just fits the hours is allowed, and no less.
+    own = [position(kind, str(k)) for k, kind in enumerate(ends)]
+    for seconds, is_allowed in ((5 * 600.0 + 1800.0, True), (5 * 600.0 + 1799.0, False)):
+        limits = constraints(own, CHANGES, Budget(seconds))
+        assert limits.allows(range(5)) == is_allowed
+        assert (2 in limits.additions([0, 1, 3, 4])) == is_allowed
+
+
+@pytest.mark.parametrize("plane", [0.0, 60.0, 150.0, 240.0, 1800.0])
+def test_random_positions_in_every_order(plane: float) -> None:
+    """Times with which places are worth coming back to, and times with which they are not."""
+    generator = np.random.default_rng(int(plane))
+    changes = ChangeTimes(120.0, plane)
+    for _ in range(25):
+        members = random_members(generator, 6)
+        assert changeover(members, changes) == least_of_all(members, changes), members
+
+
+def test_beyond_what_is_gone_through_a_bound_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against the least of all, which the search for few positions finds."""
+    generator, gaps = np.random.default_rng(3), []
+    for _ in range(40):
+        changes = ChangeTimes(120.0, float(generator.choice([30.0, 60.0, 150.0])))
+        members = random_members(generator, 10)
+        own = [position(kind, str(k)) for k, kind in enumerate(members)]
+        monkeypatch.setattr("ballplate.planning.changeover.MOST_POSITIONS", 12)
+        sequence, gap = ordered(own, changes)
+        least = cost(sequence, changes)
+        assert gap == 0.0
+        monkeypatch.setattr("ballplate.planning.changeover.MOST_POSITIONS", 5)
+        near, gap = ordered(own, changes)
+        assert cost(near, changes) - gap <= least <= cost(near, changes)
+        assert sorted(one.name for one, _ in near) == sorted(one.name for one in own)
+        gaps.append((cost(near, changes) - least, gap))
+    # Some are not the least, and the bound is no longer than it may be.
+    assert any(more > 0.0 for more, _ in gaps) and any(gap == 0.0 for _, gap in gaps)
+    sheet = next(
+        sheet
+        for _ in range(100)
+        if (sheet := run_sheet(sheet_of(generator), ChangeTimes(120.0, 60.0))).gap
+    )
+    assert f"(at most {sheet.gap / 60.0:.1f} min more than the least of any order)" in summary(
+        sheet
+    )
+
+
+def sheet_of(generator: np.random.Generator) -> list[Candidate]:
+    members = random_members(generator, 10)
+    return [position(kind, str(k)) for k, kind in enumerate(members)]
+
+
+def test_of_many_places_some_sets_are_followed() -> None:
+    """Eighteen places, of which each leads on to the next."""
+    names = [f"p{k}" for k in range(19)]
+    many = [
+        Setup(f"plate {k}", "z", frozenset(pair))
+        for k, pair in enumerate(zip(names, names[1:], strict=False))
+    ]
+    assert len(many) > MOST_PLACES
+    order = cheapest([(kind, 1) for kind in many], CHANGES)
+    assert {visit.kind for visit in order.visits} == set(many)
+    assert order.bound == 17 * CHANGES.plane <= order.seconds <= 17 * CHANGES.plane + 2 * 120.0
+
+
+def test_of_many_kinds_the_order_is_exact() -> None:
     # Six places with three kinds each that share probes: one change of place fewer than places is
     # least.
     many = [
@@ -147,14 +253,9 @@ def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
         for plane in "xyz"
         for probes in (["l"], ["r", "l"], ["d", "l", "r"])
     ]
-    assert len(many) > MOST_EXACT
-    began = process_time()
-    assert changeover(many, CHANGES) == 5 * CHANGES.plane
-    assert process_time() - began < 10.0
     order = cheapest([(kind, 1) for kind in many], CHANGES)
-    assert order.seconds == 5 * CHANGES.plane and {visit.kind for visit in order.visits} == set(
-        many
-    )
+    assert changeover(many, CHANGES) == order.seconds == order.bound == 5 * CHANGES.plane
+    assert {visit.kind for visit in order.visits} == set(many)
 
 
 def test_six_kinds_take_a_moment() -> None:

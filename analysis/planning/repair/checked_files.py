@@ -177,8 +177,8 @@ def checked_design(
 def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
     """A design whose prediction tells what it was checked for besides the rank."""
     prediction, repairs, certificate = design.prediction, design.repairs, design.certificate
-    lines = [*design.goals, *repair_lines(repairs, prediction.verdict)]
-    lines += certificate_lines(certificate)
+    lines = [*design.goals, *certificate_lines(certificate)]
+    lines += repair_lines(repairs, prediction.verdict)
     data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
     if with_repairs:
         data["repairs"] = repair_data(repairs)

@@ -27,7 +27,7 @@ from ...rank.verdict import Verdict
 from ...results.study import check
 from .changes import apply_all
 from .repair_search import Repair, Repairs
-from .written import Edit, edits, position_settings
+from .written import Edit, edits, lacks_probes, position_settings
 
 PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
@@ -66,6 +66,7 @@ def mended(
         if experiment.expected_rank_deficiency
         else []
     )
+    extra += _taken_from_pool(experiment, repair)
     new = with_experiment(text, source, experiment, changed, repair.edits, extra)
     (checked,) = (one for one in load(source, False, trust, new) if one.name == variant)
     verdict = check(checked).verdict
@@ -73,6 +74,21 @@ def mended(
         text = "the repaired file does not have the rank that was found; nothing is changed"
         raise experiment.refused((), text)
     return new
+
+
+def _taken_from_pool(experiment: Experiment, repair: Repair) -> Iterator[TextChange]:
+    """What the pool no longer offers, as it is in the experiment now."""
+    said, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
+    indices = [change.candidate for change in repair.changes if change.candidate >= 0]
+    taken = {pool.candidates[k].name for k in indices} if pool is not None else set()
+    for key in ("candidates", "calibration"):
+        entries = said.get(key) or ()
+        gone = [k for k, one in enumerate(entries) if str(one.get("name")) in taken]
+        if gone and len(gone) == len(entries):
+            yield TextChange(("pool", key), [])
+            continue
+        for k in reversed(gone):
+            yield TextChange(("pool", key, k), kind="remove")
 
 
 def with_experiment(
@@ -100,7 +116,8 @@ def with_experiment(
             *changes_of(experiment, edits(experiment, changed) if needed is None else needed),
             *extra,
         ],
-        key=lambda one: len(one.steps),
+        # What the pool no longer offers is left out last, so that the others keep their numbers.
+        key=lambda one: (one.steps[0] == "pool" and len(one.steps) < 4, len(one.steps)),
     )
     new = with_text_changes(text, source, experiment.name, changes)
     after = {one.name: one for one in load(source, True, experiment.trust, new)}
@@ -133,12 +150,26 @@ def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextC
     """What the experiment's own file would have to say otherwise, of a variant's its tree."""
     said = to_python(experiment.tree)
     places = {place.name: place for place in experiment.positions}
+    needed = tuple(needed)
+    if len(experiment.probes) == 1 and any(edit.steps[0] == "probes" for edit in needed):
+        # With more probes than one, what a pool offers has to name its own, too.
+        offered = (said.get("pool") or {}).get("candidates") or ()
+        for k, one in enumerate(offered):
+            for i, group in enumerate(one.get("readings", [one])):
+                if "probes" not in group:
+                    inner = ("readings", i) if "readings" in one else ()
+                    yield TextChange(
+                        ("pool", "candidates", k, *inner, "probes"), [*experiment.probes]
+                    )
     for edit in needed:
         if edit.steps[0] == "positions" and not edit.is_new:
             name = str(edit.steps[1])
             at = next(i for i, one in enumerate(said["positions"]) if str(one["name"]) == name)
             settings = position_settings(experiment, places[name])
             steps: Steps = ("positions", at)
+            if lacks_probes(said["positions"][at]):
+                for group in settings.get("readings", [settings]):
+                    group.pop("probes", None)
             yield from _of_position(steps, said["positions"][at], settings, edit.value)
         else:
             yield TextChange(edit.steps, edit.value, "append" if edit.is_new else "set")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
@@ -15,15 +16,19 @@ from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.experiment.pools import seconds_of
 from ballplate.simulator.machines.protocol import Array
 
 from ...rank.verdict import independent_mixture
 from ...results.prediction import Prediction
 from ...results.study import predict
+from ...uncertainty.pairs import PairSummary
+from ...uncertainty.scale import OFFSET_TRIAL, lengths_with_offsets
 from .changes import EFFORT, Change, ChangeKind, apply_all, go_together, is_inside
 from .covering import covering_pairs, covering_set, different
 from .judging import Examined, Judged, examine, judge, removed, work
 from .offers import allowed, offers
+from .scale import scale_certificate
 from .screening import rank_of, seen_by, weakest_of
 from .written import Edit, edits
 
@@ -31,6 +36,8 @@ from .written import Edit, edits
 MOST_TOLD = 3
 # Repairs of single directions told.
 MOST_PARTIAL = 4
+# Equally cheap repairs of a kind whose U6 with uncertain offsets is compared.
+MOST_COMPARED = 12
 # Changes in a set: as many as directions are open, within bounds.
 FEWEST_TOGETHER, MOST_TOGETHER = 3, 6
 # Judgements of a kind: as many as this amount of work allows, within bounds.
@@ -45,11 +52,13 @@ MOST_VERIFIED = 8
 class Repair:
     """Changes that leave nothing undetermined, with the prediction of the changed design.
 
-    `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts
-    directions still weakly determined, of which `worst` is what one standard deviation along the
-    weakest adds to corrected points, in metres. `smallest` is the smallest singular value, and
-    `is_faint` says that it is far below those of the design before. `edits` is what the file is to
-    say.
+    They take `readings` and `seconds` more. `loosened` are the lengths, U6, where probe offsets
+    that the file holds exact have a standard uncertainty of `OFFSET_TRIAL`, None where these are
+    undetermined. `removes` are the numbers, from 0, of the undetermined directions that are gone.
+    `weak` counts directions still weakly determined, of which `worst` is what one standard
+    deviation along the weakest adds to corrected points, in metres. `smallest` is the smallest
+    singular value, and `is_faint` says that it is far below those of the design before. `edits` is
+    what the file is to say.
     """
 
     changes: tuple[Change, ...]
@@ -61,6 +70,24 @@ class Repair:
     is_faint: bool
     prediction: Prediction | None
     edits: tuple[Edit, ...]
+    readings: int
+    seconds: float
+    loosened: PairSummary | None
+
+    @property
+    def rests_on_offsets(self) -> bool:
+        """Whether scale then rests on probe offsets that are held exact."""
+        scale = None if self.prediction is None else self.prediction.scale
+        return scale is not None and scale.rests_on_offsets
+
+    @property
+    def order(self) -> tuple[bool, bool, float, float]:
+        """The better, the smaller: what repairs in more than name and asks for no less, then by U6
+        with uncertain offsets, then by the time that it takes.
+        """
+        u6 = inf if self.loosened is None else self.loosened.total / self.loosened.count
+        asks_for_less = any(change.kind == ChangeKind.MODEL for change in self.changes)
+        return bool(self.weak) or self.is_faint, asks_for_less, float(comparable(u6)), self.seconds
 
 
 @dataclass(frozen=True)
@@ -130,21 +157,12 @@ class _Search:
             together = self.set_of_additions(changes) if self.is_worth_more(possible) else ()
             possible += [together] if together else []
             if possible:
-                best[kind] = min(possible, key=self.preference)
+                best[kind] = self.best_of(possible)
         for together in self.mixed(found, best):
             best[max(one.kind for one in together)] = together
-        # What costs nothing comes before what the pool has a price for.
-        order = sorted(
-            best,
-            key=lambda kind: (
-                not self.is_sound(self.judge(best[kind])),
-                kind != ChangeKind.MOVE,
-                kind,
-            ),
-        )
-        complete = tuple(
-            self.told(best[kind]) for kind in order[: self.most] if self.helps(best[kind])
-        )
+        order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
+        told = [self.told(best[kind]) for kind in order if self.helps(best[kind])]
+        complete = self.ranked(told)
         is_single = any(
             len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete
         )
@@ -155,6 +173,20 @@ class _Search:
             {kind: len(self.tried[kind]) for kind in sorted(self.tried)},
             self.sets,
         )
+
+    def ranked(self, told: Sequence[Repair]) -> tuple[Repair, ...]:
+        """The best repairs first; where even scale of the best rests on probe offsets, that with a
+        calibrated distance besides comes before it.
+        """
+        order = sorted(told, key=lambda one: one.order)
+        if order and order[0].rests_on_offsets and self.base.experiment.pool is None:
+            assert order[0].prediction is not None
+            changed = apply_all(order[0].changes, self.base.experiment)
+            certificate = scale_certificate(changed, order[0].prediction.scale)
+            if certificate is not None and certificate.change is not None:
+                with_length = self.told((*order[0].changes, certificate.change))
+                order = sorted([with_length, *order], key=lambda one: one.order)
+        return tuple(order[: self.most])
 
     def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
         """Whether several changes of a kind may be better than the best one."""
@@ -240,6 +272,17 @@ class _Search:
             len(changes),
             float(comparable(after.spread)),
         )
+
+    def best_of(self, possible: Sequence[tuple[Change, ...]]) -> tuple[Change, ...]:
+        """Of the cheapest repairs of a kind that with the smallest U6 with uncertain offsets."""
+        order = sorted(possible, key=self.preference)
+        equal = [one for one in order if self.preference(one)[:3] == self.preference(order[0])[:3]]
+        return min(equal[:MOST_COMPARED], key=self.loosened) if len(equal) > 1 else order[0]
+
+    def loosened(self, changes: tuple[Change, ...]) -> float:
+        """Average U6 of changes where exact offsets are uncertain."""
+        lengths = _loosened(apply_all(changes, self.base.experiment))
+        return inf if lengths is None else float(comparable(lengths.total / lengths.count))
 
     def thinned(self, changes: Sequence[Change]) -> list[Change]:
         """No more of them than can be judged, evenly from all."""
@@ -368,7 +411,7 @@ class _Search:
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)
         after = self.judge(changes)
-        planned = predict(placed_only(changed)) if removes is None else None
+        planned = predict(placed_only(changed), with_scale=True) if removes is None else None
         if planned is not None and planned.verdict.deficiency != after.deficiency:
             raise AssertionError("two computations of one design's rank differ")
         gone = tuple(range(self.before.deficiency)) if removes is None else removes
@@ -382,4 +425,22 @@ class _Search:
             self.is_faint(after),
             planned,
             edits(experiment, changed),
+            sum(one.count for one in changed.positions)
+            - sum(one.count for one in experiment.positions),
+            _seconds_more(experiment, changes),
+            _loosened(changed) if removes is None else None,
         )
+
+
+def _loosened(experiment: Experiment) -> PairSummary | None:
+    return lengths_with_offsets(placed_only(experiment), OFFSET_TRIAL)
+
+
+def _seconds_more(experiment: Experiment, changes: Sequence[Change]) -> float:
+    """Time that changes take, in seconds: what the pool states, else as long as usual."""
+    seconds = sum(one.cost for one in changes if one.kind == ChangeKind.POOL)
+    rest = [one for one in changes if one.kind != ChangeKind.POOL]
+    before = {place.name: seconds_of(place) for place in experiment.positions}
+    for place in apply_all(rest, experiment).positions:
+        seconds += seconds_of(place) - before.get(place.name, 0.0)
+    return seconds

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 from ...presentation.formatting import finite, number
 from ...rank.proposed_bars import listed
 from ...rank.verdict import Direction, Verdict, length
+from ...uncertainty.scale import OFFSET_TRIAL, exact_offsets
 from .changes import KINDS
+from .offers import duration
 
 if TYPE_CHECKING:
     from .repair_search import Repair, Repairs
@@ -60,12 +62,32 @@ def _worth(repair: Repair, judged: Verdict) -> str:
         words += ", but only just: see the smallest singular value"
     else:
         words += ", and nothing is weakly determined"
+    u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
+    words += caveat(repair)
+    if u6 is not None:
+        words += f"; average U6 {number(1e6 * u6.average)} µm{_with_offsets(repair)}"
+    minutes = f"{duration(repair.seconds)} more" if repair.seconds else "no time more"
+    words += f"; {repair.readings:+d} readings, {minutes}" if repair.readings else ""
     if repair.removes:
         words += f"; removes {_directions(repair, judged)}"
-    u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
-    if u6 is not None:
-        words += f"; average U6 {number(1e6 * u6.average)} µm"
     return f"{words}; smallest singular value {repair.smallest:.3g}"
+
+
+def caveat(repair: Repair) -> str:
+    """That scale rests on offsets taken as exact after a repair; empty where it does not."""
+    return "; scale rests on probe offsets taken as exact" if repair.rests_on_offsets else ""
+
+
+def _with_offsets(repair: Repair) -> str:
+    """What becomes of U6 where exact offsets are uncertain, if that is another."""
+    if repair.prediction is None or repair.prediction.experiment is None:
+        return ""
+    if not exact_offsets(repair.prediction.experiment):
+        return ""
+    loose, trial = repair.loosened, f"with {1e6 * OFFSET_TRIAL:g} µm on the exact probe offsets"
+    if loose is None:
+        return f", undetermined {trial}"
+    return f", {number(1e6 * loose.total / loose.count)} µm {trial}"
 
 
 def _directions(repair: Repair, judged: Verdict) -> str:
@@ -156,6 +178,7 @@ def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
 
 def _data(repair: Repair) -> dict[str, Any]:
     u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
+    loose = repair.loosened
     return {
         "changes": [
             {"kind": KINDS[change.kind], "text": change.words} for change in repair.changes
@@ -166,6 +189,11 @@ def _data(repair: Repair) -> dict[str, Any]:
         "weakest": repair.worst,
         "smallest_singular_value": repair.smallest,
         "average_U6": None if u6 is None else finite(u6.average),
+        "average_U6_with_uncertain_offsets": None if loose is None else loose.total / loose.count,
+        "offset_uncertainty": OFFSET_TRIAL,
+        "rests_on_exact_offsets": repair.rests_on_offsets,
+        "readings": repair.readings,
+        "seconds": repair.seconds,
         "edits": [
             {"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in repair.edits
         ],

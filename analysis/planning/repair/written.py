@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +21,7 @@ from ballplate.simulator.geometry.positions import (
 from ballplate.simulator.inputs.messages import Step, format_path
 from ballplate.simulator.inputs.quantities import LengthFunction, parse_length, typed_length
 from ballplate.simulator.inputs.yamltext import flow
-from ballplate.simulator.inputs.yamltree import to_list
+from ballplate.simulator.inputs.yamltree import to_list, to_python
 from ballplate.simulator.machines.protocol import Array
 
 from .changes import ball_set, pair_set
@@ -62,11 +63,14 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
         if name not in before.probes:
             found.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
     known = {place.name: position_settings(before, place) for place in before.positions}
+    # With one probe, a file need not name it.
+    named = to_python(before.tree).get("positions", ()) if len(after.probes) > 1 else ()
+    unnamed = {str(one["name"]) for one in named if len(before.probes) == 1 and lacks_probes(one)}
     for place in after.positions:
         settings = position_settings(after, place)
         if place.name not in known:
             found.append(Edit(("positions",), settings, True))
-        elif settings != known[place.name]:
+        elif settings != known[place.name] or place.name in unnamed:
             found.append(Edit(("positions", place.name), settings))
     candidates = () if after.pool is None else after.pool.candidates
     for k, item in enumerate(after.calibration):
@@ -87,6 +91,11 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
             if value != old.get(key)
         ]
     return tuple(found)
+
+
+def lacks_probes(said: Mapping[str, Any]) -> bool:
+    """Whether what a file says of a position leaves out which probes read it."""
+    return any("probes" not in group for group in said.get("readings", [said]))
 
 
 def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:

@@ -220,7 +220,10 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
                 )
                 for edit in one.data["edits"]
             )
-            u6 = one.micro("average_U6") if one.data["average_U6"] is not None else "-"
+            u6, loose = (
+                one.micro(symbol) if one.data[symbol] is not None else "-"
+                for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
+            )
             rows.append(
                 [
                     name,
@@ -228,6 +231,8 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
                     one.number("rank_deficiency"),
                     one.number("weakly_determined"),
                     u6,
+                    loose,
+                    one.number("readings"),
                     element("ul", edits, class_="edits"),
                 ]
             )
@@ -239,9 +244,12 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         "rank deficiency then",
         "weak directions then",
         "U6 average then, µm",
+        "with 1 µm on exact offsets, µm",
+        "more readings",
         "in the file",
     ]
-    made_table = table("repairs", "Changes, cheapest first, each verified", heads, rows, (0, 1, 5))
+    title = "Changes, by U6 with uncertain probe offsets, each verified"
+    made_table = table("repairs", title, heads, rows, (0, 1, 7))
     whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
     told = "Each of these determines what is open."
     if not whole:
