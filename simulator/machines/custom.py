@@ -73,12 +73,12 @@ def custom_model(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
     )
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
-    kind = OwnModelWithLines if isinstance(model, HasLines) else OwnModel
+    kind = GuardedModelWithLines if isinstance(model, HasLines) else GuardedModel
     return kind(model, tuple(model.parameters))
 
 
 @dataclass(frozen=True)
-class OwnModel:
+class GuardedModel:
     """A user's error `model`, whose every answer is checked."""
 
     model: ErrorModel
@@ -106,7 +106,7 @@ class OwnModel:
         return found
 
 
-class OwnModelWithLines(OwnModel):
+class GuardedModelWithLines(GuardedModel):
     """The same of a model whose error functions can be drawn."""
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:

@@ -231,11 +231,11 @@ def ball_functions(
         f"{name} has failed", lambda: build(names, drawn.copy(), **with_quantities(options)), key
     )
     _check(name, found, drawn)
-    return OwnBallFunctions(found, tuple(found.names), found.unit)
+    return GuardedFunctions(found, tuple(found.names), found.unit)
 
 
 @dataclass(frozen=True)
-class OwnBallFunctions:
+class GuardedFunctions:
     """A user's `functions` of balls, whose every answer is checked."""
 
     functions: BallFunctions
