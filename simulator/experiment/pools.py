@@ -59,7 +59,7 @@ class Candidates:
         """Add a candidate unless the same stands there already."""
         key = _identity(candidate.item) if isinstance(candidate.item, Position) else candidate.name
         if key in self.seen and not candidate.drawn:
-            self.drop("stands there twice")
+            self.drop("the same as others")
             return
         self.seen.setdefault(key, candidate.name)
         name, k = candidate.name, 1
