@@ -199,7 +199,7 @@ def test_too_many_coefficients_are_recommended_as_rarely_as_stated(
     smallest: float, limit: float
 ) -> None:
     """The levels of the tests, 1 % and 5 %, hold where every coefficient shows."""
-    kinds, count = (0, 1, 2, 3, 6, 8), 150
+    kinds, count = (0, 1, 2, 3, 6, 8), 100
     found = [too_many(kind, count, smallest) for kind in kinds]
     total, campaigns = sum(found), count * len(kinds)
     low = scipy.stats.beta.ppf(0.025, total, campaigns - total + 1)
