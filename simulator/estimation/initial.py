@@ -57,11 +57,11 @@ def initial_state(design: Design, x: Array) -> State:
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
     if design.positions.across is not None:
-        for k in np.flatnonzero(design.positions.across >= 0).tolist():
-            rotations[k], origins[k] = _in_plane(design, k, seen[k], balls, origins[k])
-        is_read = design.positions.across[:, None] >= 0
-        held = is_read & design.positions.held[:, : design.dimension]
-        origins = np.where(held, design.positions.origins, origins)
+        for k, across in enumerate(design.positions.across.tolist()):
+            if across >= 0:
+                rotations[k], there = _in_plane(design, k, across, seen[k], balls, origins[k])
+                is_held = design.positions.held[k, :d]
+                origins[k] = np.where(is_held, design.positions.origins[k], there)
     readings = design.readings
     for k in design.gauge_positions:
         rows = readings.position == k
@@ -76,12 +76,12 @@ def initial_state(design: Design, x: Array) -> State:
 
 
 def _in_plane(
-    design: Design, k: int, seen: Array, balls: Array, origin: Array
+    design: Design, k: int, across: int, seen: Array, balls: Array, origin: Array
 ) -> tuple[Array, Array]:
     """The pose of a position that is read in its plane, from where its balls (n, 3) were seen: out
     of the plane nothing is read that could tell poses from the drawing's.
     """
-    across, drawn = int(design.positions.across[k]), design.positions.rotations[k]
+    drawn = design.positions.rotations[k]
     own, inside = ~np.isnan(seen).all(axis=1), np.arange(3) != across
     turn, places = np.eye(3), balls[own] @ drawn.T
     if own.sum() > 1 and not design.positions.held[k, 3 + across]:

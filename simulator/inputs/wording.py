@@ -162,8 +162,8 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
             )
         return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
     if kind == "literal_error":
-        is_plane = not {"plane", "planes"}.isdisjoint(steps) and isinstance(value, str)
-        if is_plane and (across := _across(value)):
+        is_plane = not {"plane", "planes"}.isdisjoint(steps)
+        if is_plane and isinstance(value, str) and (across := _across(value)):
             text = f'the plane "{value}" is normal to {across}; write {across}'
             return Explanation(steps, text)
         return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))

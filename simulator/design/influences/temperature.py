@@ -361,7 +361,7 @@ def _parts(
             words = of_axis(len(differences), axis)
             sensor = add(f"sensor error of {words}", "K", 0.0, measured.sensor_uncertainty, size)
             errors = np.full(len(here), -1)
-            for k in np.flatnonzero(here) if measured.standard_uncertainty else ():
+            for k in np.flatnonzero(here).tolist() if measured.standard_uncertainty else ():
                 text = f"temperature error of {words} in {positions[k]}"
                 errors[k] = add(text, "K", 0.0, measured.standard_uncertainty, size, int(k))
         along = axis if count > 1 else whole
