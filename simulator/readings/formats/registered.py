@@ -33,7 +33,7 @@ def recognised(text: str) -> Format | None:
 
 
 def is_table(text: str) -> bool:
-    """Whether lines of a text are rows of the same columns, three of which hold numbers.
+    """Whether lines of a text are rows of the same columns, of a name at least and three numbers.
 
     >>> is_table("p;b;x;y;z\\nlow;1;0,1;2,5;3"), is_table("one, two, three, four\\nfive")
     (True, False)
@@ -43,7 +43,7 @@ def is_table(text: str) -> bool:
         for before, row in pairwise(lines[:50]):
             cells = row.split(separator)
             numbers = sum(NUMBER.fullmatch(cell.strip(' "')) is not None for cell in cells)
-            if numbers >= 3 and len(cells) == len(before.split(separator)):
+            if numbers >= 3 and 4 <= len(cells) == len(before.split(separator)):
                 return True
     return False
 
