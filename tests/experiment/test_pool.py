@@ -422,7 +422,7 @@ MISTAKES = [
         '14:19: pool.times.set_up: "20 mm" is a length; a duration is expected, for example "20 min"',
         '14:35: pool.times.reading: "5" has no unit; write for example "5 min" or "5 s"',
         '14:52: pool.times.probe_change: "-1 s" is below zero; write for example "20 min"',
-        "14:58: pool.times.plane: unknown key; known: plane_change"]),
+        "14:58: pool.times.plane: unknown key; known: plane_change, positions"]),
     ("planes: [z, x]", "plane: [z, x]", ['18:7: pool.candidates[0].plane: unknown key; did you mean "planes"?']),
     ("planes: [z, x]", "planes: [z]", [
         "20:45: pool.candidates[0].corners.z: is not an axis of the planes; remove it, or add to planes",
