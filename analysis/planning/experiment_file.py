@@ -195,7 +195,7 @@ def _times(said: Mapping[str, Any], pool: Pool, chosen: Sequence[Candidate]) -> 
         key: one for key, one in said.get("pool", {}).get("times", {}).items() if key != "positions"
     }
     common = TimesSettings.model_validate(times)
-    own = {}
+    own: dict[str, dict[str, str]] = {}
     for one in chosen:
         if isinstance(one.item, Position):
             changes = (len(one.item.probes) - 1) * pool.changes.probe
