@@ -891,8 +891,10 @@ def sheet(experiment: Experiment | PathLike) -> Sheet:
     ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
     """
     from .planning.sheet import sheet_of
+    from .simulator.experiment.load import with_pool
 
-    return sheet_of(_experiment(experiment))
+    found = _experiment(experiment)
+    return sheet_of(found if found is experiment else with_pool(found))
 
 
 def reliability(

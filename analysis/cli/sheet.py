@@ -84,7 +84,7 @@ def run(options: Namespace) -> int:
         raise UsageError(text)
     if options.ball_diameter is not None and not is_dmis:
         raise UsageError("--ball-diameter is for --points with a name that ends in .dmi")
-    sheet = sheet_of(single(options))
+    sheet = sheet_of(single(options, planning=True))
     texts: dict[Path, str] = {}
     if options.output is not None:
         texts[options.output] = sheet.text(options.output.suffix.lower())

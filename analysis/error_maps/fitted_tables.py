@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Sequence
-from itertools import islice
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from ..presentation.formatting import aligned, csv_lines, number, picked, to_uncertainty
+from ..presentation.formatting import aligned, number, picked, to_uncertainty
 from .fitted_errors import FittedErrors, FittedLengths
 from .realisations import Realisations
-from .volumetric_tables import CONVENTION
+from .volumetric_tables import CONVENTION, tables_csv, with_drawn
 
 UNDETERMINED = "undetermined"
 
@@ -129,22 +126,15 @@ def point_csv(
     and only that has uncertainties.
     """
     letters = "xyz"[: found.points.shape[1]]
-    heads = [*(["point"] if names else []), *(f"{letter}_mm" for letter in letters)]
+    heads = [f"{letter}_mm" for letter in letters]
     heads += [f"error_{letter}_um" for letter in letters]
     heads += [f"U_{letter}_um" for letter in letters]
-    yield ",".join([*(["realisation"] if realisations else []), *heads, "resultant_um", "k"])
-    none = np.full_like(found.uncertainties, np.nan)
-    drawn = [] if realisations is None else [(one, none) for one in realisations.errors]
-    labels = io.StringIO()
-    writer = CsvWriter(labels)
-    writer.writerows([name] for name in names)
-    quoted = labels.getvalue().splitlines() if names else [""] * len(found.points)
-    for i, (errors, u) in enumerate([(found.errors, found.uncertainties), *drawn]):
-        resultant, k = 1e6 * np.linalg.norm(errors, axis=1), np.full(len(errors), factor)
-        columns = [1e3 * found.points, 1e6 * errors, 1e6 * factor * u, resultant, k]
-        numbers = islice(csv_lines([], *columns), 1, None)
-        for name, line in zip(quoted, numbers, strict=True):
-            yield ",".join([*([str(i)] if realisations else []), *([name] if names else []), line])
+    k = np.full(len(found.points), factor)
+    tables = [
+        [1e3 * found.points, 1e6 * error, 1e6 * factor * u, 1e6 * np.linalg.norm(error, axis=1), k]
+        for error, u in with_drawn(found.errors, found.uncertainties, realisations)
+    ]
+    return tables_csv([*heads, "resultant_um", "k"], tables, realisations is not None, names)
 
 
 def _point(point: Array) -> str:

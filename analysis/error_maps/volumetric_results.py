@@ -152,7 +152,7 @@ class ErrorsAtPoints(MachineErrors):
         return [dict(zip(columns, row, strict=True)) | {"unit": "m"} for row in values]
 
     def point_lines(self) -> Iterator[str]:
-        return error_csv(self.errors)
+        return error_csv(self.errors, self.realisations, self.places.names_of_points)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The errors as vectors, magnified, seen from the front and above."""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import io
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.arrangement import AXES, Arrangement
 from ballplate.simulator.machines.curves import NAMES, SmoothedPoints
 from ballplate.simulator.machines.protocol import Array, Parameter
@@ -24,6 +27,7 @@ from ..presentation.formatting import (
     number,
     records,
 )
+from .realisations import Realisations
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = (
@@ -247,18 +251,44 @@ def _line_stated(along: AlongAxis) -> str:
     return "at the reference point (no line stated)" if along.error.line is None else ""
 
 
-def error_csv(errors: VolumetricErrors) -> Iterator[str]:
+def error_csv(
+    errors: VolumetricErrors, realisations: Realisations | None, names: Sequence[str] = ()
+) -> Iterator[str]:
     """Errors as lines of a CSV file."""
-    return csv_lines(
-        [
-            "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um",
-            "random_x_um,random_y_um,random_z_um",
-        ],
-        1e3 * errors.points,
-        1e6 * errors.systematic,
-        1e6 * errors.resultant,
-        1e6 * errors.deviation,
-    )
+    heads = [*(f"{axis}_mm" for axis in AXES), *(f"error_{axis}_um" for axis in AXES)]
+    heads += ["resultant_um", *(f"random_{axis}_um" for axis in AXES)]
+    tables = [
+        [1e3 * errors.points, 1e6 * error, 1e6 * np.linalg.norm(error, axis=1), 1e6 * deviation]
+        for error, deviation in with_drawn(errors.systematic, errors.deviation, realisations)
+    ]
+    return tables_csv(heads, tables, realisations is not None, names)
+
+
+def with_drawn(
+    errors: Array, uncertainties: Array, realisations: Realisations | None
+) -> list[tuple[Array, Array]]:
+    """Errors (m, d) with their uncertainties, then those of realisations, which have none."""
+    drawn = [] if realisations is None else list(realisations.errors)
+    none = np.full_like(uncertainties, np.nan)
+    return [(errors, uncertainties), *((error, none) for error in drawn)]
+
+
+def tables_csv(
+    heads: Sequence[str],
+    tables: Sequence[Sequence[Array]],
+    numbered: bool,
+    names: Sequence[str] = (),
+) -> Iterator[str]:
+    """Tables of the same columns as lines of one CSV file, with the `names` of their points; in
+    those that are `numbered` a column tells which realisation a row is of, 0 the estimate.
+    """
+    yield ",".join([*(["realisation"] if numbered else []), *(["point"] if names else []), *heads])
+    labels = io.StringIO()
+    CsvWriter(labels).writerows([name] for name in names)
+    quoted = [f"{label}," for label in labels.getvalue().splitlines()] or [""] * len(tables[0][0])
+    for i, columns in enumerate(tables):
+        for name, line in zip(quoted, islice(csv_lines([], *columns), 1, None), strict=True):
+            yield (f"{i}," if numbered else "") + name + line
 
 
 def along_csv(along: AlongAxis) -> Iterator[str]:

@@ -34,7 +34,17 @@ from .least_drift import least_drift
 from .offer import Offer, offer, open_directions
 from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
 from .schedule import Completion, run_sheet
-from .search import GAIN, Found, Losses, SelectionProblem, improve, ranked_additions, starts, value
+from .search import (
+    GAIN,
+    Found,
+    Losses,
+    SelectionProblem,
+    improve,
+    judged,
+    ranked_additions,
+    starts,
+    value,
+)
 from .selection import Campaign
 from .short_names import short_names
 from .whole_pool import pool_gap
@@ -189,7 +199,7 @@ def _campaign(
     expected = left_open
     if information.deficiency:
         expected += experiment.expected_rank_deficiency or 0
-    _refuse_unusable(experiment, chosen, budget)
+    _refuse_unusable(experiment, chosen, limits)
     unlimited = replace(problem, constraints=free)
     done = tuple(candidates[k] for k in offered.done)
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
@@ -296,13 +306,19 @@ def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
     return found
 
 
-def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget: Budget) -> None:
+def _refuse_unusable(
+    experiment: Experiment, chosen: Sequence[Candidate], limits: Constraints
+) -> None:
     """Refuse a choice that is no experiment: without a position, or with balls that nobody
     reads.
     """
     positions = [one.item for one in chosen if isinstance(one.item, Position)]
     if not positions:
-        raise _impossible(experiment, "pool", f"no position can be read with {budget}; allow more")
+        every = range(limits.count)
+        if limits.can_read(every):
+            text = f"no choice with {limits.budget} determines anything; add other positions"
+            raise _impossible(experiment, "pool", text)
+        raise _out_of_reach(experiment, limits, every, "no position can be read")
     for name in {position.artefact for position in positions}:
         own = [position for position in positions if position.artefact == name]
         read = {ball for position in own for ball in position.balls.tolist()}
@@ -325,10 +341,8 @@ def _refuse_lacking(
     """Refuse a choice without what every choice needs."""
     for plate, others in begun.items():
         if set(others).isdisjoint(best.chosen):
-            text = f'"{plate}" was begun, but no position of its other balls can be read with'
-            raise _impossible(
-                experiment, "pool", f"{text} {problem.constraints.budget}; allow more"
-            )
+            text = f'"{plate}" was begun, but no position of its other balls can be read'
+            raise _out_of_reach(experiment, problem.constraints, others, text)
     for members in problem.constraints.at_least:
         if set(members).isdisjoint(best.chosen):
             name = problem.information.candidates[members[0]].name
@@ -336,19 +350,34 @@ def _refuse_lacking(
             raise _impossible(
                 experiment, "pool.limits.keep", f"{text} {problem.constraints.budget}; allow more"
             )
-    missing = [
-        name for name, placing in problem.criterion.needed if set(placing).isdisjoint(best.chosen)
-    ]
+    missing = {
+        name: placing
+        for name, placing in problem.criterion.needed
+        if set(placing).isdisjoint(best.chosen)
+    }
     if missing:
         names, name = listing(f'"{one}"' for one in missing), problem.criterion.name
-        text = (
-            f"{name} includes the distances of {names}, but no position of these can be read with "
+        raise _out_of_reach(
+            experiment,
+            problem.constraints,
+            [k for placing in missing.values() for k in placing],
+            f"{name} includes the distances of {names}, but no position of these can be read",
+            ", keep one, or take the artefact out of the pool",
         )
-        text += (
-            f"{problem.constraints.budget}; allow more, keep one, or take the artefact out of the"
-            " pool"
-        )
-        raise _impossible(experiment, "pool", text)
+
+
+def _out_of_reach(
+    experiment: Experiment,
+    limits: Constraints,
+    members: Collection[int],
+    text: str,
+    or_else: str = "",
+) -> ExperimentError:
+    """That none of some positions can be read: for the limits on choosing them, or the budget."""
+    if limits.forbids(members):
+        why = "as limits allow none of them; change at_most or never_together"
+        return _impossible(experiment, "pool.limits", f"{text}, {why}{or_else}")
+    return _impossible(experiment, "pool", f"{text} with {limits.budget}; allow more{or_else}")
 
 
 def _as_drawn(
@@ -450,7 +479,7 @@ def _best_of_all(problem: SelectionProblem, report: Report) -> Found:
         (chosen for chosen in tried if limits.allows(chosen)),
         key=lambda one: (losses.of(one), sorted(one)),
     )
-    return Found(tuple(sorted(best)), value(problem, best))
+    return judged(problem, best)
 
 
 def _is_just_enough(problem: SelectionProblem, best: Found) -> bool:

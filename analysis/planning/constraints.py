@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -115,6 +115,15 @@ class Constraints:
             )
             and self.spent(members).is_within(self.budget)
         )
+
+    def can_read(self, members: Collection[int]) -> bool:
+        """Whether any of some candidates is a position that may be read beside what has to be."""
+        may_be = {*self.must, *self.additions(self.must).tolist()}
+        return any(self.kinds[k] is not None for k in may_be.intersection(members))
+
+    def forbids(self, members: Collection[int]) -> bool:
+        """Whether none of some positions could be read with any budget."""
+        return not replace(self, budget=Budget()).can_read(members)
 
     def additions(self, chosen: Collection[int]) -> NDArray[np.int64]:
         """Candidates that a selection, which keeps to the limits itself, may be extended by, one at

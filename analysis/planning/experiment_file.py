@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.model import Candidate, Experiment, Pool, Position
+from ballplate.simulator.experiment.pool_sections import TimesSettings
+from ballplate.simulator.experiment.pools import READING, SET_UP
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.experiment.variants import variant_trees
 from ballplate.simulator.inputs.messages import ExperimentError, format_path, in_one_line
 from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.yamltree import (
     LOADER,
     Node,
@@ -45,6 +48,7 @@ def experiment_text(
     expected_rank_deficiency: int | None = None,
     names: Mapping[str, str] | None = None,
     of_influences: Mapping[int, dict[str, Any]] | None = None,
+    with_times: bool = False,
 ) -> str:
     """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
     in their order.
@@ -54,7 +58,8 @@ def experiment_text(
     stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
     position places, what is known of them, and priors about other positions. `names` are the short
     names of chosen positions by those in the pool. `of_influences` are keys of influence quantities
-    that are others, by the places of these in their list.
+    that are others, by the places of these in their list. `with_times` a pool says how long the
+    positions take.
 
     Of an experiment that was made or changed in Python nothing of a file is kept.
 
@@ -64,6 +69,8 @@ def experiment_text(
     text, root, tree = _source(experiment)
     assert isinstance(root, MappingNode) and isinstance(tree, MappingNode)
     content = _content(tree, experiment, chosen, names or {}, of_influences or {})
+    if with_times and experiment.pool is not None:
+        content["pool"] = {"times": _times(to_list(to_python(tree)), experiment.pool, chosen)}
     if title is not None:
         content["title"] = title
     if expected_rank_deficiency is not None:
@@ -180,6 +187,28 @@ def _content(
         for key in order
         if key not in LEFT_OUT and (said[key] != [] or key == "positions")
     }
+
+
+def _times(said: Mapping[str, Any], pool: Pool, chosen: Sequence[Candidate]) -> dict[str, Any]:
+    """How long things take, and chosen positions where that is other for them, as a pool has it."""
+    times = {
+        key: one for key, one in said.get("pool", {}).get("times", {}).items() if key != "positions"
+    }
+    common = TimesSettings.model_validate(times)
+    own: dict[str, dict[str, str]] = {}
+    for one in chosen:
+        if isinstance(one.item, Position):
+            changes = (len(one.item.probes) - 1) * pool.changes.probe
+            set_up = one.seconds - one.readings * one.reading_seconds - changes
+            stated = {"set_up": (set_up, common.set_up, SET_UP)}
+            stated["reading"] = (one.reading_seconds, common.reading, READING)
+            differ = {
+                key: format_duration(value)
+                for key, (value, given, default) in stated.items()
+                if abs(value - (default if given is None else given)) > 1e-6
+            }
+            own |= {one.name: differ} if differ else {}
+    return {**times, **({"positions": own} if own else {})}
 
 
 def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, Any]:

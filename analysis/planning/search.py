@@ -89,16 +89,17 @@ class SelectionProblem:
 @dataclass(frozen=True)
 class Found:
     """A selection: indices of candidates, sorted, and the criterion, infinite where the selection
-    is deficient.
+    is deficient; then `lack` compares what it leaves undetermined.
     """
 
     chosen: tuple[int, ...]
     value: float
+    lack: float = 0.0
 
     @property
-    def order(self) -> tuple[float, tuple[int, ...]]:
+    def order(self) -> tuple[float, float, tuple[int, ...]]:
         """The better, the smaller; equal ones by the order of candidates."""
-        return float(comparable(self.value, COMPARED)), self.chosen
+        return float(comparable(self.value, COMPARED)), self.lack, self.chosen
 
 
 def full_root(information: Array) -> Array | None:
@@ -336,7 +337,14 @@ def improve(
                 if losses.of(found) < losses.of(members) * (1 - GAIN):
                     members = found
         size = size + 1 if members == before else 1
-    return Found(tuple(sorted(members)), value(problem, members))
+    return judged(problem, members)
+
+
+def judged(problem: SelectionProblem, members: frozenset[int]) -> Found:
+    """A selection with its criterion, or what compares it with other deficient ones."""
+    found = value(problem, members)
+    lack = 0.0 if np.isfinite(found) else Losses(problem).of(members)
+    return Found(tuple(sorted(members)), found, lack)
 
 
 def ranked_additions(problem: SelectionProblem, chosen: Collection[int]) -> list[tuple[int, float]]:

@@ -84,6 +84,7 @@ class Campaign(Selection, Result):
             deficiency,
             self.names,
             in_order_settings(self.chosen_experiment),
+            with_times=True,
         )
 
     def sheet_text(self, form: str = ".txt") -> str:

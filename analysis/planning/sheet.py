@@ -97,12 +97,16 @@ def sheet_of(experiment: Experiment) -> Sheet:
     by_name = {str(one["name"]): one for one in stated}
     steps: list[Step] = []
     before: tuple[Candidate, tuple[str, ...]] | None = None
+    pool, start = experiment.pool, 0.0
+    timed = {} if pool is None else {one.name: one.seconds for one in pool.candidates if one.drawn}
+    changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
     for position in experiment.positions:
         settings = by_name.get(position.name) or _settings(position, experiment)
         plane = settings.get("plane") if experiment.dimension == 3 else None
-        candidate = Candidate(position.name, position, 0.0, plane or "", "", True, settings)
+        seconds = timed.get(position.name, 0.0)
+        candidate = Candidate(position.name, position, seconds, plane or "", "", True, settings)
         here = candidate, position.probes
-        words = change_over(before, here, ChangeTimes(0.0, 0.0))[1] if before else ""
+        change, words = change_over(before, here, changes) if before else (0.0, "")
         steps.append(
             Step(
                 candidate,
@@ -110,14 +114,14 @@ def sheet_of(experiment: Experiment) -> Sheet:
                 position.probes,
                 ball_words(candidate),
                 words,
-                0.0,
-                0.0,
-                0.0,
+                change,
+                seconds,
+                start,
                 False,
             )
         )
-        before = here
-    return Sheet(experiment, RunSheet(tuple(steps), (), timed=False))
+        before, start = here, start + change + seconds
+    return Sheet(experiment, RunSheet(tuple(steps), (), bool(timed), changes))
 
 
 def _settings(position: Position, experiment: Experiment) -> dict[str, Any]:

@@ -545,6 +545,17 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "µK"}
+    """A small value in the unit it reads well in, without an exponent below a million.
+
+    >>> _amount(8.12e-3, "K"), _amount(1.234e-3, "m"), _amount(2e-9, "rad")
+    ('8.12 mK', '1230 µm', '0.002 µrad')
+    """
+    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "mK"}
     shown |= {"m/h": "µm/h", "1/h": "ppm/h"}
-    return f"{printable(value * 1e6):.3g} {shown[unit]}"
+    amount = (1e3 if unit == "K" else 1e6) * value
+    text = f"{printable(amount):.3g}"
+    return (
+        f"{float(text):.0f} {shown[unit]}"
+        if "e+" in text and abs(amount) < 1e6
+        else f"{text} {shown[unit]}"
+    )

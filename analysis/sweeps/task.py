@@ -91,9 +91,7 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
     number, block = task.number, task.block
     try:
         experiment = experiment_of(sweep, number)
-    except ExperimentError as error:
-        return CellResult(number, block, invalid_key(sweep, number), "failed", str(error))
-    except MemoryError as error:
+    except (ExperimentError, MemoryError) as error:
         return CellResult(number, block, invalid_key(sweep, number), "failed", _reason(error))
     key = key_of(sweep, experiment)
     seed = seed_of(sweep, key)
@@ -104,8 +102,6 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
             tally = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
             return CellResult(number, block, key, "done", seed=seed, tally=tally)
         return _whole(sweep, experiment, task, key, seed)
-    except ExperimentError as error:
-        return CellResult(number, block, key, "failed", str(error), seed)
     except Exception as error:
         # Of an error model written in Python anything may come; the other cells do not suffer from
         # it.
@@ -113,11 +109,15 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
 
 
 def _reason(error: Exception) -> str:
+    """What went wrong, in one line."""
+    if isinstance(error, ExperimentError):
+        return "; ".join(map(str, error.messages))
     want = want_of_memory(error)
     if want is not None:
         return f"it {want}; {WITH_MEMORY}"
     place = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+    text = "; ".join(str(error).splitlines())
+    return f"{type(error).__name__}: {text} ({Path(place.filename).name}, line {place.lineno})"
 
 
 def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:

@@ -13,9 +13,8 @@ import numpy as np
 
 from ..computing.rounding import comparable
 from ..design.arrays import Design, State, nominal_state
-from ..design.objects import Flags
 from ..design.observations.readings import seen_places
-from ..geometry.motions import fit_motion, rotation_from_vector, vector_from_rotation
+from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
 from .spheres import fit_sphere
 
@@ -58,12 +57,11 @@ def initial_state(design: Design, x: Array) -> State:
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
     if design.positions.across is not None:
-        # Out of the plane nothing is read that could tell poses from the drawing's.
-        read = design.positions.across >= 0
-        rotations[read] = _in_plane(design, rotations, read)
-        origins = np.where(
-            read[:, None] & design.positions.held[:, :d], design.positions.origins, origins
-        )
+        for k, across in enumerate(design.positions.across.tolist()):
+            if across >= 0:
+                rotations[k], there = _in_plane(design, k, across, seen[k], balls, origins[k])
+                is_held = design.positions.held[k, :d]
+                origins[k] = np.where(is_held, design.positions.origins[k], there)
     readings = design.readings
     for k in design.gauge_positions:
         rows = readings.position == k
@@ -77,13 +75,20 @@ def initial_state(design: Design, x: Array) -> State:
     return state
 
 
-def _in_plane(design: Design, rotations: Array, read: Flags) -> Array:
-    """The rotations (k, 3, 3) of positions that are `read` in their plane, without tilts against
-    the drawing.
+def _in_plane(
+    design: Design, k: int, across: int, seen: Array, balls: Array, origin: Array
+) -> tuple[Array, Array]:
+    """The pose of a position that is read in its plane, from where its balls (n, 3) were seen: out
+    of the plane nothing is read that could tell poses from the drawing's.
     """
-    drawn = design.positions.rotations[read]
-    turns = vector_from_rotation(rotations[read] @ drawn.transpose(0, 2, 1))
-    return rotation_from_vector(np.where(design.positions.held[read, 3:], 0.0, turns)) @ drawn
+    drawn = design.positions.rotations[k]
+    own, inside = ~np.isnan(seen).all(axis=1), np.arange(3) != across
+    turn, places = np.eye(3), balls[own] @ drawn.T
+    if own.sum() > 1 and not design.positions.held[k, 3 + across]:
+        turn[np.ix_(inside, inside)] = fit_motion(places[:, inside], seen[own][:, inside])[0]
+    if own.any():
+        origin = np.where(inside, (seen[own] - places @ turn.T).mean(axis=0), origin)
+    return turn @ drawn, origin
 
 
 def _mean_locations(design: Design, x: Array) -> Array:

@@ -209,7 +209,7 @@ class Pool:
     them.
 
     `must` are the indices of what has to be chosen. `dropped` states how many candidates were
-    generated but cannot be read, or stand there twice, by the reason.
+    generated but cannot be read, or are the same as others, by the reason.
     """
 
     candidates: tuple[Candidate, ...]

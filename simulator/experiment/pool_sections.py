@@ -40,6 +40,9 @@ class TimesSettings(OwnTimesSettings):
             " previous one; default 30 min"
         ),
     )
+    positions: dict[Name, OwnTimesSettings] | None = Field(
+        None, description="name of a position of the file → times that are others there"
+    )
 
 
 class RangeSettings(Settings):

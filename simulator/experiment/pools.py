@@ -59,7 +59,7 @@ class Candidates:
         """Add a candidate unless the same stands there already."""
         key = _identity(candidate.item) if isinstance(candidate.item, Position) else candidate.name
         if key in self.seen and not candidate.drawn:
-            self.drop("stands there twice")
+            self.drop("the same as others")
             return
         self.seen.setdefault(key, candidate.name)
         name, k = candidate.name, 1
@@ -119,10 +119,14 @@ def resolve_candidates(
     for i, position in positions.items():
         settings = sections.get("positions", i)
         stated = to_python(written(root, "positions", i))  # type: ignore[arg-type]
-        result.add(_candidate(position, settings.plane, "", True, stated, times, None, references))
+        own = (times.positions or {}).get(position.name)
+        result.add(_candidate(position, settings.plane, "", True, stated, times, own, references))
         references.count_readings(result.found[-1].readings, ("positions", i))
         if bounds is not None:
             _check_bounds(position, ("positions", i), bounds, references)
+    known = {position.name for position in positions.values()}
+    for name in (times.positions or {}) if all_drawn else ():
+        references.is_position(name, known, ("pool", "times", "positions", name))
     count = len(positions)
     for i in range(written_count(root, "pool", "candidates")):
         steps: Steps = ("pool", "candidates", i)

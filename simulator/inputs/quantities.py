@@ -401,6 +401,10 @@ def format_length(length: float) -> str:
     return typed_length(length).replace(" um", " µm")
 
 
+def _in_microradians(angle: float) -> str:
+    return f"{Decimal(repr(angle)).scaleb(6).normalize():f} urad"
+
+
 def format_angle(angle: float) -> str:
     """Write an angle in radians in microradians.
 
@@ -628,6 +632,11 @@ def _parse(value: object, kind: str) -> float:
                     f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example'
                     f' "{example}"'
                 )
+        if factor := re.fullmatch(r"(.+?)\s*\(\s*k\s*=\s*([1-9][0-9]*\.?[0-9]*)\s*\)", plain):
+            standard = f"{float(number) / float(factor[2]):.9g} {factor[1]}"
+            raise QuantityError(
+                f'"{text}" is an expanded uncertainty; write the standard one, "{standard}"'
+            )
         raise QuantityError(
             f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}'
         )
@@ -667,7 +676,14 @@ ALTERNATIVES = {
 }
 
 
+# A number without a unit that is smaller than this is one of metres or radians, as programs have.
+SMALL = 1e-4
+
+
 def _with_unit(number: str, kind: str) -> str:
+    if kind in ("length", "angle") and 0.0 < abs(float(number)) < SMALL:
+        of_si = ("metres", length_text) if kind == "length" else ("radians", _in_microradians)
+        return f'write "{of_si[1](float(number))}" if it is in {of_si[0]}'
     units = [EXAMPLES[kind].split()[1], *([ALTERNATIVES[kind]] if kind in ALTERNATIVES else [])]
     return "write for example " + " or ".join(f'"{number} {unit}"' for unit in units)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
@@ -161,6 +162,10 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
             )
         return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
     if kind == "literal_error":
+        is_plane = not {"plane", "planes"}.isdisjoint(steps)
+        if is_plane and isinstance(value, str) and (across := _across(value)):
+            text = f'the plane "{value}" is normal to {across}; write {across}'
+            return Explanation(steps, text)
         return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))
     if kind in EXPECTED:
         about = _description(schema, root, steps) if not steps or isinstance(steps[-1], str) else ""
@@ -201,13 +206,25 @@ def _unknown_key(steps: Steps, root: Node, schema: Schema) -> Explanation:
     return Explanation(steps, f"unknown key; {meant}", of_key=True)
 
 
-def _wrong_literal(value: Any, allowed: list[str]) -> str:
+def _across(plane: str) -> str:
+    """The axis that a plane of two axes is normal to; empty where a text is no such plane.
+
+    >>> _across("xy"), _across("Z-X"), _across("xx")
+    ('z', 'y', '')
+    """
+    axes = re.fullmatch("([xyz])[ /-]?([xyz])", plane.strip().casefold())
+    left = {"x", "y", "z"}.difference(axes.groups() if axes else ())
+    return left.pop() if len(left) == 1 else ""
+
+
+def _wrong_literal(value: Any, meanings: AnyMapping[str, str]) -> str:
+    allowed = list(meanings)
     if isinstance(value, str):
-        meant = hint(value, allowed)
-        others = "" if meant.startswith("known") else f" allowed: {listing(allowed, 12)}"
-        return f'unknown value "{shorten(value)}"; ' + (
-            f"{meant}{others}" if others else f"allowed: {listing(allowed, 12)}"
-        )
+        meant = hint(value, meanings)
+        meant = "" if meant.startswith("known") else f"{meant} "
+        if not meant:
+            allowed = [f"{name} ({words})" if words else name for name, words in meanings.items()]
+        return f'unknown value "{shorten(value)}"; {meant}allowed: {listing(allowed, 12)}'
     return f"expected one of: {listing(allowed, 12)}; found {describe(value)}"
 
 
@@ -248,13 +265,14 @@ def _description(schema: Schema, root: Node, steps: Steps) -> str:
     return ""
 
 
-def _allowed(schema: Schema, root: Node, steps: Steps) -> list[str]:
-    allowed: list[str] = []
+def _allowed(schema: Schema, root: Node, steps: Steps) -> dict[str, str]:
+    """The values that are allowed at a path, with what they mean where the schema says it."""
+    allowed: dict[str, str] = {}
     for one in _schemas_at(schema, root, steps, any_kind=True):
-        allowed += [
-            str(value) for value in one.get("enum", [one["const"]] if "const" in one else [])
-        ]
-    return list(dict.fromkeys(allowed))
+        values = one.get("enum", [one["const"]] if "const" in one else [])
+        meanings = one.get("enumDescriptions", [""] * len(values))
+        allowed |= dict(zip(map(str, values), meanings, strict=True))
+    return allowed
 
 
 def _schemas_at(

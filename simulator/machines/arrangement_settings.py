@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -33,7 +33,22 @@ class ArrangementSettings(Settings):
         return self
 
 
-ArrangementName = Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"]
+MEANINGS = {
+    "MB1": "moving bridge along y",
+    "MB2": "moving bridge along x",
+    "FB1": "fixed bridge, table along y",
+    "FB2": "fixed bridge, table along x",
+    "FH1": "fixed horizontal arm, table along x",
+    "FH2": "fixed horizontal arm, table along y",
+    "MH1": "moving horizontal arm along x, on a column along y",
+    "MH2": "moving horizontal arm along y, on a column along x",
+    "CX1": "column, table along y on x",
+    "CY1": "column, table along x on y",
+}
+ArrangementName = Annotated[
+    Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"],
+    Field(json_schema_extra={"enumDescriptions": list(MEANINGS.values())}),
+]
 ARRANGEMENT = (
     "Which axis carries which: a named arrangement, or the axes on either side. "
     "MB2 (x carries y carries z carries the probe) is NPL's kinematic model."

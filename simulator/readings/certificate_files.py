@@ -30,7 +30,14 @@ from ..experiment.exact_values import exact_contradictions
 from ..experiment.model import Experiment
 from ..experiment.star_tables import doubt_of_table
 from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path, refused
-from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
+from ..inputs.quantities import (
+    SMALLEST,
+    QuantityError,
+    length_text,
+    parse_angle,
+    parse_length,
+    parse_ratio,
+)
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, read_table
@@ -139,9 +146,9 @@ def drawn_values(
 def certificate_rows(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:
     """All values that an experiment states, with all digits, as rows of `COLUMNS`."""
     for one in certified_values(experiment):
-        text = (
-            length_text(one.value) if one.unit == "m" else f"{one.value!r} {UNIT_NAMES[one.unit]}"
-        )
+        # Less than can be read again is rounding, such as that of the cosine of a right angle.
+        value = one.value if abs(one.value) >= SMALLEST else 0.0
+        text = length_text(value) if one.unit == "m" else f"{value!r} {UNIT_NAMES[one.unit]}"
         yield one.item, one.first, one.second, text
 
 

@@ -13,7 +13,7 @@ from itertools import product
 
 from ..design.arrays import Design
 from ..experiment.name_rules import PLACE
-from ..inputs.messages import refused
+from ..inputs.messages import ExperimentError, refused
 from ..inputs.settings import listing, shorten
 
 # Tried in this order where the experiment is known and no rule is given.
@@ -39,12 +39,14 @@ Parts = Mapping[str, str]
 @dataclass(frozen=True)
 class Named:
     """The parts of each feature's name by a rule, none where it is not of the rule; `numbered` are
-    those of which names have the number.
+    those of which names have the number. Those that are `strange` are not the experiment's, and
+    matched by number and place as those of tables are.
     """
 
     rule: str
     parts: tuple[Parts | None, ...]
     numbered: tuple[str, ...] = ()
+    strange: bool = False
 
 
 def fold(name: str) -> str:
@@ -153,6 +155,8 @@ def _known(names: Sequence[str], rule: str | None, design: Design, file: str) ->
             raise refused(file, text)
         if found:
             return found[0]
+    if strange := _strange(names, rule, design, file):
+        return strange
     some = listing((shorten(name, 30) for name in names), 3)
     text = (
         f"no names of the experiment in {some}; its positions are"
@@ -161,6 +165,25 @@ def _known(names: Sequence[str], rule: str | None, design: Design, file: str) ->
         " {position}_{ball}"
     )
     raise refused(file, text)
+
+
+def _strange(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named | None:
+    """The parts of names that are not an experiment's, by the rule that is stated, or by one that
+    all follow if these have numbers of balls; None where there are none, or where the plane of a
+    position has to be known to read it.
+    """
+    if design.positions.across is not None:
+        return None
+    try:
+        found = named(names, rule, None, file)
+    except ExperimentError:
+        return None
+    parts = [part for part in found.parts if part is not None and "ball" in part]
+    is_clear = rule is not None or all(re.search("[0-9]", part["ball"]) for part in parts)
+    whole = {tuple(part.values()) for part in parts}
+    if not is_clear or "{position}" not in found.rule or len(parts) < 2 or len(whole) < 2:
+        return None
+    return Named(found.rule, found.parts, strange=True)
 
 
 def _has(rule: str, places: Sequence[str]) -> bool:

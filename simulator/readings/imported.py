@@ -244,6 +244,8 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         known.add((one.name, one.centre))
         found.features.append((one, {"position": position, "probe": "", **own}, fit))
     source = f'; position "{position}" by the name of the file' if is_of_file else ""
+    if names.strange:
+        source += "; they are not the experiment's, and fit matches them by number and place"
     for place in names.numbered:
         source += f"; {place}s by their numbers, from 1 in the experiment's order"
     found.remarks.append(f"{report.file}: names{whose} are read as {names.rule}{source}")
@@ -346,11 +348,14 @@ def _probe(feature: Feature, position: str, design: Design | None, file: str) ->
     """
     if design is None:
         return feature.probe
-    names = design.probes.names
+    names, positions = design.probes.names, design.positions.names
     same = [name for name in names if fold(name) == fold(feature.probe)]
     if len(same) == 1:
         return same[0]
-    place = design.positions.names.index(position)
+    if position not in positions:
+        # Which probe was planned there is known when the position is.
+        return ""
+    place = positions.index(position)
     planned = {names[i] for i in design.readings.probe[design.readings.position == place]}
     possible = planned or set(names)
     if len(possible) == 1:

@@ -258,15 +258,22 @@ def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Desi
 
 def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
     """Standard uncertainties (m, d) that the design plans for the readings, None where it plans
-    none in particular.
+    none in particular. Repeats that differ in them count in the order of their groups.
     """
-    planned = design.readings
-    if planned.uncertainty is None:
+    if design.readings.uncertainty is None:
         return None
-    of_key = dict(zip(reading_keys(planned), planned.uncertainty, strict=True))
-    return np.array(
-        [of_key.get(key, design.machine.repeatability) for key in reading_keys(readings)]
-    )
+    planned = design.readings.expanded()
+    assert planned.uncertainty is not None
+    of_key: dict[tuple[int, int, int], list[Array]] = {}
+    for key, u in zip(reading_keys(planned), planned.uncertainty, strict=True):
+        of_key.setdefault(key, []).append(u)
+    read: Counter[tuple[int, int, int]] = Counter()
+    uncertainties = []
+    for key in reading_keys(readings):
+        stated = of_key.get(key, [design.machine.repeatability])
+        uncertainties.append(stated[min(read[key], len(stated) - 1)])
+        read[key] += 1
+    return np.array(uncertainties)
 
 
 def _compare(

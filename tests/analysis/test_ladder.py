@@ -5,6 +5,7 @@ forms, its choice against simulated machines whose coefficients are known.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import ballplate as bp
 import numpy as np
@@ -12,9 +13,14 @@ import pytest
 import scipy.stats
 from ballplate.results.validation.lack_of_fit import pure_error
 from ballplate.results.validation.ladder import climb, fit_rung, ladder
-from ballplate.results.validation.nested import nested_sums
-from ballplate.results.validation.rung_choice import Comparison, FittedSum, PolynomialGrid
-from ballplate.results.validation.rungs import kinematic_rung, with_model
+from ballplate.results.validation.nested import NestedSums, nested_sums
+from ballplate.results.validation.rung_choice import (
+    Comparison,
+    FittedSum,
+    PolynomialGrid,
+    first_adequate,
+)
+from ballplate.results.validation.rungs import LadderModel, chain_of, kinematic_rung, with_model
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
@@ -28,6 +34,7 @@ from numpy.typing import NDArray
 from tests.analysis.ladder_campaigns import (
     KINDS,
     campaign,
+    last_ones,
     quickstart,
     readings_of,
     true_model,
@@ -135,6 +142,74 @@ def test_the_true_model_is_recommended_in_nine_of_ten_campaigns(kind: int) -> No
     words = true_model(kind).words
     chosen = [climb(quickstart(), campaign(kind, k), False).chosen.model.words for k in range(100)]
     assert chosen.count(words) >= 90
+
+
+def too_many(kind: int, count: int, smallest: float) -> int:
+    """In how many campaigns of a kind of machine a function gets more coefficients than it has.
+
+    The readings are linear in the machine's parameters: of the richest model's columns X = Q R only
+    R, the truth and normal numbers count, beside a chi-squared rest. Last coefficients are at least
+    `smallest` times their standard uncertainty.
+    """
+    experiment, generator = quickstart(), np.random.default_rng([20261123, kind])
+
+    @lru_cache(None)
+    def made(n: int, m: int, own: tuple[tuple[str, int], ...]) -> LadderModel:
+        return kinematic_rung(experiment, n, m, dict(own))
+
+    def make(n: int, m: int, own: dict[str, int]) -> LadderModel:
+        return made(n, m, tuple(own.items()))
+
+    rich, true, u = make(8, 8, {}), true_model(kind), uncertainties(kind)
+    fit = fit_rung(experiment, campaign(kind, 0), rich)
+    root = np.linalg.qr(nested_sums(fit.at).columns)[1]
+    scale = fit.at.spectrum.scale[fit.at.layout.model]
+    of_rich, of_true = chain_of(rich.model), chain_of(true.model)
+    place = np.concatenate(
+        [
+            of_rich.slices[one.name].start
+            + np.arange(of_true.slices[one.name].stop - of_true.slices[one.name].start)
+            for one in of_true.functions
+        ]
+    )
+    freedom, found = fit.fitted.degrees_of_freedom, 0
+    test = Comparison(False, fit.at.design.observation_count)
+    for _ in range(count):
+        a = 10.0 * u * generator.standard_normal(len(u))
+        least = u * generator.uniform(smallest, smallest + 3.0, len(u))
+        is_small = last_ones(true) & (np.abs(a) < least) & (smallest > 0.0)
+        a = np.where(is_small, np.where(a < 0.0, -least, least), a)
+        truth = np.zeros(len(scale))
+        truth[place] = a
+        target = generator.standard_normal(len(root)) - root @ (truth / scale)
+        rest = generator.chisquare(freedom)
+        whole = FittedSum(rich, rest, freedom)
+        grid = PolynomialGrid(whole, NestedSums(root, target, rest), make)
+        chosen = first_adequate(grid, grid.every(), test)[0].model
+        found += any(
+            chosen.coefficients(one.name, one.rotation) > true.coefficients(one.name, one.rotation)
+            for one in of_rich.functions
+        )
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("smallest", "limit"), [(5.0, 0.06), (0.0, 0.1)])
+def test_too_many_coefficients_are_recommended_as_rarely_as_stated(
+    smallest: float, limit: float
+) -> None:
+    """The levels of the tests, 1 % and 5 %, hold where every coefficient shows."""
+    kinds, count = (0, 1, 2, 3, 6, 8), 100
+    found = [too_many(kind, count, smallest) for kind in kinds]
+    total, campaigns = sum(found), count * len(kinds)
+    low = scipy.stats.beta.ppf(0.025, total, campaigns - total + 1)
+    high = scipy.stats.beta.ppf(0.975, total + 1, campaigns - total)
+    print(
+        f"last coefficients from {smallest:g} u on: too many coefficients in {total} of"
+        f" {campaigns} campaigns, {100 * total / campaigns:.1f} % ({100 * low:.1f} to"
+        f" {100 * high:.1f}); by kind {dict(zip(kinds, found, strict=True))}"
+    )
+    assert 0.01 < high < limit
 
 
 class Wave:

@@ -348,3 +348,30 @@ def test_a_missing_plotting_library_is_named(
     assert run("map", scales, "--plot", tmp_path / "map.svg") == 3
     out, err = capsys.readouterr()
     assert out == "" and "python -m pip install 'ballplate[report]'" in err
+
+
+@pytest.mark.parametrize(
+    "places", [("--grid", "2,2,2"), ("--line", "y = 600 mm, z = 100 mm"), ("--plane", "z = 1 mm")]
+)
+def test_realisations_in_csv_are_those_in_json(
+    places: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ("map", BRIDGE, *places)
+    plain, text, data = (
+        (run(*asked, *more), capsys.readouterr().out)[1]
+        for more in (
+            ("--format", "csv"),
+            ("--draw", "3", "--format", "csv"),
+            ("--draw", "3", "--json"),
+        )
+    )
+    rows = list(csv.DictReader(io.StringIO(text)))
+    estimate = [{k: v for k, v in row.items() if k != "realisation"} for row in rows]
+    undrawn = list(csv.DictReader(io.StringIO(plain)))
+    assert estimate[: len(undrawn)] == undrawn and len(rows) == 4 * len(undrawn)
+    drawn = np.array(json.loads(data)["realisations"]["errors"])
+    found = [[1e-6 * float(row[f"error_{axis}_um"]) for axis in "xyz"] for row in rows]
+    np.testing.assert_allclose(found[len(undrawn) :], drawn.reshape(-1, 3), rtol=1e-9, atol=1e-16)
+    numbers = [row["realisation"] for row in rows[:: len(undrawn)]]
+    assert numbers == ["0", "1", "2", "3"]
+    assert all(not row["random_x_um"] for row in rows[len(undrawn) :])

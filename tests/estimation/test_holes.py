@@ -22,6 +22,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.gross_errors import find_gross_errors
+from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
 
@@ -220,3 +222,23 @@ def test_what_cannot_be_read_in_its_plane_is_refused(
 def test_estimators_of_distances_alone_refuse(changes: dict[str, Any], expected: str) -> None:
     with pytest.raises(ExperimentError, match=expected):
         compare(small(**changes), trials=2)
+
+
+@pytest.mark.parametrize("single", [(k,) for k in range(6)] + [(1, 2, 5), (2, 3, 4)])
+@pytest.mark.parametrize("line", ["r{}c2", "r{}c3", "r2c{}"])
+def test_exact_readings_of_single_columns_and_rows_are_right(
+    single: tuple[int, ...], line: str
+) -> None:
+    """Balls in one line leave the turn about it open, which the plane of the position tells."""
+    balls = [line.format(k) for k in range(1, 4)]
+    places = [
+        position | ({"balls": balls} if k in single else {})
+        for k, position in enumerate(QUICKSTART["positions"])
+    ]
+    experiment = small(positions=places)
+    simulated = simulated_readings(experiment, exact=True)
+    observed = observe(lay_out(experiment), simulated.readings, simulated.x)
+    assert find_gross_errors(observed.design, observed.x) == ([], [])
+    state, positions = initial_state(observed.design, observed.x), observed.design.positions
+    np.testing.assert_allclose(state.rotations, positions.rotations, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(state.origins, positions.origins, rtol=0, atol=1e-4)

@@ -126,6 +126,12 @@ SECTIONS = [
         "(the errors that simulated readings have; default zero)"]),
 ]  # fmt: skip
 MACHINE = [
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, arrangement: moving bridge}", [
+        '5:45: error_model.arrangement: unknown value "moving bridge"; allowed: MB1 (moving bridge along'
+        " y), MB2 (moving bridge along x), FB1 (fixed bridge, table along y), FB2 (fixed bridge, table"
+        " along x), FH1 (fixed horizontal arm, table along x), FH2 (fixed horizontal arm, table along y),"
+        " MH1 (moving horizontal arm along x, on a column along y), MH2 (moving horizontal arm along y,"
+        " on a column along x), CX1 (column, table along y on x), CY1 (column, table along x on y)"]),
     ("z: [0 mm, 1 m]}", "w: [0 mm, 1 m]}", ['3:44: machine.volume.w: unknown key; known: z']),
     ("z: [0 mm, 1 m]}", "z: [0 mm, 1000]}", [
         '3:54: machine.volume.z[1]: "1000" has no unit; write for example "1000 mm" or "1000 um"']),
@@ -210,6 +216,10 @@ POSITIONS = [
         'must differ']),
     (LOW, LOW.replace("plane: z", "plane: w"), [
         '11:41: positions[0].plane: unknown value "w"; allowed: x, y, z']),
+    (LOW, LOW.replace("plane: z", "plane: xy"), [
+        '11:41: positions[0].plane: the plane "xy" is normal to z; write z']),
+    (LOW, LOW.replace("plane: z", "plane: Z-X"), [
+        '11:41: positions[0].plane: the plane "Z-X" is normal to y; write y']),
     (LOW, LOW.replace("plane: z", "plane: x"), [
         '11:65: positions[0].corner.z: missing; add "z"',
         "11:66: positions[0].corner.x: is not an axis of the plane; give y and z",

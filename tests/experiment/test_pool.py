@@ -114,7 +114,7 @@ def test_every_combination_is_there_but_what_is_drawn(tmp_path: Path) -> None:
         "gauge",
         "dear",
     ]
-    assert pool.dropped == {"stands there twice": 1}
+    assert pool.dropped == {"the same as others": 1}
     assert [one.drawn for one in pool.candidates] == [True] + 10 * [False]
     assert [one.group for one in pool.candidates] == ["", *7 * ["some"], "bar", "gauge", "dear"]
     assert [one.plane for one in pool.candidates] == [*4 * "z", *4 * "x", "", "", ""]
@@ -237,7 +237,7 @@ def test_a_large_pool_loads_soon() -> None:
     (experiment,) = load(FOLDER / "plate-pool.yaml", planning=True)
     assert process_time() - began < 2.0
     assert experiment.pool is not None and len(experiment.pool.candidates) == 1260
-    assert experiment.pool.dropped == {"stands there twice": 6}
+    assert experiment.pool.dropped == {"the same as others": 6}
 
 
 def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
@@ -422,7 +422,7 @@ MISTAKES = [
         '14:19: pool.times.set_up: "20 mm" is a length; a duration is expected, for example "20 min"',
         '14:35: pool.times.reading: "5" has no unit; write for example "5 min" or "5 s"',
         '14:52: pool.times.probe_change: "-1 s" is below zero; write for example "20 min"',
-        "14:58: pool.times.plane: unknown key; known: plane_change"]),
+        "14:58: pool.times.plane: unknown key; known: plane_change, positions"]),
     ("planes: [z, x]", "plane: [z, x]", ['18:7: pool.candidates[0].plane: unknown key; did you mean "planes"?']),
     ("planes: [z, x]", "planes: [z]", [
         "20:45: pool.candidates[0].corners.z: is not an axis of the planes; remove it, or add to planes",

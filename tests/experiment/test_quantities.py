@@ -157,7 +157,16 @@ def test_a_data_sheet_is_not_read_in_metres(divisor: str) -> None:
     [
         ("750", '"750" has no unit; write for example "750 mm" or "750 um"'),
         (750, '"750" has no unit; write for example "750 mm" or "750 um"'),
-        (1e-6, '"1e-06" has no unit; write for example "1e-06 mm" or "1e-06 um"'),
+        (1e-6, '"1e-06" has no unit; write "1 um" if it is in metres'),
+        (2e-7, '"2e-07" has no unit; write "0.2 um" if it is in metres'),
+        (
+            "0.4 um (k=2)",
+            '"0.4 um (k=2)" is an expanded uncertainty; write the standard one, "0.2 um"',
+        ),
+        (
+            "1 µm ( k = 2.5 )",
+            '"1 µm ( k = 2.5 )" is an expanded uncertainty; write the standard one, "0.4 um"',
+        ),
         ("750 mn", '"750 mn" has the unknown unit "mn"; did you mean "m'),
         ("1 MM", '"1 MM" has the unknown unit "MM"; did you mean "mm"?'),
         (

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import run_sheet
+from ballplate.planning.sheet import sheet_of
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -58,6 +59,26 @@ def written(
     )
     (found,) = load(path)
     return found
+
+
+def test_a_sheet_of_the_file_has_the_minutes_of_the_plan(tmp_path: Path) -> None:
+    """Of positions with times of their own too, in the order of the file."""
+    experiment = planned(FOLDER / "campaign.yaml")
+    assert experiment.pool is not None
+    chosen = Random(2).sample(experiment.pool.candidates, 12)
+    expected = run_sheet(chosen, experiment.pool.changes)
+    path = tmp_path / "chosen.yaml"
+    written(experiment, expected.written, path, with_times=True)
+    found = sheet_of(planned(path)).sheet
+    assert found.timed
+    times = [
+        [(one.name, one.change_seconds, one.seconds, one.start) for one in sheet.steps]
+        for sheet in (found, expected)
+    ]
+    assert len(times[0]) > 8 and len({one[2] for one in times[0]}) > 1
+    for (name, *minutes), (other, *others) in zip(*times, strict=True):
+        assert name == other and minutes == pytest.approx(others, abs=1e-6)
+    assert sheet_of(load(path)[0]).sheet.timed is False
 
 
 @pytest.mark.parametrize(("name", "number"), [("plate-pool", 25), ("campaign", 12)])

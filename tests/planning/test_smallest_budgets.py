@@ -17,11 +17,14 @@ from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
 from ballplate.planning.search import LARGE, SMALL_POOL, Losses, SelectionProblem, full_root, value
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.planning.small_pool import TEXT as SMALL
 from tests.reference import dense
 
 # Of the pairs of its candidates that have both plates some determine everything, and most leave
@@ -189,3 +192,45 @@ def test_beside_a_certificate_that_is_as_good_as_exact() -> None:
         of_names[frozenset(one.name for one in found.chosen)], rel=1e-7
     )
     assert found.value <= 1.01 * min(of_names.values())
+
+
+POSITIONS_ALONE = SMALL[: SMALL.index("  calibration:\n    - {name: sides")].replace(
+    "[50 mm, 350 mm]", "[50 mm, 200 mm, 350 mm]"
+)
+LIMITED = """\
+  limits:
+    at_most: [{of: {plane: x}, count: COUNT}, {of: {plane: y}, count: 0}, {of: {name: bar}, count: 0}]
+"""
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_the_choice_that_limits_leave_deficient_is_the_nearest_to_a_determined_one(
+    count: int,
+) -> None:
+    """Of all choices that limits allow none determines everything: told is one that leaves the
+    fewest directions open, by the rank of each.
+    """
+    experiment = loaded(POSITIONS_ALONE + LIMITED.replace("COUNT", str(count)))
+    assert experiment.pool is not None and len(experiment.pool.candidates) > TINY_POOL
+    found = campaign(experiment, Request("U6", Budget(positions=2)))
+    assert not found.is_determined and found.chosen
+    allowed = [
+        one
+        for one in experiment.pool.candidates
+        if isinstance(one.item, Position) and one.plane in ("z", "x") and one.name != "bar"
+    ]
+    deficiencies = [
+        linearise(lay_out(with_chosen(experiment, pair))).deficiency
+        for pair in combinations(allowed, 2)
+        if sum(one.plane == "x" for one in pair) <= count
+    ]
+    assert found.prediction.verdict.deficiency == min(deficiencies)
+
+
+def test_limits_that_leave_no_position_are_named() -> None:
+    experiment = loaded(SMALL + "  limits: {at_most: [{of: {name: '*'}, count: 0}]}\n")
+    with pytest.raises(ExperimentError, match="limits: no position can be read, as limits allow"):
+        campaign(experiment, Request("U6", Budget(positions=6)))
+    experiment = loaded(SMALL)
+    with pytest.raises(ExperimentError, match="no position can be read with 0.01 h; allow more"):
+        campaign(experiment, Request("U6", Budget(seconds=36.0)))

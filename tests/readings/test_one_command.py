@@ -142,6 +142,38 @@ def test_the_rule_of_names_in_a_report_can_be_stated(
         bp.fit(CAMPAIGN, path, names="{position}")
 
 
+STRANGE = "Lage {}_K{:02}_{}"
+
+
+@pytest.mark.parametrize(
+    ("file", "written", "plain_file"),
+    [
+        ("qif_3_0.qif", ">{} {} {}<", "plain/mm6.csv"),
+        ("calypso_fet.txt", "\t{}_{}_{}\t", "plain/mm7.csv"),
+    ],
+)
+def test_names_of_reports_are_matched_by_number_and_place_as_those_of_tables(
+    file: str, written: str, plain_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    encoding = "cp1252" if file.endswith("txt") else "utf-8"
+    text = (FOLDER / file).read_text(encoding=encoding)
+    table = pd.read_csv(FOLDER / plain_file)
+    balls = list(dict.fromkeys(table["ball"]))
+    for position, ball, probe in table[["position", "ball", "probe"]].itertuples(index=False):
+        old = written.format(position, ball, probe)
+        strange = STRANGE.format(int(position[1:]), balls.index(ball) + 1, probe)
+        assert old in text
+        text = text.replace(old, f"{old[0]}{strange}{old[-1]}")
+    path = tmp_path / file
+    path.write_text(text, encoding=encoding)
+    expected = plain(plain_file)
+    for rule in ([], ["--name", "{position}_{ball}_{probe}"]):
+        found, told = fitted([str(CAMPAIGN), str(path), *rule], capsys)
+        assert largest_difference(found, expected) <= 1e-4
+        assert "positions matched by number, and by place" in told
+        assert "balls matched by number in reading order" in told
+
+
 def test_what_reports_say_of_co_ordinates_is_not_contradicted() -> None:
     with pytest.raises(bp.ExperimentError, match="scale readings are stated; state ball centres"):
         bp.fit(CAMPAIGN, FOLDER / "dmis_mm.dmo", coordinates="scale readings")

@@ -26,7 +26,8 @@ def test_reports_of_another_experiment_are_told_by_their_names(
     capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     text = refusal(capsys, SAMPLES / name)
-    assert "no names of the experiment in P1" in text and len(text.splitlines()) == 1
+    assert 'the positions "P1", "P2", "P3"' in text and "are not in the experiment" in text
+    assert len(text.splitlines()) == 1
 
 
 def test_what_was_done_of_a_plan_is_told_by_tables(

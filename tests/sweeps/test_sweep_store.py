@@ -16,6 +16,7 @@ from ballplate.cli import main
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.sweeps.fingerprint import fingerprint
 from ballplate.sweeps.load import experiment_of, load_sweep
 from ballplate.sweeps.model import Sweep
@@ -501,3 +502,23 @@ def test_a_cell_that_finds_no_memory_says_so(
         row.reason
         == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"
     )
+
+
+def test_the_errors_of_a_cell_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a file that is wrong in two places, and of an error of a user's own in two lines."""
+    loaded = load_sweep(small_sweep(tmp_path, 2))
+    several = [Message("f.yaml", k, 1, "positions", "is wrong") for k in (3, 4)]
+    for error, expected in (
+        (
+            ExperimentError(several),
+            "f.yaml:3:1: positions: is wrong; f.yaml:4:1: positions: is wrong",
+        ),
+        (ValueError("one\ntwo"), "ValueError: one; two (test_sweep_store.py, line "),
+    ):
+
+        def fails(*_: object, error: Exception = error) -> None:
+            raise error
+
+        monkeypatch.setattr("ballplate.sweeps.task.predict", fails)
+        row = compute(loaded, CellTask(0))
+        assert row.status == "failed" and row.reason.startswith(expected)

@@ -15,7 +15,8 @@ from .nested import NestedSums
 from .rungs import POOREST, LadderModel, chain_of, contains, free_coefficients
 
 # Chance that a model is left although it is right: of all richer ones together, and of all single
-# functions together.
+# functions together. Both are limits (Bonferroni); simulated campaigns have about half of their
+# sum.
 FALSE_STEP, FALSE_FUNCTION = 0.01, 0.05
 
 # Chance with which a last coefficient of a single function counts as none.

@@ -9,7 +9,7 @@ position.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
@@ -39,6 +39,8 @@ REFERENCE = 20.0
 ARTEFACT_COLUMN = "temperature_artefact"
 SCALES_COLUMN = "temperature_scales"
 AXIS_COLUMNS = ("temperature_x", "temperature_y", "temperature_z")
+# What expands along all axes alike, in place of an axis.
+ARTEFACT, SCALES = -2, -1
 UNITS = {"degC": Fraction(1)}
 
 # What is outside these limits, in degC, K and 1/K, is possible and hardly meant.
@@ -197,46 +199,47 @@ class TemperaturesSettings(InfluenceSettings):
         every = np.arange(len(design.artefacts.names))
         chosen = every if self.artefact is None else [design.artefacts.names.index(self.artefact)]
         arm = float(np.abs(design.balls.places).max(initial=0.1))
+        parameters: list[InfluenceParameter] = []
         parts: list[Part] = []
         if self.artefact_expansion is not None and self.artefact_temperature is not None:
             here = np.isin(design.positions.artefact, chosen)
-            temperatures = self._at_positions(design, "artefact", self.artefact_temperature.value)
-            parts.append(
-                _part(
-                    name,
-                    self.artefact_expansion,
-                    self.artefact_temperature,
-                    temperatures - self.reference,
-                    here,
-                    arm,
-                    design,
-                )
+            above = self._at_positions(design, "artefact", self.artefact_temperature.value)
+            parts += _parts(
+                parameters,
+                name,
+                ARTEFACT,
+                (self.artefact_expansion,),
+                self.artefact_temperature,
+                above[None] - self.reference,
+                here,
+                arm,
+                design.positions.names,
             )
         if self.scale_expansion is not None and self.scale_temperature is not None:
+            axes = range(design.machine.dimension)
             listed = self.scale_expansion
-            per_axis = isinstance(listed, tuple) or self._has_axes()
-            reach = float(np.abs(design.machine.volume.corners).max())
-            everywhere = np.ones(len(design.positions.names), bool)
-            for axis in range(design.machine.dimension) if per_axis else (-1,):
-                own = listed[axis] if isinstance(listed, tuple) else listed
-                temperatures = self._at_positions(
-                    design, "scales", self.scale_temperature.value, axis
+            parts += _parts(
+                parameters,
+                "the scales",
+                SCALES,
+                listed if isinstance(listed, tuple) else (listed,),
+                self.scale_temperature,
+                np.array(
+                    [
+                        self._at_positions(design, "scales", self.scale_temperature.value, axis)
+                        for axis in (axes if self._has_axes() else (0,))
+                    ]
                 )
-                parts.append(
-                    _part(
-                        "the scales" if axis < 0 else f"scale {'xyz'[axis]}",
-                        own,
-                        self.scale_temperature,
-                        temperatures - self.reference,
-                        everywhere,
-                        reach,
-                        design,
-                        "all" if axis < 0 else axis,
-                        shared=per_axis and not isinstance(listed, tuple) and axis > 0,
-                    )
-                )
+                - self.reference,
+                np.ones(len(design.positions.names), bool),
+                float(np.abs(design.machine.volume.corners).max()),
+                design.positions.names,
+            )
         return Temperatures(
-            tuple(parts), np.isin(design.balls.artefact, chosen), float(self.reference)
+            tuple(parameters),
+            tuple(parts),
+            np.isin(design.balls.artefact, chosen),
+            float(self.reference),
         )
 
     def _has_axes(self) -> bool:
@@ -258,41 +261,37 @@ class TemperaturesSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class Part:
-    """What expands as one: the artefact, with `axis` -2, all scales, -1, or the scale of an axis.
+    """What expands as one: the artefact, all scales, or the scale of an `axis` from 0 on.
 
     `differences` (k,) are its temperatures in all positions above the reference; `expansion` is
-    the coefficient, `own` tells that it is a parameter of this part, and not of the one before.
-    `wrong` (k,) are the places of the parameters of single positions among its own, -1 for
-    positions without one. `parameters` (p,) are first the coefficient, then the sensor, then the
-    temperatures.
+    the coefficient. `coefficient`, `sensor` and `errors` (k,), -1 for positions without one, are
+    the places of its parameters among all; scales that are measured together share them.
+    `columns` have its temperatures, the last that a reading has counting.
     """
 
     axis: int
     differences: Array
     expansion: float
-    own: bool
-    wrong: np.ndarray
-    parameters: tuple[InfluenceParameter, ...]
-
-    @property
-    def columns(self) -> list[str]:
-        """Columns with its temperature, the last that a reading has counting."""
-        if self.axis == -2:
-            return [ARTEFACT_COLUMN]
-        return [SCALES_COLUMN, *([AXIS_COLUMNS[self.axis]] if self.axis >= 0 else [])]
+    coefficient: int
+    sensor: int
+    errors: np.ndarray
+    columns: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Temperatures(Influence):
-    """Temperatures of `parts`; `balls` (n,) are those of the artefact that expands."""
+    """Temperatures of `parts` with the parameters `stated`; `balls` (n,) are those of the artefact
+    that expands.
+    """
 
+    stated: tuple[InfluenceParameter, ...]
     parts: tuple[Part, ...]
     balls: Flags
     reference: float
 
     @property
     def parameters(self) -> tuple[InfluenceParameter, ...]:
-        return tuple(parameter for part in self.parts for parameter in part.parameters)
+        return self.stated
 
     @property
     def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
@@ -305,68 +304,75 @@ class Temperatures(Influence):
         """
         shift = np.zeros(at.x.shape)
         derivative = np.zeros((*at.x.shape, len(self.parameters)))
-        first, coefficient = 0, 0
         for part in self.parts:
-            if part.axis == -2:
+            if part.axis == ARTEFACT:
                 length = np.where(self.balls[at.ball][:, None], at.arms, 0.0)
             else:
                 axes = np.arange(at.x.shape[1])
-                length = np.where((axes == part.axis) | (part.axis == -1), -at.x, 0.0)
+                length = np.where((axes == part.axis) | (part.axis == SCALES), -at.x, 0.0)
             difference = part.differences[at.position]
             for column in part.columns:
                 given = at.column(column) - self.reference
                 difference = np.where(np.isnan(given), difference, given)
             shift += part.expansion * difference[:, None] * length
-            if part.own:
-                coefficient = first
-            sensor = first + part.own
-            derivative[:, :, coefficient] += difference[:, None] * length
-            derivative[:, :, sensor] = part.expansion * length
-            rows = np.flatnonzero(part.wrong[at.position] >= 0)
-            derivative[rows, :, first + part.wrong[at.position[rows]]] = (
-                part.expansion * length[rows]
-            )
-            first += len(part.parameters)
+            derivative[:, :, part.coefficient] += difference[:, None] * length
+            derivative[:, :, part.sensor] += part.expansion * length
+            errors = part.errors[at.position]
+            rows = np.flatnonzero(errors >= 0)
+            derivative[rows, :, errors[rows]] += part.expansion * length[rows]
         return shift, derivative
 
 
-def _part(
+def _parts(
+    parameters: list[InfluenceParameter],
     name: str,
-    expansion: ExpansionSettings,
+    whole: int,
+    expansions: Sequence[ExpansionSettings],
     measured: MeasuredSettings,
     differences: Array,
     here: Flags,
     reach: float,
-    design: DesignParts,
-    axis: int | Literal["all"] = -2,
-    shared: bool = False,
-) -> Part:
-    """What expands as one, with its parameters; `reach` is how far it goes, in metres."""
-    size = max(abs(expansion.value), LEAST_EXPANSION) * reach
-    most = max(float(np.abs(differences).max(initial=0.0)), LEAST_DIFFERENCE)
-    u = expansion.standard_uncertainty
-    parameters = []
+    positions: Sequence[str],
+) -> Iterator[Part]:
+    """What expands as one, each with `parameters` added to those of all.
 
-    def add(words: str, unit: Unit, value: float, u: float, effect: float, k: int = -1) -> None:
+    `expansions` and `differences` (a, k) have one row for each axis where they are stated so, else
+    one for all. `reach` is how far they go, in metres.
+    """
+
+    def add(words: str, unit: Unit, value: float, u: float, effect: float, k: int = -1) -> int:
         parameters.append(InfluenceParameter(words, unit, value, u, effect, k))
+        return len(parameters) - 1
 
-    if not shared:
-        words = f"expansion of {'the scales' if axis == 'all' else name}"
-        add(words, "1/K", expansion.value, or_unknown(u), most * reach)
-    add(f"sensor error of {name}", "K", 0.0, measured.sensor_uncertainty, size)
-    wrong = np.full(len(here), -1)
-    for k in np.flatnonzero(here) if measured.standard_uncertainty else ():
-        wrong[k] = len(parameters)
-        words = f"temperature error of {name} in {design.positions.names[k]}"
-        add(words, "K", 0.0, measured.standard_uncertainty, size, int(k))
-    return Part(
-        -1 if axis == "all" else axis,
-        differences,
-        expansion.value,
-        not shared,
-        wrong,
-        tuple(parameters),
-    )
+    def of_axis(count: int, axis: int) -> str:
+        return name if count == 1 else f"scale {'xyz'[axis]}"
+
+    size = max(LEAST_EXPANSION, *(abs(expansion.value) for expansion in expansions)) * reach
+    most = max(float(np.abs(differences).max(initial=0.0)), LEAST_DIFFERENCE)
+    count = max(len(expansions), len(differences))
+    coefficient, sensor, errors = -1, -1, np.full(len(here), -1)
+    for axis in range(count):
+        if axis < len(expansions):
+            expansion = expansions[axis]
+            u = or_unknown(expansion.standard_uncertainty)
+            words = f"expansion of {of_axis(len(expansions), axis)}"
+            coefficient = add(words, "1/K", expansion.value, u, most * reach)
+        if axis < len(differences):
+            words = of_axis(len(differences), axis)
+            sensor = add(f"sensor error of {words}", "K", 0.0, measured.sensor_uncertainty, size)
+            errors = np.full(len(here), -1)
+            for k in np.flatnonzero(here).tolist() if measured.standard_uncertainty else ():
+                text = f"temperature error of {words} in {positions[k]}"
+                errors[k] = add(text, "K", 0.0, measured.standard_uncertainty, size, int(k))
+        along = axis if count > 1 else whole
+        columns = (
+            (ARTEFACT_COLUMN,)
+            if whole == ARTEFACT
+            else (SCALES_COLUMN, *AXIS_COLUMNS[along : along + 1])
+        )
+        row = differences[min(axis, len(differences) - 1)]
+        value = expansions[min(axis, len(expansions) - 1)].value
+        yield Part(along, row, value, coefficient, sensor, errors, columns)
 
 
 def _check_uncertainties(stated: object, steps: Steps, references: References) -> None:

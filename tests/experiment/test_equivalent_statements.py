@@ -1,0 +1,910 @@
+"""Pairs of files that state the same thing in two ways: the same ranks, uncertainties and
+simulated readings.
+
+Each pair is a change of one small experiment, by paths, and the same as it can be written
+otherwise; `None` removes a key. What is equal by a law (a temperature's error and a scale's, two
+readings and one of less uncertainty) is the only thing that the pairs assume.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from ballplate.simulator.estimation.functions import linear_functions
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Position
+from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import simulated_readings
+from ballplate.uncertainty.quantities import QUANTITIES
+
+DESIGNS = Path(__file__).parents[2] / "designs"
+Changes = Mapping[str, object]
+EVERY = ("U1", "U2", "U2 offsets", "U3", "U4", "U5", "U6", "tasks")
+Z, X, Y = "positions.0", "positions.2", "positions.4"
+PLACES = ("z low", "z high", "x low", "x high", "y low", "y high")
+CORNERS = ["r1c1", "r1c3", "r3c1", "r3c3"]
+BALLS = [f"r{row}c{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
+SIDES = [["r1c1", "r1c3"], ["r3c1", "r3c3"], ["r1c1", "r3c1"], ["r1c3", "r3c3"]]
+
+
+@cache
+def experiment(design: str) -> dict[str, Any]:
+    """A design, or the quickstart with nine balls, three coefficients, a few places and a task."""
+    path = DESIGNS / f"{design or 'quickstart'}.yaml"
+    tree: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if not design:
+        tree["artefacts"]["plate"]["balls"] = [3, 3]
+        tree["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+        points = [[100, 200, 300], [700, 600, 500], [250, 800, 50]]
+        tree["evaluation"]["points"] = [[f"{x} mm" for x in point] for point in points]
+        tree["true_machine"] = {
+            "kind": "coefficients",
+            "error_model": dict(tree["error_model"]),
+            "values": {"EXX t^2": "30 um", "EAY t": "20 urad"},
+        }
+        start, end = ([f"{x} mm" for x in point] for point in ([0, 10, 20], [500, 500, 500]))
+        tree["evaluation"]["tasks"] = [{"name": "bore", "from": start, "to": end}]
+    return tree
+
+
+def changed(tree: dict[str, Any], changes: Changes) -> dict[str, Any]:
+    """A copy with other values at the paths; None removes what is there."""
+    tree = copy.deepcopy(tree)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        holder: Any = tree
+        for step in parents:
+            holder = holder[int(step)] if isinstance(holder, list) else holder[step]
+        key: Any = int(last) if isinstance(holder, list) else last
+        if value is None:
+            del holder[key]
+        else:
+            holder[key] = copy.deepcopy(value)
+    return tree
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two statements of the same thing, `common` in both; `files` are beside them by their names.
+
+    `quantities` are those that are compared, all unless a page says that one is counted otherwise.
+    `in_order` is false where balls or parameters have another order. `design` names a
+    file to start from in place of the quickstart.
+    """
+
+    first: Changes
+    second: Changes
+    common: Changes = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+    quantities: tuple[str, ...] = EVERY
+    in_order: bool = True
+    design: str = ""
+
+
+def temperature(**keys: object) -> Changes:
+    return {"influences": [{"kind": "temperature", **keys}]}
+
+
+def influences(*items: dict[str, object]) -> Changes:
+    return {"influences": list(items)}
+
+
+def exact(value: str) -> dict[str, object]:
+    return {"value": value, "standard_uncertainty": "0 um/m/K"}
+
+
+def priors(*items: tuple[str, str]) -> Changes:
+    return {"priors": [{"parameter": name, "standard_uncertainty": u} for name, u in items]}
+
+
+SENSOR = {"value": "20.8 degC", "standard_uncertainty": "50 mK", "sensor_uncertainty": "200 mK"}
+WARM = {"artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "0.6 um/m/K"}}
+OFFSET_OF_LEFT = ["-50 mm", "0 mm", "0 mm"]
+EMPIRICAL = {"kind": "empirical", "terms": "univariate", "coefficients": 3}
+SPLINE = {"order": 3, "knots": []}
+SAG = {"kind": "sag", "value": "5 um", "standard_uncertainty": "2 um"}
+DRIFT = {"value": "2 um/h", "standard_uncertainty": "0.5 um/h"}
+STAR = {"probes": ["right", "left", "back"], "standard_uncertainty": "0.5 um", "place": "unknown"}
+DISTANCES = "calibration.0"
+UNCERTAIN = {"balls": "all", "kind": "coordinates"}
+COORDINATES = "".join(
+    f"{ball},{375 * column},{375 * row},0\n"
+    for ball, (row, column) in zip(BALLS, np.ndindex(3, 3), strict=True)
+)
+
+
+def column_of(heading: str, value: object) -> str:
+    rows = COORDINATES.splitlines()
+    return "\n".join([f"ball,x_mm,y_mm,z_mm,{heading}", *(f"{row},{value}" for row in rows)]) + "\n"
+
+
+PAIRS: dict[str, Pair] = {
+    # Scalars and lists.
+    "repeatability by axis": Pair(
+        {"machine.repeatability": "0.3 um"}, {"machine.repeatability": ["0.3 um"] * 3}
+    ),
+    "repeatability by named axes": Pair(
+        {"machine.repeatability": ["0.3 um", "0.2 um", "0.4 um"]},
+        {"machine.repeatability": {"x": "0.3 um", "y": "0.2 um", "z": "0.4 um"}},
+    ),
+    "volume by its ends": Pair({}, {"machine.volume": {axis: ["0 mm", "1 m"] for axis in "xyz"}}),
+    "readings of a position by axis": Pair(
+        {f"{X}.standard_uncertainty": "0.4 um"}, {f"{X}.standard_uncertainty": ["0.4 um"] * 3}
+    ),
+    "readings of a position as the machine's": Pair({}, {f"{X}.standard_uncertainty": "0.2 um"}),
+    "offset by axis": Pair(
+        {"probes.left": {"offset": OFFSET_OF_LEFT, "standard_uncertainty": "1 um"}},
+        {"probes.left": {"offset": OFFSET_OF_LEFT, "standard_uncertainty": ["1 um"] * 3}},
+    ),
+    "one sensor of scales with three expansions": Pair(
+        temperature(scale_expansion=exact("10 um/m/K"), scale_temperature=SENSOR),
+        temperature(scale_expansion=[exact("10 um/m/K")] * 3, scale_temperature=SENSOR),
+    ),
+    "one sensor of scales, temperatures by position": Pair(
+        temperature(
+            scale_expansion=exact("10 um/m/K"),
+            scale_temperature=SENSOR | {"value": "22 degC"},
+            positions={place: {"scales": "20.8 degC"} for place in PLACES},
+        ),
+        temperature(scale_expansion=[exact("10 um/m/K")] * 3, scale_temperature=SENSOR),
+    ),
+    "three sensors of scales with one expansion": Pair(
+        temperature(
+            scale_expansion=exact("10 um/m/K"),
+            scale_temperature=SENSOR | {"value": ["21 degC"] * 3},
+        ),
+        temperature(
+            scale_expansion=[exact("10 um/m/K")] * 3,
+            scale_temperature=SENSOR | {"value": "21 degC"},
+            positions={place: {"scales": ["21 degC"] * 3} for place in PLACES},
+        ),
+    ),
+    "three expansions and temperatures, by position": Pair(
+        temperature(
+            scale_expansion=[exact(f"{value} um/m/K") for value in (8, 9, 10)],
+            scale_temperature=SENSOR | {"value": ["20.8 degC", "21 degC", "22 degC"]},
+        ),
+        temperature(
+            scale_expansion=[exact(f"{value} um/m/K") for value in (8, 9, 10)],
+            scale_temperature=SENSOR,
+            positions={place: {"scales": ["20.8 degC", "21 degC", "22 degC"]} for place in PLACES},
+        ),
+    ),
+    "drift by axis": Pair(
+        influences({"kind": "drift", "axes": DRIFT}),
+        influences({"kind": "drift", "axes": [DRIFT] * 3}),
+    ),
+    "co-ordinates by axis": Pair(
+        {DISTANCES: UNCERTAIN | {"standard_uncertainty": "0.5 um"}},
+        {DISTANCES: UNCERTAIN | {"standard_uncertainty": dict.fromkeys("xyz", "0.5 um")}},
+    ),
+    # Variants and full text, by group and by item.
+    "variant": Pair(
+        {Z + ".level": "300 mm", "machine.repeatability": "0.3 um"},
+        {
+            "variants": {
+                "other": {"positions[z low].level": "0.3 m", "machine.repeatability": "300 nm"}
+            }
+        },
+    ),
+    "candidates of a group": Pair(
+        {
+            "pool": {
+                "candidates": [
+                    {
+                        "planes": ["z"],
+                        "levels": {"from": "100 mm", "to": "300 mm", "count": 2},
+                        "corners": {"x": ["0 mm", "200 mm"], "y": "100 mm"},
+                        "quarter_turns": 1,
+                        "probes": ["down"],
+                    }
+                ]
+            }
+        },
+        {
+            "pool": {
+                "candidates": [
+                    {
+                        "name": f"{level} {x}",
+                        "plane": "z",
+                        "level": f"{level} mm",
+                        "corner": {"x": f"{x} mm", "y": "100 mm"},
+                        "quarter_turns": 1,
+                        "probes": ["down"],
+                        "times": {"set_up": "20 min"},
+                    }
+                    for level in (100, 300)
+                    for x in (0, 200)
+                ]
+            }
+        },
+    ),
+    "terms of the true machine": Pair(
+        {"true_machine.values": {"EXX t": "30 um", "EAY t^2": "20 urad"}},
+        {"true_machine.values": {"EXX t^1": "0.03 mm", "EAY t^2": "20e-6 rad"}},
+    ),
+    "curves of the true machine": Pair(
+        {"true_machine.values": {"EXX t": "30 um", "EAY t": "20 urad"}},
+        {"true_machine": {"kind": "curves", "arrangement": "MB2", "files": ["x.csv", "y.csv"]}},
+        files={
+            "x.csv": "position_mm,EXX_um\n0,0\n1000,30\n",
+            "y.csv": "position_mm,EAY_urad\n0,0\n400,8\n1000,20\n",
+        },
+    ),
+    "coefficients of each function": Pair(
+        {},
+        {
+            "error_model.functions": {
+                **{f"E{a}{b}": 3 for a in "XYZABC" for b in "XYZ"},
+            },
+            "error_model.position_coefficients": 5,
+            "error_model.rotation_coefficients": 4,
+        },
+    ),
+    "arrangement in full": Pair(
+        {}, {"error_model.arrangement": {"probe_side": ["x", "y", "z"], "workpiece_side": []}}
+    ),
+    "another arrangement in full": Pair(
+        {"error_model.arrangement": "FB1"},
+        {"error_model.arrangement": {"probe_side": ["x", "z"], "workpiece_side": ["y"]}},
+    ),
+    "splines without knots": Pair(
+        {},
+        {"error_model": {"kind": "kinematic", "arrangement": "MB2", "basis": SPLINE}},
+        quantities=("U1", "U2", "U4", "U5", "U6", "tasks"),
+    ),
+    "splines of each function": Pair(
+        {"error_model.functions": {"EXX": {"order": 3, "knots": []}}},
+        {"error_model.functions": {"EXX": 3}},
+        quantities=("U1", "U2", "U4", "U5", "U6", "tasks"),
+    ),
+    "monomials": Pair({}, {"error_model.basis": "monomial"}),
+    "21 parameters": Pair(
+        {},
+        {"error_model.squareness": "parameters"},
+        quantities=("U1", "U2", "U4", "U5", "U6", "tasks"),
+    ),
+    "grid as square": Pair(
+        {"artefacts.plate.balls": [2, 2]},
+        {"artefacts.plate": {"kind": "square", "balls": 2, "size": "750 mm"}},
+    ),
+    "grid as a list of balls": Pair(
+        {DISTANCES + ".pairs": SIDES},
+        {
+            "artefacts.plate": {
+                "kind": "balls",
+                "coordinates": {
+                    ball: [f"{375 * column} mm", f"{375 * row} mm", "0 mm"]
+                    for ball, (row, column) in zip(BALLS, np.ndindex(3, 3), strict=True)
+                },
+            },
+        },
+        {DISTANCES + ".pairs": SIDES},
+    ),
+    "grid as a file of balls": Pair(
+        {},
+        {"artefacts.plate": {"kind": "balls", "file": "balls.csv"}},
+        {DISTANCES + ".pairs": SIDES},
+        {"balls.csv": f"ball,x_mm,y_mm,z_mm\n{COORDINATES}"},
+    ),
+    "corner and centre": Pair(
+        {f"{Z}.corner": {"x": "100 mm", "y": "0 mm"}},
+        {f"{Z}.corner": None, f"{Z}.centre": {"x": "475 mm", "y": "375 mm"}},
+    ),
+    "plane and pose": Pair(
+        {},
+        {
+            **{f"{Z}.{key}": None for key in ("plane", "level", "corner")},
+            f"{Z}.pose": {"origin": ["0 mm", "0 mm", "250 mm"]},
+        },
+    ),
+    "turn and pose": Pair(
+        {},
+        {
+            **{f"positions.1.{key}": None for key in ("plane", "level", "corner", "quarter_turns")},
+            "positions.1.pose": {
+                "origin": ["1 m", "250 mm", "750 mm"],
+                "rotation": ["0 deg", "0 deg", "90 deg"],
+            },
+        },
+    ),
+    "no turns": Pair({}, {f"{Z}.quarter_turns": 0}),
+    "all balls named": Pair({}, {f"{X}.balls": BALLS}),
+    "probes in groups": Pair(
+        {},
+        {
+            f"{X}.probes": None,
+            f"{X}.readings": [{"probes": ["right"]}, {"probes": ["left"]}],
+        },
+    ),
+    "balls in groups": Pair(
+        {},
+        {
+            f"{X}.probes": None,
+            f"{X}.readings": [
+                {"probes": ["right", "left"], "balls": BALLS[:4]},
+                {"probes": ["right", "left"], "balls": BALLS[4:]},
+            ],
+        },
+    ),
+    "repeats in groups": Pair(
+        {f"{Z}.repeats": 2},
+        {f"{Z}.probes": None, f"{Z}.readings": [{"probes": ["down"]}, {"probes": ["down"]}]},
+    ),
+    "repeats of a group": Pair(
+        {f"{Z}.repeats": 3, f"{Z}.standard_uncertainty": "0.5 um"},
+        {
+            f"{Z}.probes": None,
+            f"{Z}.readings": [
+                {"probes": ["down"], "repeats": 3, "standard_uncertainty": ["0.5 um"] * 3}
+            ],
+        },
+    ),
+    "repeats as smaller uncertainties": Pair(
+        {f"{Z}.repeats": 4}, {f"{Z}.standard_uncertainty": "0.1 um"}
+    ),
+    "repeats of two uncertainties": Pair(
+        {
+            f"{Z}.probes": None,
+            f"{Z}.readings": [
+                {"probes": ["down"], "standard_uncertainty": u} for u in ("0.5 um", "0.375 um")
+            ],
+        },
+        {f"{Z}.standard_uncertainty": "0.3 um"},
+    ),
+    "artefact named": Pair(
+        {},
+        {f"positions.{k}.artefact": "plate" for k in range(6)} | {DISTANCES + ".artefact": "plate"},
+    ),
+    "reference named": Pair(
+        {},
+        {"probes.down": {"offset": ["0 mm", "0 mm", "-50 mm"], "reference": True}},
+        {"probes.left": {"offset": OFFSET_OF_LEFT, "unknown": True}},
+    ),
+    "head and offsets": Pair(
+        {},
+        {
+            "head": {"tip": ["0 mm", "0 mm", "-50 mm"], "centre": ["0 mm"] * 3},
+            "probes": {
+                "down": {"A": "0 deg"},
+                "right": {"A": "90 deg", "B": "90 deg"},
+                "left": {"A": "90 deg", "B": "-90 deg"},
+                "back": {"A": "90 deg", "B": "180 deg"},
+                "front": {"A": "90 deg", "B": "0 deg"},
+            },
+        },
+    ),
+    # Calibration.
+    "sides by name": Pair({}, {DISTANCES + ".pairs": SIDES}, in_order=False),
+    "sides in items": Pair(
+        {},
+        {
+            "calibration": [
+                {"kind": "distances", "pairs": [pair], "standard_uncertainty": "0.2 um"}
+                for pair in SIDES
+            ]
+        },
+    ),
+    "corners by name": Pair(
+        {DISTANCES + ".pairs": "corners"},
+        {DISTANCES + ".pairs": [*SIDES, ["r1c1", "r3c3"], ["r1c3", "r3c1"]]},
+    ),
+    "distances with values": Pair(
+        {},
+        {
+            DISTANCES + ".pairs": SIDES,
+            DISTANCES + ".values": [{"balls": pair, "distance": "750 mm"} for pair in SIDES],
+        },
+    ),
+    "distances in a file": Pair(
+        {},
+        {
+            DISTANCES + ".values": "sides.csv",
+            DISTANCES + ".pairs": SIDES,
+            DISTANCES + ".standard_uncertainty": None,
+        },
+        files={
+            "sides.csv": "ball_1,ball_2,distance_mm,expanded_uncertainty_um,k\n"
+            + "".join(f"{a},{b},750,0.4,2\n" for a, b in SIDES)
+        },
+    ),
+    "covariance of independent values": Pair(
+        {},
+        {
+            DISTANCES + ".pairs": SIDES,
+            DISTANCES + ".standard_uncertainty": None,
+            DISTANCES + ".values": [{"balls": pair, "distance": "750 mm"} for pair in SIDES],
+            DISTANCES + ".covariance": "covariance.csv",
+        },
+        files={
+            "covariance.csv": "\n".join(
+                ",".join(row)
+                for row in [
+                    ["covariance_um2", *map(" ".join, SIDES)],
+                    *(
+                        [" ".join(side), *("0.04" if side == other else "0" for other in SIDES)]
+                        for side in SIDES
+                    ),
+                ]
+            )
+        },
+    ),
+    "co-ordinates in a file": Pair(
+        {DISTANCES: UNCERTAIN | {"standard_uncertainty": "0.5 um"}},
+        {DISTANCES: {"kind": "coordinates", "values": "balls.csv"}},
+        files={"balls.csv": column_of("standard_uncertainty_um", 0.5)},
+    ),
+    "co-ordinates with U": Pair(
+        {DISTANCES: UNCERTAIN | {"standard_uncertainty": "0.5 um"}},
+        {DISTANCES: {"kind": "coordinates", "values": "balls.csv", "coverage_factor": 2}},
+        files={"balls.csv": column_of("expanded_uncertainty_um", 1.0)},
+    ),
+    "co-ordinates in items": Pair(
+        {DISTANCES: UNCERTAIN | {"standard_uncertainty": "0.5 um"}},
+        {
+            "calibration": [
+                {"kind": "coordinates", "balls": balls, "standard_uncertainty": "0.5 um"}
+                for balls in (BALLS[:5], BALLS[5:])
+            ]
+        },
+    ),
+    "calibrated twice": Pair(
+        {DISTANCES + ".standard_uncertainty": "0.3 um"},
+        {
+            "calibration": [
+                {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": u}
+                for u in ("0.5 um", "0.375 um")
+            ]
+        },
+    ),
+    # A prior and the same as a certificate, common and by item.
+    "prior of a function": Pair(
+        priors(("EAX", "1 urad")), priors(("EAX[1]", "1 urad"), ("EAX[2]", "1 urad"))
+    ),
+    "priors stated twice": Pair(
+        priors(("EXX t^2", "0.3 um")), priors(("EXX t^2", "0.5 um"), ("EXX t^2", "0.375 um"))
+    ),
+    "prior with its value": Pair(
+        priors(("z high: origin z", "2 um")),
+        {
+            "priors": [
+                {
+                    "parameter": "z high: origin z",
+                    "value": "750 mm",
+                    "standard_uncertainty": "2 um",
+                }
+            ]
+        },
+    ),
+    # Influences.
+    "expansion and temperature of a plate": Pair(
+        temperature(
+            artefact_expansion=exact("10 um/m/K"),
+            artefact_temperature={"value": "21 degC", "sensor_uncertainty": "50 mK"},
+        ),
+        temperature(
+            artefact_expansion={"value": "10 um/m/K", "standard_uncertainty": "0.5 um/m/K"},
+            artefact_temperature={"value": "21 degC"},
+        ),
+        quantities=("U1", "U2", "U3", "U4", "U5", "U6", "tasks"),
+    ),
+    "temperatures of positions and their scales": Pair(
+        temperature(
+            artefact_expansion=exact("10 um/m/K"),
+            artefact_temperature={"value": "20 degC", "standard_uncertainty": "50 mK"},
+        ),
+        influences({"kind": "position scale", "standard_uncertainty": "0.5 ppm"}),
+    ),
+    "plate and scales in two items": Pair(
+        temperature(
+            **WARM,
+            artefact_temperature=SENSOR,
+            scale_expansion=exact("8 um/m/K"),
+            scale_temperature=SENSOR,
+        ),
+        influences(
+            {"kind": "temperature", "artefact": "plate", **WARM, "artefact_temperature": SENSOR},
+            {
+                "kind": "temperature",
+                "reference": "20 degC",
+                "scale_expansion": exact("8 um/m/K"),
+                "scale_temperature": SENSOR,
+            },
+        ),
+    ),
+    "temperature of the plate by position": Pair(
+        temperature(**WARM, artefact_temperature=SENSOR),
+        temperature(
+            **WARM,
+            artefact_temperature=SENSOR | {"value": "25 degC"},
+            positions={place: {"artefact": "20.8 degC"} for place in PLACES},
+        ),
+    ),
+    "re-indexing as reproducibility": Pair(
+        influences({"kind": "re-indexing", "standard_uncertainty": "1 um"}),
+        influences(
+            {
+                "kind": "reproducibility",
+                "each": ["position", "probe"],
+                "standard_uncertainty": "1 um",
+            }
+        ),
+    ),
+    "re-indexing by probe": Pair(
+        influences({"kind": "re-indexing", "standard_uncertainty": "1 um"}),
+        influences(
+            {
+                "kind": "re-indexing",
+                "standard_uncertainty": "1 um",
+                "probes": ["down", "right", "left", "back", "front"],
+            }
+        ),
+    ),
+    "re-indexing in items": Pair(
+        influences(
+            {"kind": "re-indexing", "standard_uncertainty": "1 um", "probes": ["left", "back"]}
+        ),
+        influences(
+            {"kind": "re-indexing", "standard_uncertainty": "1 um", "probes": ["back"]},
+            {"kind": "re-indexing", "standard_uncertainty": "1 um", "probes": ["left"]},
+        ),
+    ),
+    "reproducibility of each reading": Pair(
+        {"machine.repeatability": "0.5 um"},
+        influences(
+            {
+                "kind": "reproducibility",
+                "each": ["position", "probe", "ball"],
+                "standard_uncertainty": "0.4 um",
+            }
+        ),
+        {"machine.repeatability": "0.3 um"},
+    ),
+    "reproducibility and re-indexing": Pair(
+        influences({"kind": "re-indexing", "standard_uncertainty": "0.5 um"}),
+        influences(
+            {"kind": "re-indexing", "standard_uncertainty": "0.3 um"},
+            {
+                "kind": "reproducibility",
+                "each": ["probe", "position"],
+                "standard_uncertainty": "0.4 um",
+            },
+        ),
+    ),
+    "styli as they point": Pair(
+        influences({"kind": "probing", "standard_uncertainty": "1 um", "between_probes": "0.5 um"}),
+        influences(
+            {
+                "kind": "probing",
+                "standard_uncertainty": "1 um",
+                "between_probes": "0.5 um",
+                "directions": {
+                    "down": [0, 0, -1],
+                    "right": [2, 0, 0],
+                    "left": [-1, 0, 0],
+                    "back": [0, 1, 0],
+                    "front": [0, -5, 0],
+                },
+            }
+        ),
+    ),
+    "probing in items": Pair(
+        influences({"kind": "probing", "standard_uncertainty": "0.5 um", "probes": ["left"]}),
+        influences(
+            {
+                "kind": "probing",
+                "standard_uncertainty": "0.3 um",
+                "between_probes": "0.4 um",
+                "probes": ["left"],
+            }
+        ),
+    ),
+    "scales of named positions": Pair(
+        influences({"kind": "position scale", "standard_uncertainty": "1 ppm"}),
+        influences(
+            {"kind": "position scale", "standard_uncertainty": "1 um/m", "positions": list(PLACES)}
+        ),
+    ),
+    "sag along x as a term": Pair(
+        influences(SAG | {"shape": "x"}),
+        influences(SAG | {"values": "sag.csv"}),
+        files={"sag.csv": "ball,sag_um\n" + "".join(f"{b},{5 * (b[-1] == '2')}\n" for b in BALLS)},
+    ),
+    "sag with its defaults": Pair(
+        influences(SAG), influences(SAG | {"artefact": "plate", "shape": "both", "gravity": "-z"})
+    ),
+    "drift with its times": Pair(
+        influences({"kind": "drift", "axes": {"standard_uncertainty": "0.5 um/h"}}),
+        influences(
+            {
+                "kind": "drift",
+                "axes": {"standard_uncertainty": "0.5 um/h"},
+                "positions": {
+                    place: {"start": f"{15 * 9 * start} s", "reading": "0.25 min"}
+                    for place, start in zip(PLACES, (0, 1, 2, 4, 6, 8), strict=True)
+                },
+            }
+        ),
+    ),
+    "sag along x in powers": Pair(
+        influences(SAG | {"shape": [{"factor": -1, "x": 2}]}),
+        influences(SAG | {"shape": [{"factor": -3, "x": 2, "y": 0}]}),
+    ),
+    "drift with its times of all": Pair(
+        influences(
+            {
+                "kind": "drift",
+                "scale": {"standard_uncertainty": "0.5 ppm/h"},
+                "times": {"reading": "20 s", "set_up": "10 min"},
+            }
+        ),
+        influences(
+            {
+                "kind": "drift",
+                "scale": {"standard_uncertainty": "0.5 um/m/h", "value": "0 ppm/h"},
+                "times": {"set_up": "600 s", "reading": "1 s"},
+                "positions": {place: {"reading": "20 s"} for place in PLACES},
+            }
+        ),
+    ),
+    # Other artefacts and models.
+    "repeats of a hole plate": Pair(
+        {f"{Z}.repeats": 4, f"{X}.repeats": 4},
+        {f"{Z}.standard_uncertainty": "0.1 um", f"{X}.standard_uncertainty": "0.1 um"},
+        {"artefacts.plate.reads": "in plane", "artefacts.plate.flatness": "5 um"},
+    ),
+    "repeats of a bar": Pair(
+        {"positions.0.repeats": 4},
+        {"positions.0.standard_uncertainty": "0.5 um"},
+        {"artefacts.bar.role": "length_standard"},
+        design="certified/ball-bar",
+    ),
+    "repeats of a bar in groups": Pair(
+        {"positions.0.repeats": 2},
+        {
+            "positions.0.probes": None,
+            "positions.0.readings": [{"probes": ["cone"]}, {"probes": ["cone"]}],
+        },
+        {"artefacts.bar.role": "length_standard"},
+        design="certified/ball-bar",
+    ),
+    "ends of a bar in groups": Pair(
+        {},
+        {
+            "positions.0.probes": None,
+            "positions.0.readings": [
+                {"probes": ["cone"], "balls": ["1"]},
+                {"probes": ["cone"], "balls": ["2"]},
+            ],
+        },
+        {"artefacts.bar.role": "length_standard"},
+        design="certified/ball-bar",
+    ),
+    "bar of two spheres": Pair(
+        {},
+        {
+            "artefacts.bar": {
+                "kind": "two_spheres",
+                "length": "0.5 m",
+                "role": "length_standard",
+            }
+        },
+        {"artefacts.bar.role": "length_standard", "calibration.0.values": None},
+        design="certified/ball-bar",
+        in_order=False,
+    ),
+    "repeats of a gauge": Pair(
+        {"positions.0.repeats": 4},
+        {"positions.0.standard_uncertainty": "0.5 um"},
+        design="certified/bryan-gauge",
+    ),
+    "repeats in two dimensions": Pair(
+        {"positions.0.repeats": 4, "positions.0.standard_uncertainty": "1 um"},
+        {"positions.0.standard_uncertainty": ["0.5 um", "0.5 um"]},
+        design="certified/two-dimensions",
+    ),
+    "functions of the empirical model": Pair(
+        {"error_model": EMPIRICAL},
+        {
+            "error_model": EMPIRICAL
+            | {"rotation_functions": {"terms": "univariate", "coefficients": 3}}
+        },
+    ),
+    "empirical model in splines": Pair(
+        {"error_model": EMPIRICAL},
+        {"error_model": {"kind": "empirical", "terms": "univariate", "basis": SPLINE}},
+        quantities=("U1", "U2", "U4", "U5", "U6", "tasks"),
+    ),
+    # Stars, units, targets and what is evaluated.
+    "star in a table": Pair(
+        {"stars": [STAR]},
+        {"stars": [STAR | {"values": "star.csv"}]},
+        files={"star.csv": "probe,x_mm,y_mm,z_mm\nright,50,0,0\nleft,-50,0,0\nback,0,50,0\n"},
+    ),
+    "star of all its probes": Pair(
+        {"stars": [STAR | {"probes": ["down", "right", "left", "back", "front"]}]},
+        {"stars": [{key: value for key, value in STAR.items() if key != "probes"}]},
+    ),
+    "star in the machine's units": Pair(
+        {"stars": [STAR]}, {"stars": [STAR | {"standard_uncertainty": "500 nm"}]}
+    ),
+    "lengths in other units": Pair(
+        {},
+        {
+            "machine.volume": ["1000 mm", "1000000 um", "1 m"],
+            "machine.repeatability": "200 nm",
+            "artefacts.plate.size": ["0.75 m", "750000 um"],
+            f"{Z}.level": "0.25 m",
+            DISTANCES + ".standard_uncertainty": "0.0002 mm",
+        },
+    ),
+    "inches": Pair({f"{Z}.level": "254 mm"}, {f"{Z}.level": "10 in"}),
+    "angles in other units": Pair(
+        priors(("EAX", "3.141592653589793 urad")), priors(("EAX", "0.6479999999999999 arcsec"))
+    ),
+    "temperatures in other units": Pair(
+        temperature(**WARM, artefact_temperature=SENSOR),
+        temperature(
+            artefact_expansion={"value": "11.5 ppm/K", "standard_uncertainty": "0.6 um/m/degC"},
+            artefact_temperature=SENSOR
+            | {"standard_uncertainty": "0.05 K", "sensor_uncertainty": "0.2 K"},
+        ),
+    ),
+    "uncertainty that grows": Pair(
+        {DISTANCES + ".standard_uncertainty": "0.1 um + L/1000000"},
+        {DISTANCES + ".standard_uncertainty": "(0.1 + L/1000) um with L in mm"},
+    ),
+    "uncertainty of one length": Pair(
+        {DISTANCES + ".standard_uncertainty": "0.1 um + 1 ppm"},
+        {DISTANCES + ".standard_uncertainty": "0.85 um"},
+    ),
+    "points in a file": Pair(
+        {},
+        {"evaluation.points": {"file": "points.csv"}},
+        files={"points.csv": "x_mm,y_mm,z_mm\n100,200,300\n700,600,500\n250,800,50\n"},
+    ),
+    "points drawn": Pair(
+        {"evaluation.points": {"random": 5}}, {"evaluation.points": {"random": 5, "seed": 1}}
+    ),
+    "probe of the points": Pair({}, {"evaluation.probe": None}),
+    "probe of the task": Pair(
+        {"evaluation.tasks.0.probe": "left"}, {"evaluation.tasks.0.probes": ["left", "left"]}
+    ),
+    "target by its earlier name": Pair(
+        {},
+        {
+            "target_uncertainty": None,
+            "target_accuracy": "0.5 um + 1 um/m",
+            "evaluation.tasks.0.target_uncertainty": "0.5 um + L/1000000",
+        },
+    ),
+}
+
+
+def figures(tree: dict[str, Any], folder: Path, pair: Pair) -> dict[str, Any]:
+    """Rank deficiency, degrees of freedom, and standard uncertainties of all quantities with their
+    targets.
+    """
+    # JSON is YAML, and quicker to write.
+    (folder / "file.yaml").write_text(json.dumps(tree), encoding="utf-8")
+    experiment = load(folder / "file.yaml")[-1]
+    design = lay_out(experiment)
+    at = linearise(design)
+    found: dict[str, Any] = {"deficiency": at.deficiency}
+    x = simulated_readings(experiment, exact=True).x
+    # Repeats of exact readings are the same, and may be counted otherwise.
+    x = x[np.lexsort(np.round(x, 12).T)]
+    found["readings"] = x[np.append(True, (np.diff(x, axis=0) > 1e-12).any(axis=1))]
+    for symbol in pair.quantities:
+        for k, functions in enumerate(QUANTITIES[symbol].functions(design, at.layout)):
+            u = at.uncertainty(linear_functions(at, functions))
+            found[f"{symbol} {k}"] = u if pair.in_order else np.sort(u)
+    targets = [task.target for task in experiment.evaluation.tasks]
+    found["target"] = [
+        [np.nan if target is None else target.at(length) for length in (0.0, 0.3, 1.0)]
+        for target in [experiment.target_uncertainty, *targets]
+    ]
+    if experiment.pool is not None:
+        found["candidates"] = [
+            [candidate.seconds, *candidate.item.pose.origin, *candidate.item.pose.rotation.ravel()]
+            for candidate in experiment.pool.candidates
+            if isinstance(candidate.item, Position)
+        ]
+    return found
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_two_statements_of_the_same_give_the_same_figures(name: str, tmp_path: Path) -> None:
+    pair = PAIRS[name]
+    tree = changed(experiment(pair.design), pair.common)
+    for file, text in pair.files.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    first = figures(changed(tree, pair.first), tmp_path, pair)
+    second = figures(changed(tree, pair.second), tmp_path, pair)
+    assert first.keys() == second.keys()
+    for key, value in first.items():
+        np.testing.assert_allclose(second[key], value, rtol=1e-9, atol=0, err_msg=key)
+
+
+def read_table(folder: Path, changes: Changes, headings: str, cells: str) -> dict[str, Any]:
+    """The fit of the plain experiment's readings with further cells in every row."""
+    (folder / "plain.yaml").write_text(json.dumps(experiment("")), encoding="utf-8")
+    simulated = simulated_readings(load(folder / "plain.yaml")[0])
+    with (folder / "plain.csv").open("w", encoding="utf-8", newline="") as stream:
+        write_readings(stream, simulated.design, simulated.readings, simulated.x)
+    first, *rows = (folder / "plain.csv").read_text(encoding="utf-8").splitlines()
+    lines = [first + headings, *(row + cells for row in rows)]
+    (folder / "readings.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    tree = changed(experiment(""), changes)
+    (folder / "file.yaml").write_text(json.dumps(tree), encoding="utf-8")
+    (stated,) = load(folder / "file.yaml")
+    observed = read_readings(folder / "readings.csv", lay_out(stated), settings=stated.readings)
+    solution = estimate(observed.design, observed.x)
+    at = linearised_fit(observed.design, solution)
+    (functions,) = QUANTITIES["U6"].functions(observed.design, at.layout)
+    return {
+        "machine": solution.state.a,
+        "balls": solution.state.balls,
+        "influences": solution.state.influences,
+        "U6": at.uncertainty(linear_functions(at, functions)),
+    }
+
+
+READ: dict[str, tuple[tuple[Changes, str, str], tuple[Changes, str, str]]] = {
+    "uncertainty of readings": (
+        ({"machine.repeatability": "0.4 um"}, "", ""),
+        ({}, ",u_nm", ",400"),
+    ),
+    "expanded uncertainty of readings": (
+        ({"machine.repeatability": "0.4 um"}, "", ""),
+        ({}, ",U_um,k", ",1,2.5"),
+    ),
+    "uncertainty in the section of readings": (
+        ({"machine.repeatability": "0.4 um"}, "", ""),
+        ({"readings": {"columns": {"u": "=0.0004 mm"}}}, "", ""),
+    ),
+    "temperature of readings": (
+        (temperature(scale_expansion=exact("10 um/m/K"), scale_temperature=SENSOR), "", ""),
+        (
+            temperature(
+                scale_expansion=[exact("10 um/m/K")] * 3,
+                scale_temperature=SENSOR | {"value": "25 degC"},
+            ),
+            ",temperature_scales_degC",
+            ",20.8",
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_two_statements_of_the_same_readings_give_the_same_fit(name: str, tmp_path: Path) -> None:
+    first, second = (read_table(tmp_path, *statement) for statement in READ[name])
+    for key, value in first.items():
+        np.testing.assert_allclose(second[key], value, rtol=1e-9, atol=1e-15, err_msg=key)
+
+
+def test_repeats_have_the_uncertainties_of_their_groups(tmp_path: Path) -> None:
+    groups = [{"probes": ["down"], "standard_uncertainty": u} for u in ("0.5 um", "0.2 um")]
+    tree = changed(experiment(""), {f"{Z}.probes": None, f"{Z}.readings": groups})
+    (tmp_path / "file.yaml").write_text(json.dumps(tree), encoding="utf-8")
+    simulated = simulated_readings(load(tmp_path / "file.yaml")[0])
+    with (tmp_path / "readings.csv").open("w", encoding="utf-8", newline="") as stream:
+        write_readings(stream, simulated.design, simulated.readings, simulated.x)
+    observed = read_readings(tmp_path / "readings.csv", simulated.design)
+    assert observed.design.readings.uncertainty is not None
+    planned = simulated.readings.uncertainty
+    assert planned is not None and set(planned[:, 0]) == {0.5e-6, 0.2e-6}
+    np.testing.assert_array_equal(observed.design.readings.uncertainty, planned)
