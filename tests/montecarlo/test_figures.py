@@ -7,6 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,19 +137,15 @@ def test_bias_is_found_where_there_is_one_and_only_there() -> None:
     assert with_bias.actual.value > 1.05 > with_bias.spread.value
 
 
-@cache
-def two() -> Estimates:
-    return estimate_batch(quickstart(), 1, 0, 2)
-
-
 def comparison(errors: np.ndarray) -> MonteCarloComparison:
     """What errors (b, q), in their standard uncertainties, come to."""
     n, q = errors.shape
+    shared: Any = SimpleNamespace(degrees_of_freedom=1, sum_of_squares=0.0)
     aim = MonteCarloQuantity("U4", np.zeros(q), np.ones(q), ("1",) * q, lambda _: errors)
-    first = estimate_batch(quickstart(), 1, 0, 1)
-    many = Estimates(np.arange(n), first.found, np.ones(n), np.ones(n, np.int64), np.ones(n, bool))
-    total = accumulate(quickstart(), (aim,), many, n)
-    return outcome(quickstart(), (aim,), total).comparisons["U4"]
+    found: Any = None
+    converged = np.ones(n, bool)
+    many = Estimates(np.arange(n), found, np.ones(n), np.ones(n, np.int64), converged)
+    return outcome(shared, (aim,), accumulate(shared, (aim,), many, n)).comparisons["U4"]
 
 
 @pytest.mark.parametrize("standard_errors", [3.95, 4.05])
