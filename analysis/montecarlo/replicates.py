@@ -211,8 +211,7 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
                 drawn, at, chosen = drawn.select(left), at.select(left), chosen[left]
     converged &= np.isfinite(squares)
     found = at if ended is None else ended.with_rows(chosen, at)
-    rest = np.flatnonzero(~converged)
-    for k in rest:
+    for k in np.flatnonzero(~converged).tolist():
         solution = complete_fit(shared, *whole.of(k))
         converged[k] = solution.status == "converged"
         passes[k] = len(solution.iterations) - 1

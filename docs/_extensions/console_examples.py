@@ -81,8 +81,8 @@ LOADED_BEFORE = (
 
 # Lines that no example leaves out, and what goes on with one of them in the next line.
 ALARM = re.compile(
-    r"^(\S+: )?(warning|suspected|reason|note|rank deficiency|Too optimistic|NOT|<-)\b"
-    r"|cannot follow|did not converge|weakly determined|\bNO\b"
+    r"^(\S+: )?(warning|suspected|reason|note|rank deficiency|weakly determined|Too optimistic)\b"
+    r"|^<-|cannot follow|did not converge|\bNOT?\b"
 )
 CONTINUED = re.compile(r"^  (?! )")
 
