@@ -32,7 +32,7 @@ import shutil
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -79,7 +79,7 @@ LOADED_BEFORE = (
 )
 
 
-# Lines that no example leaves out, and what goes on with one of them in the next line.
+# Lines that no example leaves out, and how a line begins that goes on with the one before.
 ALARM = re.compile(
     r"^(\S+: )?(warning|suspected|reason|note|rank deficiency|weakly determined|Too optimistic)\b"
     r"|^<-|cannot follow|did not converge|\bNOT?\b"
@@ -87,20 +87,15 @@ ALARM = re.compile(
 CONTINUED = re.compile(r"^  (?! )")
 
 
-def alarms(lines: list[str]) -> set[int]:
-    """Numbers of the lines that warn, with the lines that go on with them."""
-    found: set[int] = set()
-    for i, line in enumerate(lines):
-        if ALARM.search(line) or (i - 1 in found and CONTINUED.search(line)):
-            found.add(i)
-    return found
-
-
-def with_gaps(lines: list[str], kept: set[int]) -> list[str]:
-    """Lines of the numbers that are kept, with dots in the place of others."""
+def with_gaps(lines: list[str], chosen: Iterable[int]) -> list[str]:
+    """Lines of the numbers chosen and all alarms, each to its end, with dots in the place of
+    others.
+    """
     shown: list[str] = []
+    kept = {*chosen, *(i for i, line in enumerate(lines) if ALARM.search(line))}
     for i, line in enumerate(lines):
-        if i in kept:
+        if i in kept or (i - 1 in kept and CONTINUED.search(line)):
+            kept.add(i)
             shown.append(line)
         elif shown[-1:] != ["…"]:
             shown.append("…")
@@ -163,7 +158,7 @@ class Console(_Example):
             if not places:
                 raise self.refuse(f'no line has "{pattern}":\n' + "\n".join(lines))
             kept = kept[places[0] :] if option == "from" else places
-        return with_gaps(lines, {*kept[: self.options.get("shown")], *alarms(lines)})
+        return with_gaps(lines, kept[: self.options.get("shown")])
 
 
 class File(_Example):

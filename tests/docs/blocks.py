@@ -91,7 +91,7 @@ def made(block: Block, folder: Path) -> list[str]:
     status, lines = examples.terminal_lines(f"ballplate {block.command}", folder)
     if status:
         raise ValueError(f"{block.page}: {block.command} has exit status {status}: {lines}")
-    kept, at = examples.alarms(lines), 0
+    kept, at = [], 0
     for line in block.shown:
         if line == "…":
             continue
@@ -99,7 +99,7 @@ def made(block: Block, folder: Path) -> list[str]:
         place = next((i for i in range(at, len(lines)) if parts(lines[i])[0] == kind), None)
         if place is None:
             raise ValueError(f"{block.page}: {block.command} prints no line like: {line}")
-        kept.add(place)
+        kept.append(place)
         at = place + 1
     shown: list[str] = examples.with_gaps(lines, kept)
     return shown
