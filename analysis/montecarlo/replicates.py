@@ -22,6 +22,7 @@ from ballplate.simulator.design.arrays import Replicates, State
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
 from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.estimation.substitution import solve_balls, solve_kept, solve_shared
 from ballplate.simulator.geometry.motions import cross_matrices, vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
@@ -150,7 +151,15 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
     drawn = draw(shared, seed, batch)
     if count < BATCH:
         drawn = drawn.select(np.arange(count))
-    whole = drawn
+    found = _refined(shared, drawn, batch * BATCH + np.arange(count))
+    for k in np.flatnonzero(~found.converged).tolist():
+        found = _with_estimate(found, k, shared, complete_fit(shared, *drawn.of(k)))
+    return found
+
+
+def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
+    """What passes with the shared factor end at."""
+    count = len(index)
     design, layout = shared.design, shared.factor.layout
     columns, offset = layout.pose_columns, layout.offset_columns
     n, d = design.balls.places.shape
@@ -211,13 +220,22 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
                 drawn, at, chosen = drawn.select(left), at.select(left), chosen[left]
     converged &= np.isfinite(squares)
     found = at if ended is None else ended.with_rows(chosen, at)
-    for k in np.flatnonzero(~converged).tolist():
-        solution = complete_fit(shared, *whole.of(k))
-        converged[k] = solution.status == "converged"
-        passes[k] = len(solution.iterations) - 1
-        squares[k] = solution.factor.sum_of_squares
-        found = found.with_rows(np.array([k]), _deviation(shared, solution.state))
-    return Estimates(batch * BATCH + np.arange(count), found, squares, passes, converged)
+    return Estimates(index, found, squares, passes, converged)
+
+
+def _with_estimate(all_of: Estimates, k: int, shared: Reference, solution: Solution) -> Estimates:
+    """The same with one of them from a fit of its own."""
+
+    def changed(values: Array, value: float) -> Array:
+        return np.where(np.arange(len(values)) == k, value, values).astype(values.dtype)
+
+    return Estimates(
+        all_of.index,
+        all_of.found.with_rows(np.array([k]), _deviation(shared, solution.state)),
+        changed(all_of.sum_of_squares, solution.factor.sum_of_squares),
+        changed(all_of.passes, len(solution.iterations) - 1),
+        changed(all_of.converged, solution.status == "converged"),
+    )
 
 
 def _deviation(shared: Reference, state: State) -> Deviations:
