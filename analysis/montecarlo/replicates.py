@@ -159,19 +159,9 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
 
 def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
     """What passes with the shared factor end at."""
-    count = len(index)
-    design, layout = shared.design, shared.factor.layout
+    count, d, layout = len(index), shared.design.dimension, shared.factor.layout
     columns, offset = layout.pose_columns, layout.offset_columns
-    n, d = design.balls.places.shape
-    k, turns = columns.shape[0], columns.shape[1] - d
-    at = Deviations(
-        np.zeros((count, d, n)),
-        np.zeros((count, k, turns)),
-        np.zeros((count, k, d)),
-        np.zeros((count, len(shared.start.a))),
-        np.zeros((count, *design.probes.offsets.shape)),
-        np.zeros((count, len(layout))),
-    )
+    at = _no_deviations(shared, count)
     passes, converged = np.zeros(count, np.int64), np.zeros(count, bool)
     squares, first, previous = np.full(count, np.nan), np.zeros(count), np.zeros(count)
     alone = np.zeros(count, bool)
@@ -221,6 +211,20 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
     converged &= np.isfinite(squares)
     found = at if ended is None else ended.with_rows(chosen, at)
     return Estimates(index, found, squares, passes, converged)
+
+
+def _no_deviations(shared: Reference, count: int) -> Deviations:
+    design, layout = shared.design, shared.factor.layout
+    n, d = design.balls.places.shape
+    k, turns = layout.pose_columns.shape[0], layout.pose_columns.shape[1] - d
+    return Deviations(
+        np.zeros((count, d, n)),
+        np.zeros((count, k, turns)),
+        np.zeros((count, k, d)),
+        np.zeros((count, len(shared.start.a))),
+        np.zeros((count, *design.probes.offsets.shape)),
+        np.zeros((count, len(layout))),
+    )
 
 
 def _with_estimate(all_of: Estimates, k: int, shared: Reference, solution: Solution) -> Estimates:
