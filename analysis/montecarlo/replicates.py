@@ -229,17 +229,12 @@ def _no_deviations(shared: Reference, count: int) -> Deviations:
 
 def _with_estimate(all_of: Estimates, k: int, shared: Reference, solution: Solution) -> Estimates:
     """The same with one of them from a fit of its own."""
-
-    def changed(values: Array, value: float) -> Array:
-        return np.where(np.arange(len(values)) == k, value, values).astype(values.dtype)
-
-    return Estimates(
-        all_of.index,
-        all_of.found.with_rows(np.array([k]), _deviation(shared, solution.state)),
-        changed(all_of.sum_of_squares, solution.factor.sum_of_squares),
-        changed(all_of.passes, len(solution.iterations) - 1),
-        changed(all_of.converged, solution.status == "converged"),
-    )
+    squares, passes = all_of.sum_of_squares.copy(), all_of.passes.copy()
+    converged = all_of.converged.copy()
+    squares[k], passes[k] = solution.factor.sum_of_squares, len(solution.iterations) - 1
+    converged[k] = solution.status == "converged"
+    found = all_of.found.with_rows(np.array([k]), _deviation(shared, solution.state))
+    return Estimates(all_of.index, found, squares, passes, converged)
 
 
 def _deviation(shared: Reference, state: State) -> Deviations:
