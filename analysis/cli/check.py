@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
 from .outputs import UsageError
-from .telling import complain, tell_notes, warn
+from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ..planning.repair.checked_files import CheckedFile
@@ -127,6 +128,8 @@ def run(options: Namespace) -> int:
                 statuses.append(status)
             files.append(checked)
             _print(checked, options)
+            if not wanted.repairs and options.format == "text":
+                _name_suggestions(checked, options)
     if options.format == "junit":
         from .junit import junit_report
 
@@ -139,6 +142,15 @@ def run(options: Namespace) -> int:
     if not all(checked.as_expected for checked in files):
         statuses.append(NOT_AS_EXPECTED)
     return max(statuses)
+
+
+def _name_suggestions(checked: CheckedFile, options: Namespace) -> None:
+    """Name the command that suggests repairs of a design that determines less than it should."""
+    verdicts = [design.prediction.verdict for design in checked.designs]
+    if any(one.deficiency and not one.as_expected for one in verdicts):
+        variants = [word for name in options.variant or () for word in ("--variant", name)]
+        words = ["ballplate", "check", str(checked.file), *variants, "--suggest"]
+        note(options, f"next: {shlex.join(words)}")
 
 
 def _goals(options: Namespace) -> tuple[Goal, ...]:

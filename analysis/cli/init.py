@@ -26,7 +26,7 @@ def run(options: Namespace) -> int:
     from importlib.resources import files
 
     name, command = (
-        ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
+        ("machine_template.yaml", "map") if options.machine else ("template.yaml", "check")
     )
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if write(options, {options.file: text}):

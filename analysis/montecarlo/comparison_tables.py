@@ -45,9 +45,7 @@ def trials_lines(done: Trials) -> list[str]:
     if outcome is None:
         return [f"no Monte Carlo: {done.reason}"]
     if not outcome.comparisons:
-        return [
-            f"no Monte Carlo: none of {outcome.trials} data sets led to an estimate that converged"
-        ]
+        return [f"no Monte Carlo: {outcome.reason}", *_failed_lines(outcome)]
     rows = [
         [
             "",
@@ -94,13 +92,15 @@ def trials_lines(done: Trials) -> list[str]:
         lines.append(f"{' and '.join(sampled)} for a sample of {count} distances")
     if any(one.flags for one in outcome.comparisons.values()):
         lines.append(f"<- differs from linear theory by more than {BEYOND:g} standard errors")
-    if outcome.failed:
-        numbers = listing([str(k) for k in outcome.failed])
-        lines.append(
-            f"{len(outcome.failed)} data sets did not converge and are left out of all figures:"
-            f" {numbers}"
-        )
-    return lines + _misfit_lines(done, outcome)
+    return lines + _failed_lines(outcome) + _misfit_lines(done, outcome)
+
+
+def _failed_lines(outcome: MonteCarloOutcome) -> list[str]:
+    if not outcome.failed:
+        return []
+    left_out = " and are left out of all figures" if outcome.comparisons else ""
+    numbers = listing([str(k) for k in outcome.failed])
+    return [f"{len(outcome.failed)} data sets did not converge{left_out}: {numbers}"]
 
 
 def _misfit_lines(done: Trials, outcome: MonteCarloOutcome) -> list[str]:
@@ -151,6 +151,7 @@ def trials_data(done: Trials) -> dict[str, Any]:
         return {"reason": done.reason}
     misfit = outcome.misfit
     found: dict[str, Any] = {
+        **({"reason": outcome.reason} if outcome.reason else {}),
         "trials": outcome.trials,
         "seed": done.seed,
         "not_converged": list(outcome.failed),

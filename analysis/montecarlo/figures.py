@@ -29,6 +29,11 @@ BEYOND = 4.0
 # Data sets below which standard errors are themselves too uncertain for flags.
 REPLICATES_LIMIT = 100
 
+# Data sets without an estimate, in number and as a share of all, beyond both of which the others
+# are a selection: it is the widest errors that fail.
+FAILED_LIMIT = 2
+FAILED_SHARE = 0.01
+
 
 @dataclass(frozen=True)
 class MonteCarloEstimate:
@@ -89,8 +94,8 @@ class Misfit:
 
 @dataclass(frozen=True)
 class MonteCarloOutcome:
-    """All comparisons, how many replicates they rest on and which failed; no comparison where all
-    did.
+    """All comparisons, how many replicates they rest on and which failed; no comparison, and no
+    figures of the misfit, where so many failed that the others are a selection.
     """
 
     trials: int
@@ -100,33 +105,43 @@ class MonteCarloOutcome:
     misfit: Misfit
     interrupted: bool = False
 
+    @property
+    def reason(self) -> str:
+        """Why there are no comparisons; empty where there are."""
+        if self.comparisons:
+            return ""
+        return (
+            f"{len(self.failed)} of {self.trials} data sets have no estimate that converged;"
+            " neither ratios nor coverage are shown, since the others are a selection"
+        )
+
 
 def outcome(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], total: Accumulator
 ) -> MonteCarloOutcome:
     """Figures from sums."""
     comparisons: dict[str, MonteCarloComparison] = {}
+    failed, trials = len(total.failed), total.count + len(total.failed)
+    n = 0 if failed > max(FAILED_LIMIT, FAILED_SHARE * trials) else total.count
     for aim, sums in zip(aims, total.quantities, strict=True):
-        if not total.count:
+        if not n:
             break
         # Of several artefacts each has its own distances.
         name = aim.symbol
         while name in comparisons:
             name += "'"
-        comparisons[name] = _comparison(aim, sums, total.count)
-    freedom, n = shared.degrees_of_freedom, max(total.count, 1)
-    mean = float(total.residual[0] / n)
-    share = total.rejected / n
+        comparisons[name] = _comparison(aim, sums, n)
+    mean, share = (float(one) / n if n else np.nan for one in (total.residual[0], total.rejected))
     return MonteCarloOutcome(
-        total.count + len(total.failed),
+        trials,
         total.failed,
         total.passes,
         comparisons,
         Misfit(
             MonteCarloEstimate(mean, _error_of_mean(total.residual[0], total.residual[1], n)),
-            freedom,
+            shared.degrees_of_freedom,
             shared.sum_of_squares,
-            MonteCarloEstimate(share, float(np.sqrt(share * (1.0 - share) / n))),
+            MonteCarloEstimate(share, float(np.sqrt(share * (1.0 - share) / max(n, 1)))),
         ),
     )
 
@@ -157,22 +172,13 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
     )
     mean_error = sums.errors / count
     # Scatter alone makes means differ from zero; what it makes of their square is taken away.
-    square = float(((mean_error / aim.uncertainty) ** 2).mean() - means[SPREAD] / count)
-    # Without a bias the square of a mean scatters as a replicate's mean square does, divided by
-    # their number once more.
-    error = (
-        float(np.hypot(errors[SPREAD] / np.sqrt(count), errors[SYSTEMATIC]))
-        if n > 1
-        else float("inf")
-    )
-    value = float(np.sqrt(max(square, 0.0)))
-    bias = MonteCarloEstimate(
-        value, error / (2.0 * value) if square > error else float(np.sqrt(error))
-    )
+    by_chance = float(means[SPREAD] / count)
+    square = float(((mean_error / aim.uncertainty) ** 2).mean()) - by_chance
+    bias = _root_of_bias(square, by_chance, errors[SPREAD] / np.sqrt(count), errors[SYSTEMATIC])
     flags = []
     if spread.differs_from(1.0):
         flags.append("spread")
-    if square > BEYOND * error:
+    if bias.differs_from(0.0):
         flags.append("bias")
     if known.differs_from(COVERAGE):
         flags.append("coverage")
@@ -199,6 +205,31 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         estimated,
         tuple(flags),
     )
+
+
+def _root_of_bias(
+    square: float, by_chance: float, scatter: float, systematic: float
+) -> MonteCarloEstimate:
+    """Bias from its `square`, of which what chance contributes is taken away, with a standard error
+    that tells how improbable the bias is without one.
+
+    Without a bias the mean square is `by_chance` and scatters by `scatter`, about as chi-squared
+    with the degrees of freedom that these two have. To first order its root would have half the
+    relative standard error of the square, and two standard errors of the square, which chance
+    passes in one of thirty figures, would be four of the bias. The standard error is therefore that
+    of a normal variable which would be as improbable, unless what is `systematic`, the bias of
+    readings without noise, is known less well.
+    """
+    from scipy.special import chdtrc, ndtri
+
+    error = float(np.hypot(scatter, systematic))
+    if not (0.0 < scatter < np.inf and square > error):
+        return MonteCarloEstimate(float(np.sqrt(max(square, 0.0))), float(np.sqrt(error)))
+    value, freedom = float(np.sqrt(square)), 2.0 * (by_chance / scatter) ** 2
+    chi_squared = freedom * (1.0 + square / by_chance)
+    # Far out the probability is zero in floating point, and the two are the same.
+    improbable = min(-ndtri(0.5 * chdtrc(freedom, chi_squared)), np.sqrt(chi_squared))
+    return MonteCarloEstimate(value, max(value / improbable, error / (2.0 * value)))
 
 
 def power_of_difference(more: int, gain: float) -> float:

@@ -72,13 +72,13 @@ class PositionReadings:
 class Reference:
     """What all replicates share.
 
-    The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty
-    of each. `ends` are the model at the first and the second ends of the length standards' lengths,
-    so far as they are read, with `end_noise` (d, ends) and `end_difference` (m, d), their
-    difference at the reference; `is_expanded` tells that models are expanded about readings,
-    because that is faithful. `rows` are those of each kind of observations about the truth. `start`
-    is the estimate from readings without noise. Directions that the design as `drawn` leaves open
-    are held; None where there are none.
+    The plates' readings, `order` (m,) among the design's, stand in the order of `groups`; `noise`
+    (d, m) is the standard uncertainty of each. `ends` are the model at the first and the second
+    ends of the length standards' lengths, so far as they are read, with `end_noise` (d, ends) and
+    `end_difference` (m, d), their difference at the reference; `is_expanded` tells that models are
+    expanded about readings, because that is faithful. `rows` are those of each kind of observations
+    about the truth. `start` is the estimate from readings without noise. Directions that the design
+    as `drawn` leaves open are held; None where there are none.
     """
 
     design: Design
@@ -87,6 +87,7 @@ class Reference:
     factor: Factor
     spectrum: Spectrum
     noise: Array
+    order: Integers
     groups: tuple[PositionReadings, ...]
     ends: tuple[LocalModel, LocalModel] | None
     end_noise: tuple[Array, Array]
@@ -106,8 +107,7 @@ class Reference:
     @property
     def position(self) -> Integers:
         """Positions (m,) of the plates' readings, in the order of the groups."""
-        counts = [group.rows.stop - group.rows.start for group in self.groups]
-        return np.repeat([group.position for group in self.groups], counts)
+        return self.design.readings.position[self.order]
 
     @property
     def linearisation(self) -> Linearisation:
@@ -212,6 +212,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         solution.factor,
         solution.spectrum,
         np.ascontiguousarray(noise[order].T),
+        plates[order],
         tuple(groups),
         ends,
         (end_noise[0], end_noise[1]),

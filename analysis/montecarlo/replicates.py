@@ -3,8 +3,10 @@
 A pass computes the exact non-linear residuals of all replicates of a batch and their exact
 gradient; the step solves R'R step = -gradient with the triangular factor that all share. What the
 passes end at is each replicate's own least-squares estimate, whatever factor the steps were made
-with. Everything is counted from the reference, so that differences of a nanometre in a metre keep
-their digits.
+with. A replicate that the shared factor does not bring near enough, because its own is another, is
+estimated by itself with `complete_fit`: to leave it out would make the others a selection.
+Everything is counted from the reference, so that differences of a nanometre in a metre keep their
+digits.
 
 A batch has a seed of its own and a fixed size, so that neither the number of workers nor the size
 of their tasks changes a bit of the result.
@@ -16,14 +18,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Replicates
+from ballplate.simulator.design.arrays import Replicates, State
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
 from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.estimation.substitution import solve_balls, solve_kept, solve_shared
-from ballplate.simulator.geometry.motions import cross_matrices
+from ballplate.simulator.geometry.motions import cross_matrices, vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from .complete_fits import complete_fit
 from .expansion import Single
 from .reference import PositionReadings, Reference
 
@@ -31,8 +35,12 @@ from .reference import PositionReadings, Reference
 # be constant.
 BATCH = 128
 
-# Passes after which a replicate counts as not converged.
+# Passes after which a replicate is estimated by itself.
 PASSES = 20
+
+# A step longer than this share of the one before shortens too slowly for the passes that there are,
+# or not at all: the replicate is estimated by itself at once.
+SLOWEST = 0.5
 
 # A replicate has converged when its step is below this fraction of its first, which is as long as
 # its errors are. Each pass shortens it a hundredfold at least, so that a few millionths of the
@@ -73,7 +81,10 @@ class Deviations:
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of b replicates with their S^2, passes and whether they converged, each (b,)."""
+    """Estimates of b replicates with their S^2, passes and whether they converged, each (b,).
+
+    Passes of a replicate that was estimated by itself are its iterations.
+    """
 
     index: Integers
     found: Deviations
@@ -91,6 +102,14 @@ class Draw:
     moved: Single
     errors: tuple[Array, ...]
     ends: tuple[Array, Array]
+
+    def of(self, k: int) -> tuple[Array, tuple[Array, ...], tuple[Array, Array]]:
+        """Noise of readings (d, m), of values and of both ends of one replicate."""
+        return (
+            self.moved[k],
+            tuple(one[k] for one in self.errors),
+            (self.ends[0][k], self.ends[1][k]),
+        )
 
     def select(self, chosen: Integers | Flags) -> Draw:
         """That of some replicates."""
@@ -132,20 +151,20 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
     drawn = draw(shared, seed, batch)
     if count < BATCH:
         drawn = drawn.select(np.arange(count))
-    design, layout = shared.design, shared.factor.layout
+    found = _refined(shared, drawn, batch * BATCH + np.arange(count))
+    for k in np.flatnonzero(~found.converged).tolist():
+        found = _with_estimate(found, k, shared, complete_fit(shared, *drawn.of(k)))
+    return found
+
+
+def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
+    """What passes with the shared factor end at."""
+    count, d, layout = len(index), shared.design.dimension, shared.factor.layout
     columns, offset = layout.pose_columns, layout.offset_columns
-    n, d = design.balls.places.shape
-    k, turns = columns.shape[0], columns.shape[1] - d
-    at = Deviations(
-        np.zeros((count, d, n)),
-        np.zeros((count, k, turns)),
-        np.zeros((count, k, d)),
-        np.zeros((count, len(shared.start.a))),
-        np.zeros((count, *design.probes.offsets.shape)),
-        np.zeros((count, len(layout))),
-    )
+    at = _no_deviations(shared, count)
     passes, converged = np.zeros(count, np.int64), np.zeros(count, bool)
-    squares, first = np.full(count, np.nan), np.zeros(count)
+    squares, first, previous = np.full(count, np.nan), np.zeros(count), np.zeros(count)
+    alone = np.zeros(count, bool)
     # Those still looked at, and what all were at when fewer were left.
     chosen, ended = np.arange(count), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -154,7 +173,7 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
             balls, common = _step(shared, by_ball, by_shared)
             # A replicate that has converged is left alone, so that its end does not depend on its
             # neighbours.
-            active = ~converged[chosen]
+            active = ~(converged[chosen] | alone[chosen])
             balls, common = balls * active[:, None, None], common * active[:, None]
             poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
             turn = poses[:, :, d:]
@@ -179,7 +198,10 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
                 first = size
             else:
                 converged[chosen] |= size <= SMALLEST_STEP * first[chosen]
-            left = ~converged[chosen]
+                # What is no number is no shorter either.
+                alone[chosen] |= ~(converged[chosen] | (size <= SLOWEST * previous[chosen]))
+            previous[chosen] = size
+            left = ~(converged[chosen] | alone[chosen])
             if not left.any():
                 break
             if left.sum() <= FEW_LEFT * len(chosen):
@@ -188,7 +210,48 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
                 drawn, at, chosen = drawn.select(left), at.select(left), chosen[left]
     converged &= np.isfinite(squares)
     found = at if ended is None else ended.with_rows(chosen, at)
-    return Estimates(batch * BATCH + np.arange(count), found, squares, passes, converged)
+    return Estimates(index, found, squares, passes, converged)
+
+
+def _no_deviations(shared: Reference, count: int) -> Deviations:
+    design, layout = shared.design, shared.factor.layout
+    n, d = design.balls.places.shape
+    k, turns = layout.pose_columns.shape[0], layout.pose_columns.shape[1] - d
+    return Deviations(
+        np.zeros((count, d, n)),
+        np.zeros((count, k, turns)),
+        np.zeros((count, k, d)),
+        np.zeros((count, len(shared.start.a))),
+        np.zeros((count, *design.probes.offsets.shape)),
+        np.zeros((count, len(layout))),
+    )
+
+
+def _with_estimate(all_of: Estimates, k: int, shared: Reference, solution: Solution) -> Estimates:
+    """The same with one of them from a fit of its own."""
+    squares, passes = all_of.sum_of_squares.copy(), all_of.passes.copy()
+    converged = all_of.converged.copy()
+    squares[k], passes[k] = solution.factor.sum_of_squares, len(solution.iterations) - 1
+    converged[k] = solution.status == "converged"
+    found = all_of.found.with_rows(np.array([k]), _deviation(shared, solution.state))
+    return Estimates(all_of.index, found, squares, passes, converged)
+
+
+def _deviation(shared: Reference, state: State) -> Deviations:
+    """What a single estimate differs by from the reference."""
+    start, layout = shared.start, shared.factor.layout
+    turns = vector_from_rotation(state.rotations @ start.rotations.transpose(0, 2, 1))
+    origins, a = state.origins - start.origins, state.a - start.a
+    offsets = state.probes - start.probes
+    # What is held goes to the extra column.
+    common = np.zeros(len(layout) + 1)
+    common[layout.pose_columns] = np.concatenate([origins, turns], axis=1)
+    common[layout.model], common[layout.offset_columns] = a, offsets
+    common[layout.lengths] = state.lengths - start.lengths
+    common[layout.influences] = state.influences - start.influences
+    balls = (state.balls - start.balls).T
+    values = (balls, turns, origins, a, offsets, common[:-1])
+    return Deviations(*(value[None] for value in values))
 
 
 def _gradient(

@@ -43,6 +43,9 @@ def run_trials(
 
     :raises KeyboardInterrupt: before the first task was done.
     """
+    # What figures are made with is loaded first: after an interruption there is little time.
+    import scipy.special  # noqa: F401
+
     aims = targets(shared)
     total: Accumulator | None = None
     interrupted = False

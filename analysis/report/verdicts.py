@@ -87,7 +87,7 @@ def flags(results: ReportedSweep) -> VerdictGroups:
         told = [f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()]
         if "monte_carlo" in texts:
             told.append(f"no Monte Carlo: {texts['monte_carlo']}")
-        if texts.get("not_converged"):
+        elif texts.get("not_converged"):
             told.append("data sets that did not converge, and are left out")
         if told:
             found.setdefault(("; ".join(told), ()), []).append(cell)

@@ -20,6 +20,7 @@ from .published import (
     Document,
     Erratum,
     Illegible,
+    OneSided,
     PublishedColumn,
     PublishedIterations,
     RankStatement,
@@ -266,11 +267,41 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Side:
+    """Ratios to ours, after the common factor, of the figures of a quantity that lie on one side of
+    ours.
+    """
+
+    stated: OneSided
+    ratios: tuple[float, ...]
+
+    @property
+    def above(self) -> int:
+        """Number of figures above ours."""
+        return sum(ratio > 1.0 for ratio in self.ratios)
+
+
+@dataclass(frozen=True)
 class Reproduction:
     """A document's sections, compared."""
 
     document: Document
     sections: tuple[Section, ...]
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """What lies on one side of ours in the columns that are compared, where there are any."""
+        found = []
+        for stated in self.document.statements.one_sided:
+            ratios = [
+                figure.adjusted
+                for section in self.sections
+                for one in section.columns
+                for figure in one.figures
+                if (figure.quantity, one.column.statistic) == (stated.quantity, stated.statistic)
+            ]
+            found += [Side(stated, tuple(ratios))] if ratios else []
+        return tuple(found)
 
     @property
     def agrees(self) -> bool:

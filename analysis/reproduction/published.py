@@ -71,6 +71,16 @@ class Reservation(Settings):
         )
 
 
+class OneSided(Settings):
+    """A quantity whose figures lie on one side of ours in all columns, which nobody has explained,
+    and what is known of it.
+    """
+
+    quantity: str
+    statistic: Statistic
+    reason: str
+
+
 class Erratum(Settings):
     """A block of a table, the designs that it is headed with, and those whose figures it has."""
 
@@ -153,6 +163,7 @@ class Statements(Settings):
     assumptions: tuple[Assumption, ...]
     limits: Limits
     exceptions: tuple[Reservation, ...]
+    one_sided: tuple[OneSided, ...]
     errata: tuple[Erratum, ...]
     illegible: tuple[Illegible, ...]
     ranks: tuple[RankStatement, ...]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, as_data, number, picked
 from .compare import (
@@ -20,6 +21,7 @@ from .compare import (
     ProgressLine,
     Reproduction,
     Section,
+    Side,
 )
 from .published import (
     REPEATABILITY,
@@ -400,8 +402,10 @@ def _exception_blocks(reproduction: Reproduction) -> list[Block]:
     excepted = _excepted(reproduction)
     for title, is_open in (("Open differences", True), ("Exceptions with a reason", False)):
         chosen = [(one, under) for one, under in excepted if one.open == is_open]
-        if chosen:
+        sides = reproduction.sides if is_open else ()
+        if chosen or sides:
             blocks.append(Heading(2, title))
+        blocks += [Paragraph(_side(one)) for one in sides]
         for one, under in chosen:
             ratios = [f.adjusted for f in under]
             many = f"{len(under)} figures" if len(under) > 1 else "1 figure"
@@ -416,6 +420,17 @@ def _exception_blocks(reproduction: Reproduction) -> list[Block]:
                 )
             )
     return blocks
+
+
+def _side(side: Side) -> str:
+    """A sentence on figures that lie on one side of ours."""
+    stated, count = side.stated, len(side.ratios)
+    where = f"{'all ' if side.above == count else f'{side.above} of '}{number_of(count, 'column')}"
+    return (
+        f"The printed {stated.statistic} {stated.quantity} is above ours in {where}:"
+        f" after the common factor {min(side.ratios):.3f} to {max(side.ratios):.3f} times ours."
+        f" {_sentence(stated.reason)}"
+    )
 
 
 def _tables(reservation: Reservation) -> str:
@@ -448,6 +463,13 @@ def _summary(reproduction: Reproduction) -> list[Block]:
     unexplained = sum(len(under) for one, under in _excepted(reproduction) if one.open)
     if unexplained:
         parts.append(("open differences, unexplained", f"{unexplained} figures"))
+    parts += [
+        (
+            f"{one.stated.statistic} {one.stated.quantity} above ours, unexplained",
+            f"{one.above} of {len(one.ratios)}",
+        )
+        for one in reproduction.sides
+    ]
     text = (
         "Everything compared agrees within what is stated."
         if reproduction.agrees
@@ -479,6 +501,14 @@ def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
             one.key: {**picked(one, "reason", "open", "within"), "figures": len(under)}
             for one, under in _excepted(reproduction)
         },
+        "one_sided": [
+            {
+                **picked(one.stated, "quantity", "statistic", "reason"),
+                **{"columns": len(one.ratios), "above": one.above},
+                **{"least_ratio": min(one.ratios), "largest_ratio": max(one.ratios)},
+            }
+            for one in reproduction.sides
+        ],
         "sections": [_section_data(section) for section in reproduction.sections],
     }
     plain_data: dict[str, Any] = as_data(data)

@@ -28,6 +28,7 @@ METHODS = {
         " ratio of actual errors to those predicted, and the order and number of weakly determined"
         " directions"
     ),
+    3: "data sets of Monte Carlo that are hard to estimate, and the standard errors of biases",
 }
 METHOD = max(METHODS)
 

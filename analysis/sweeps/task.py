@@ -132,6 +132,8 @@ def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed:
             details["monte_carlo"] = found.reason
         else:
             figures |= trial_figures(found.outcome, sweep.record)
+            if found.outcome.reason:
+                details["monte_carlo"] = found.outcome.reason
             details["not_converged"] = list(found.outcome.failed)
             details["flags"] = {
                 name: list(one.flags)
@@ -230,7 +232,8 @@ def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[s
         add(f"{name}_bias_ratio", one.bias)
         add(f"{name}_coverage_sigma_given", one.known)
         add(f"{name}_coverage_sigma_estimated", one.estimated)
-    add("sum_of_squares", outcome.misfit.mean)
+    if outcome.comparisons:
+        add("sum_of_squares", outcome.misfit.mean)
     figures["degrees_of_freedom"] = float(outcome.misfit.degrees_of_freedom)
     return figures
 

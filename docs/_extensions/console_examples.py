@@ -6,7 +6,7 @@ another:
 `{console}`      lines that begin with `$ ` are commands, and their output follows them. `:status:`
                  is the exit status of the last one, any other ends the build. Of its output
                  `:only:` shows lines with a pattern, `:from:` what follows the first such line,
-                 `:shown:` so many lines.
+                 `:shown:` so many lines; dots stand for the others, and no alarm is left out.
 `{file} NAME`    writes a file and shows it. `{edit} NAME`    changes a file, as a difference: lines
 with `-` go, lines with `+` come, others stay. `{python-run}`   runs a program and shows what it
 prints. `:continued:` goes on where the page's last program has ended,
@@ -32,7 +32,7 @@ import shutil
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -79,6 +79,29 @@ LOADED_BEFORE = (
 )
 
 
+# Lines that no example leaves out, and how a line begins that goes on with the one before.
+ALARM = re.compile(
+    r"^(\S+: )?(warning|suspected|reason|note|rank deficiency|weakly determined|Too optimistic)\b"
+    r"|^<-|cannot follow|did not converge|\bNOT?\b"
+)
+CONTINUED = re.compile(r"^  (?! )")
+
+
+def with_gaps(lines: list[str], chosen: Iterable[int]) -> list[str]:
+    """Lines of the numbers chosen and all alarms, each to its end, with dots in the place of
+    others.
+    """
+    shown: list[str] = []
+    kept = {*chosen, *(i for i, line in enumerate(lines) if ALARM.search(line))}
+    for i, line in enumerate(lines):
+        if i in kept or (i - 1 in kept and CONTINUED.search(line)):
+            kept.add(i)
+            shown.append(line)
+        elif shown[-1:] != ["…"]:
+            shown.append("…")
+    return shown
+
+
 class _Example(SphinxDirective):
     has_content = True
 
@@ -98,16 +121,11 @@ class _Example(SphinxDirective):
 
     def execute(self, what: str, action: Callable[[], int], expected: int = 0) -> list[str]:
         """What a terminal shows of a command, line by line."""
-        status, text = _on_terminal(action, self.folder)
+        status, lines = _lines_on_terminal(action, self.folder)
         if status != expected:
+            text = "\n".join(lines)
             raise self.refuse(f"{what}\nexit status {status} instead of {expected}:\n{text}")
-        text = text.replace("\r\n", "\n").replace(f"{self.folder}/", "")
-        # What a progress bar has drawn is cleared again.
-        return (
-            [line.rpartition("\r")[2].rstrip() for line in text.rstrip("\n").split("\n")]
-            if text
-            else []
-        )
+        return lines
 
 
 class Console(_Example):
@@ -128,17 +146,19 @@ class Console(_Example):
         return [nodes.literal_block("", "\n".join(shown), language="console")]
 
     def selected(self, lines: list[str]) -> list[str]:
-        """The lines that the options ask for, with dots where some are left out."""
+        """The lines that the options ask for, and all alarms, with dots where others are left
+        out.
+        """
+        kept = list(range(len(lines)))
         for option in ("from", "only"):
             pattern = self.options.get(option)
             if pattern is None:
                 continue
-            places = [i for i, line in enumerate(lines) if re.search(pattern, line)]
+            places = [i for i in kept if re.search(pattern, lines[i])]
             if not places:
                 raise self.refuse(f'no line has "{pattern}":\n' + "\n".join(lines))
-            lines = ["…", *lines[places[0] :]] if option == "from" else [lines[i] for i in places]
-        limit = self.options.get("shown", len(lines))
-        return lines if len(lines) <= limit else [*lines[:limit], "…"]
+            kept = kept[places[0] :] if option == "from" else places
+        return with_gaps(lines, kept[: self.options.get("shown")])
 
 
 class File(_Example):
@@ -254,6 +274,19 @@ def _program(source: str, path: Path) -> int:
             kept[name] = found.getvalue()
     path.write_bytes(pickle.dumps(kept))
     return 0
+
+
+def terminal_lines(command: str, folder: Path) -> tuple[int, list[str]]:
+    """Exit status of a line of the shell, and what a terminal shows of it."""
+    return _lines_on_terminal(_command(command), folder)
+
+
+def _lines_on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, list[str]]:
+    status, text = _on_terminal(action, folder)
+    text = text.replace("\r\n", "\n").replace(f"{folder}/", "")
+    # What a progress bar has drawn is cleared again.
+    lines = [line.rpartition("\r")[2].rstrip() for line in text.rstrip("\n").split("\n")]
+    return status, lines if text else []
 
 
 def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:

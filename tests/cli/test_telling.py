@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import shlex
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -63,10 +64,28 @@ def test_files_that_an_experiment_names_are_told(capsys: pytest.CaptureFixture[s
 
 def test_notes_go_and_errors_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "new.yaml"
-    assert told(capsys, "init", file) == (0, "", [f"{file} written; next: ballplate run {file}"])
+    assert told(capsys, "init", file) == (0, "", [f"{file} written; next: ballplate check {file}"])
     assert told(capsys, "init", file, "--force", "-q") == (0, "", [])
     status, out, lines = told(capsys, "init", file, "-q")
     assert (status, out) == (3, "") and "exists already" in lines[0]
+
+
+def test_a_deficient_check_names_the_next_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And that command does what is said of it; a deficiency that is expected needs none."""
+    file = tmp_path / "two planes.yaml"
+    lines = Path(QUICKSTART).read_text(encoding="utf-8").splitlines(keepends=True)
+    file.write_text("".join(line for line in lines if "{name: y" not in line), encoding="utf-8")
+    status, _, lines = told(capsys, "check", file)
+    assert status == 1 and lines == [f"next: ballplate check {shlex.quote(str(file))} --suggest"]
+    status, out, lines = told(capsys, *shlex.split(lines[0])[2:])
+    assert status == 1 and lines == [] and "full rank" in out
+    assert told(capsys, "check", file, "-q")[2] == []
+    assert told(capsys, "check", file, "--format", "github")[2] == []
+    expected = file.read_text(encoding="utf-8").replace("deficiency: 0", "deficiency: 5")
+    file.write_text(expected, encoding="utf-8")
+    assert told(capsys, "check", file)[0::2] == (0, [])
 
 
 def test_doubts_about_the_verdict_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ from ballplate.montecarlo.figures import (
     power_of_misfit,
 )
 from ballplate.montecarlo.reference import Reference, reference
-from ballplate.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.montecarlo.replicates import BATCH, Estimates, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, targets
 from ballplate.montecarlo.trials import run_trials
 from ballplate.results.study import predict
@@ -133,6 +135,50 @@ def test_bias_is_found_where_there_is_one_and_only_there() -> None:
     assert "bias" in with_bias.flags and abs(with_bias.bias.value - 0.5) < 4 * with_bias.bias.error
     assert "bias" not in without.flags
     assert with_bias.actual.value > 1.05 > with_bias.spread.value
+
+
+def comparison(errors: np.ndarray) -> MonteCarloComparison:
+    """What errors (b, q), in their standard uncertainties, come to."""
+    n, q = errors.shape
+    shared: Any = SimpleNamespace(degrees_of_freedom=1, sum_of_squares=0.0)
+    aim = MonteCarloQuantity("U4", np.zeros(q), np.ones(q), ("1",) * q, lambda _: errors)
+    found: Any = None
+    converged = np.ones(n, bool)
+    many = Estimates(np.arange(n), found, np.ones(n), np.ones(n, np.int64), converged)
+    return outcome(shared, (aim,), accumulate(shared, (aim,), many, n)).comparisons["U4"]
+
+
+@pytest.mark.parametrize("standard_errors", [3.95, 4.05])
+def test_a_bias_is_flagged_at_four_standard_errors(standard_errors: float) -> None:
+    """A single value, whose mean has a standard error that needs no theory."""
+    n = 4096
+    normal = scipy.stats.norm.ppf((np.arange(n) + 0.5) / n)
+    found = comparison(normal[:, None] + standard_errors * normal.std() / np.sqrt(n))
+    assert ("bias" in found.flags) == (standard_errors > 4)
+    assert found.bias.error == pytest.approx(1 / np.sqrt(n), rel=0.05)
+
+
+def correlated(generator: np.random.Generator, kind: str, n: int) -> np.ndarray:
+    """Standard normal errors (n, q) without a bias."""
+    if kind == "one":
+        return generator.standard_normal((n, 1))
+    own = generator.standard_normal((n, 30))
+    return own if kind == "independent" else np.sqrt(0.7) * own + np.sqrt(0.3) * own[:, :1]
+
+
+@pytest.mark.parametrize("kind", ["one", "independent", "correlated"])
+def test_biases_are_flagged_by_their_standard_errors_and_seldom_by_chance(kind: str) -> None:
+    """Of 1500 runs each without a bias three at most, and as often as the figures say with one."""
+    generator = np.random.default_rng(4)
+    clean = [comparison(correlated(generator, kind, 128)) for _ in range(1500)]
+    assert sum("bias" in one.flags for one in clean) <= 3
+    biased = [comparison(correlated(generator, kind, 400) + 0.3) for _ in range(200)]
+    for one in (*clean, *biased):
+        assert ("bias" in one.flags) == (one.bias.value > 4 * one.bias.error)
+    scatter = np.std([one.bias.value for one in biased])
+    stated = np.sqrt(np.mean([one.bias.error**2 for one in biased]))
+    assert 0.5 < scatter / stated < 2.0
+    assert sum("bias" in one.flags for one in biased) > 150
 
 
 def test_actual_errors_are_compared_as_root_mean_squares() -> None:

@@ -11,6 +11,9 @@ import pytest
 from ballplate.reproduction.compare import compare_column, compare_erratum, compare_remark
 from ballplate.reproduction.published import SYMBOLS, case_of, npl
 from ballplate.reproduction.shipped import Shipped, planned
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
+from ballplate.simulator.estimation.linearisation import linearise
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +64,43 @@ def test_figures_that_rest_on_no_random_points_agree_to_four_digits(shipped: Shi
         ]
     assert compared == 200
     assert off == ["6.2.2[n=10 NDEL=5] average U3"]
+
+
+def test_the_page_states_the_difference_of_all_averages_of_u4(shipped: Shipped) -> None:
+    """Its figures are those of all columns, and of the draws of points in the first of each
+    table.
+    """
+    ratios, above, means = [], {}, []
+    for column in npl().columns:
+        found = {f.quantity: f for f in compare_column(npl(), shipped, column).figures}
+        if column.statistic != "average" or "U4" not in found:
+            continue
+        figure = found["U4"]
+        ratios.append(figure.adjusted)
+        if column.table not in above:
+            draws = averages_of_draws(planned(shipped, column.design).design) / figure.ours
+            above[column.table] = (figure.adjusted - draws.mean()) / draws.std(ddof=1)
+            means.append(abs(draws.mean() - 1.0))
+    assert min(ratios) > 1.0
+    text = " ".join(Path("docs/documents/npl-cise-15-98.md").read_text(encoding="utf-8").split())
+    for part in (
+        f"above ours in all {len(ratios)} columns that have one",
+        f"by factors of {min(ratios):.3f} to {max(ratios):.3f} after",
+        f"{min(above.values()):.1f} to {max(above.values()):.1f} standard deviations",
+        f"which is within {100 * max(means):.1f} % of ours",
+    ):
+        assert part in text, part
+    assert len(above) == 7 and min(above.values()) > 2.0 and sorted(above.values())[1] > 3.0
+
+
+def averages_of_draws(design: Design) -> np.ndarray:
+    """Average U4 (60,) of as many draws of 100 points in the volume."""
+    volume, count = design.machine.volume, 60 * 100
+    share = np.random.default_rng(1).random((count, 3))
+    points = volume.lower + share * (volume.upper - volume.lower)
+    places = MeasuredPoints(points, np.full(count, design.evaluation.probe))
+    found = displacements(linearise(design), places).uncertainties
+    return np.asarray(found.reshape(60, -1).mean(axis=1))
 
 
 @pytest.mark.parametrize(

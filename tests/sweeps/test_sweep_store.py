@@ -17,7 +17,7 @@ from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.sweeps.fingerprint import fingerprint
+from ballplate.sweeps.fingerprint import METHOD, fingerprint
 from ballplate.sweeps.load import experiment_of, load_sweep
 from ballplate.sweeps.model import Sweep
 from ballplate.sweeps.store import definitions, files, keys, open_store, results
@@ -114,7 +114,8 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
     captured = capsys.readouterr()
     assert (
         told in captured.err
-        and "this version computes by method 2, and computes these cells anew" in captured.err
+        and f"this version computes by method {METHOD}, and computes these cells anew"
+        in captured.err
     )
     assert captured.out == f"{store}: 4 cells, 2 done, 2 failed\n"
     # With the same seeds, so that only what was corrected differs.

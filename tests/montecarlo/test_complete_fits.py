@@ -1,0 +1,140 @@
+"""Data sets that the shared factor does not bring to their estimate are estimated by themselves, so
+that no figure is that of a selection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.montecarlo import replicates
+from ballplate.montecarlo.accumulator import accumulate
+from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
+from ballplate.montecarlo.complete_fits import replicate_data
+from ballplate.montecarlo.experiments import Trials, true_experiment
+from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
+from ballplate.montecarlo.reference import Reference, reference
+from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
+from ballplate.montecarlo.targets import targets
+from ballplate.montecarlo.trials import sum_of_task
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.sweeps.task import trial_figures
+
+from .test_replicates import assert_agree, small, truth, with_length_standard, with_unknown_probes
+
+
+@cache
+def weak() -> Reference:
+    """The quickstart read a thousand times less well: of full rank, and far from linear."""
+    changes = {"machine.repeatability": "200 um", "evaluation.points": {"random": 10, "seed": 1}}
+    return reference(*true_experiment(bp.quickstart().with_(changes)))
+
+
+def test_no_data_set_of_a_weak_design_is_left_out() -> None:
+    """Half of these had no estimate where all were refined with the shared factor alone."""
+    shared, aims, count = weak(), targets(weak()), 12
+    found = estimate_batch(shared, 1, 0, count)
+    assert found.converged.all()
+    drawn = draw(shared, 1, 0)
+    for k in (0, 7):
+        solution = estimate(*replicate_data(shared, *drawn.of(k)))
+        state, own = solution.state, found.found
+        spread = own.balls.std(axis=0).max()
+        assert np.abs(shared.start.balls + own.balls[k].T - state.balls).max() < 1e-3 * spread
+        turned = rotation_from_vector(own.rotations[k]) @ shared.start.rotations
+        assert np.abs(turned - state.rotations).max() < 1e-3 * own.rotations.std(axis=0).max()
+        assert found.sum_of_squares[k] == pytest.approx(solution.factor.sum_of_squares, rel=1e-4)
+    told = outcome(shared, aims, accumulate(shared, aims, found, count))
+    assert told.comparisons["U6"].count == 45 and not told.failed
+    freedom = told.misfit.degrees_of_freedom
+    assert abs(told.misfit.mean.value - freedom) < 4 * told.misfit.mean.error
+
+
+@pytest.mark.parametrize(
+    "design",
+    [small(), small(kept=True), with_length_standard(False), with_unknown_probes(True)],
+    ids=["distances", "neighbours", "length", "probes and length"],
+)
+def test_an_estimate_by_itself_is_that_of_the_passes(
+    design: Design, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shared = reference(design, truth(design))
+    passes = estimate_batch(shared, 5, 0, 3)
+    monkeypatch.setattr(replicates, "SMALLEST_STEP", -1.0)
+    alone = estimate_batch(shared, 5, 0, 3)
+    assert alone.converged.all() and not (alone.found.a == passes.found.a).any()
+    own = alone.found
+    for k in range(3):
+        start = shared.start
+        turned = rotation_from_vector(own.rotations[k]) @ start.rotations
+        state = replace(
+            start,
+            balls=start.balls + own.balls[k].T,
+            rotations=turned,
+            origins=start.origins + own.origins[k],
+            a=start.a + own.a[k],
+            probes=start.probes + own.offsets[k],
+        )
+        assert_agree(shared, passes, state, float(alone.sum_of_squares[k]), k)
+    for name in ("balls", "shared"):
+        values, others = vars(alone.found)[name], vars(passes.found)[name]
+        assert np.abs(values - others).max() < 1e-5 * np.abs(others).max(), name
+
+
+def test_the_time_of_a_data_set_is_bounded() -> None:
+    """As many iterations as `fit` makes, however hopeless the readings."""
+    shared = replace(weak(), noise=100.0 * weak().noise)
+    found = estimate_batch(shared, 1, 0, 3)
+    assert found.passes.max() <= 20
+
+
+def without(failing: int, trials: int = BATCH) -> MonteCarloOutcome:
+    """A run of which the last data sets have no estimate."""
+    shared = reference(*true_experiment(bp.quickstart()))
+    aims = targets(shared)
+    found = estimate_batch(shared, 1, 0, trials)
+    kept = np.arange(trials) < trials - failing
+    return outcome(shared, aims, accumulate(shared, aims, replace(found, converged=kept), trials))
+
+
+@pytest.mark.parametrize(("failing", "shown"), [(0, True), (2, True), (3, False), (BATCH, False)])
+def test_where_too_many_fail_no_figure_is_shown(failing: int, shown: bool) -> None:
+    told = without(failing)
+    lines = "\n".join(trials_lines(Trials(1, told)))
+    assert (told.comparisons != {}) == shown == ("spread / U" in lines) == (not told.reason)
+    assert (f"{failing} data sets did not converge" in lines) == (failing > 0)
+    data = trials_data(Trials(1, told))
+    assert (data["quantities"] != {}) == shown and len(data["not_converged"]) == failing
+    figures = trial_figures(told, ("U6",))
+    assert ("U6_spread_ratio" in figures) == shown == ("sum_of_squares" in figures)
+    if not shown:
+        assert "S^2" not in lines and "covered" not in lines
+        assert f"{failing} of {BATCH} data sets have no estimate that converged" in lines
+        assert data["reason"] == told.reason and data["sum_of_squares"]["value"] is None
+
+
+def test_one_in_a_hundred_may_fail() -> None:
+    """More than two, and more than 1 %: both."""
+    shared = reference(*true_experiment(bp.quickstart()))
+    aims = targets(shared)
+    total = accumulate(shared, aims, estimate_batch(shared, 1, 0), BATCH)
+    for failing, trials, shown in ((10, 1000, True), (11, 1000, False), (3, 300, True)):
+        some = replace(total, count=trials - failing, failed=tuple(range(failing)))
+        assert (outcome(shared, aims, some).reason == "") == shown
+
+
+def test_workers_change_no_bit_of_estimates_by_themselves() -> None:
+    """Tasks in this process and in two others."""
+    tasks = [(weak(), targets(weak()), seed, 0, 3) for seed in (1, 3)]
+    expected = [sum_of_task(*task) for task in tasks]
+    for one, other in zip(expected, in_processes(sum_of_task, tasks, 2), strict=True):
+        assert one.passes == other.passes > 2 and one.failed == other.failed == ()
+        for own, again in zip(one.quantities, other.quantities, strict=True):
+            for values, same in zip(vars(own).values(), vars(again).values(), strict=True):
+                np.testing.assert_array_equal(values, same)
