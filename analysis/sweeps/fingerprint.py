@@ -28,7 +28,10 @@ METHODS = {
         " ratio of actual errors to those predicted, and the order and number of weakly determined"
         " directions"
     ),
-    3: "data sets of Monte Carlo that are hard to estimate, and the standard errors of biases",
+    3: (
+        "data sets of Monte Carlo that are hard to estimate, the standard errors of biases, and"
+        " scales with several expansions whose temperature one sensor measures"
+    ),
 }
 METHOD = max(METHODS)
 
