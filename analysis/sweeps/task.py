@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.memory import want_of_memory
 from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -112,6 +113,8 @@ def _reason(error: Exception) -> str:
     """What went wrong, in one line."""
     if isinstance(error, ExperimentError):
         return "; ".join(map(str, error.messages))
+    if isinstance(error, UnusableError):
+        return str(error)
     want = want_of_memory(error)
     if want is not None:
         return f"it {want}; {WITH_MEMORY}"

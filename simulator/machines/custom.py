@@ -19,7 +19,7 @@ from ..inputs.own_code import own_array, own_frame, own_result, running_own_code
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
 from ..inputs.trust import Trust
-from .protocol import Array, ErrorModel, HasLines, Line, Parameter, Reported
+from .protocol import Array, ErrorModel, Line, Parameter, Reported
 
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
@@ -73,7 +73,7 @@ def custom_model(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
     )
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
-    kind = GuardedModelWithLines if isinstance(model, HasLines) else GuardedModel
+    kind = GuardedModelWithLines if hasattr(model, "lines") else GuardedModel
     return kind(model, tuple(model.parameters))
 
 
