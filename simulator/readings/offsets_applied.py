@@ -175,7 +175,7 @@ def doubt_about_offsets(
             text += (
                 "; or write part instead, since the artefact stands turned against the plan in them"
             )
-    if taken == HYPOTHESES[0].name:
+    if taken == HYPOTHESES[0].name and is_read.all():
         mistakes = wrong_offsets(design, readings, x)
         text += "".join(f"; or {one.words(design)}" for one in mistakes)
     raise mark.refused(text)

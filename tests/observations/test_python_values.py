@@ -15,6 +15,7 @@ from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.trust import UNKNOWN
 from ballplate.sweeps.named_files import named_by
 from scipy.stats import norm
 
@@ -94,8 +95,8 @@ def test_every_command_knows_it(folder: Path) -> None:
 def test_modules_are_refused_where_they_are_not_allowed(folder: Path) -> None:
     written(folder, SIDES, ITEM)
     (folder / "diagonals.py").write_text("raise SystemExit('was run')", encoding="utf-8")
-    with pytest.raises(ExperimentError, match="a calibration in Python is code"):
-        load(folder / "e.yaml", with_modules=False)
+    with pytest.raises(ExperimentError, match="object: is code in Python"):
+        load(folder / "e.yaml", trust=UNKNOWN)
 
 
 CHANGED: list[tuple[str, str, str]] = [
