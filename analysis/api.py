@@ -209,9 +209,8 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     :raises ExperimentError: the file is wrong; no changes were found, or they cannot be written
         without changing the rest of the file.
 
-    >>> before = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").splitlines()
-    >>> new = set(repair("designs/npl/6.1.1.yaml", variant="B").splitlines()).difference(before)
-    >>> "    positions[z low].quarter_turns: 1" in new
+    >>> line = "    positions[z low].quarter_turns: 1"
+    >>> line in repair("designs/npl/6.1.1.yaml", variant="B").splitlines()
     True
     """
     from .planning.repair.mending import mended, to_write

@@ -190,7 +190,8 @@ def test_long_functions_say_why() -> None:
 def test_only_the_commands_write_to_the_terminal() -> None:
     written = []
     for path, tree in trees().items():
-        if room_of(path) == "analysis/cli":
+        # What code of a user's own prints goes where it mixes with no result.
+        if room_of(path) == "analysis/cli" or path == Path("simulator/inputs/own_code.py"):
             continue
         for node in ast.walk(tree):
             is_print = isinstance(node, ast.Name) and node.id == "print"

@@ -119,8 +119,8 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
 def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
     from ballplate.simulator.computing.internal_error import InternalError
-    from ballplate.simulator.computing.unusable import UnusableError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
+    from ballplate.simulator.inputs.unusable import UnusableError
 
     try:
         check_outputs(options)

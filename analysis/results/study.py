@@ -95,6 +95,7 @@ def _predict(
     )
 
 
+# In one piece: an estimate is judged step by step, each from those before it.
 @single_threaded
 def fit(
     experiment: Experiment,

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import ballplate.simulator
-from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.inputs.trust import OPENED
+from ballplate.simulator.inputs.unusable import UnusableError
 
 from .bundle import Bundle, unpack
 from .execute import Runner

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.unusable import UnusableError
 from filelock import FileLock, Timeout
 
 from ..presentation.result import Result

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
-from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.unusable import UnusableError
 
 # The second format has digests of what it keeps; rows that came from the first have none.
 NEWEST = 2

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.memory import want_of_memory
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.unusable import UnusableError
 
 from ..montecarlo.accumulator import Accumulator
 from ..montecarlo.experiments import Trials, block_of_trials, combined, trials

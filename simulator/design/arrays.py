@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..computing.unusable import UnusableError
 from ..inputs.own_code import own_frame, told
+from ..inputs.unusable import UnusableError
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
 from .noise import Noise

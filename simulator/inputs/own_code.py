@@ -16,9 +16,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..computing.unusable import UnusableError
 from .messages import in_one_line
 from .settings import shorten
+from .unusable import UnusableError
 
 # Packages that the program uses, by their folders.
 LIBRARIES = frozenset(

@@ -8,10 +8,10 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.computing.unusable import UnusableError
 from ballplate.simulator.design.arrays import influence_shifts, nominal_state
 from ballplate.simulator.design.influences.protocol import Disturbed, Influence, InfluenceParameter
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.inputs.unusable import UnusableError
 from ballplate.simulator.machines.protocol import Array
 
 from tests.machines.test_custom_model import EXPERIMENT, GOOD

@@ -193,6 +193,7 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
     return joined(parts)
 
 
+# In one piece: the columns of one table, and what is said of them.
 def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
     """What would determine the rest, and what each change would do."""
     if quoted["check"].data.get("repairs") is None:
