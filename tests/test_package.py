@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
+import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import ballplate
@@ -80,6 +83,29 @@ def test_all_packages_are_listed() -> None:
         for path in (TOP / folder).rglob("__init__.py"):
             names.add(".".join([package, *path.parent.relative_to(TOP / folder).parts]))
     assert names == set(settings["packages"])
+
+
+def imported(folder: Path) -> set[str]:
+    """Distributions whose modules the files below a folder import."""
+    modules = set()
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                modules |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                modules.add(node.module.partition(".")[0])
+    modules -= {*sys.stdlib_module_names, "tests"}
+    distributions = packages_distributions()
+    names = {distributions.get(module, [module])[0] for module in modules}
+    return {re.sub("[-_.]+", "-", name).lower() for name in names}
+
+
+def test_what_is_imported_is_declared() -> None:
+    project = tomllib.loads((TOP / "pyproject.toml").read_text("utf-8"))["project"]
+    groups = [project["dependencies"], *project["optional-dependencies"].values()]
+    declared = {re.split(r"[^\w-]", entry)[0].lower() for group in groups for entry in group}
+    for folder in ("simulator", "analysis", "tests", "docs/_extensions"):
+        assert imported(TOP / folder) <= {*declared, "ballplate"}, folder
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
@@ -127,7 +126,7 @@ def test_files_of_windows_say_the_same(tmp_path: Path, capsys: pytest.CaptureFix
         )
         == 0
     )
-    shutil.copy(ROOT / "designs/quickstart.yaml", tmp_path / "unix.yaml")
+    (tmp_path / "unix.yaml").write_text(QUICKSTART, encoding="utf-8", newline="\n")
     points = "".join(f"{10 * k},{k % 3}\n" for k in range(30))
     (tmp_path / "unix-errors.csv").write_text(
         f"# by hand\nposition_mm,error_um\n{points}", encoding="utf-8"
