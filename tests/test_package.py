@@ -113,7 +113,11 @@ def test_a_wheel_holds_one_package(tmp_path: Path) -> None:
     build = f"from setuptools.build_meta import build_wheel; print(build_wheel({str(tmp_path)!r}))"
     copied = tmp_path / "source"
     files = subprocess.run(
-        ["git", "ls-files"], cwd=TOP, capture_output=True, text=True, check=True
+        ["git", "-c", "safe.directory=*", "ls-files"],
+        cwd=TOP,
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     for name in files.splitlines():
         if (TOP / name).is_file():
