@@ -1,21 +1,31 @@
-"""What the tests need of the system: those that need more than Windows has are left out there, and
-told.
+"""What the tests need of the system: those that need what it lacks are skipped with a reason, and a
+checkout that takes no files is enough.
 """
 
 from __future__ import annotations
 
 import ast
+import atexit
 import compileall
 import importlib.util
 import inspect
 import os
 import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+
+if not os.access(ROOT, os.W_OK) and sys.pycache_prefix is None:
+    sys.pycache_prefix = os.environ["PYTHONPYCACHEPREFIX"] = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, sys.pycache_prefix, ignore_errors=True)
 
 # Hundreds of commands are run, each of which would compile all modules anew: once is enough. None of
 # them writes what it has compiled, since some are run on a disk that takes no more.
@@ -30,6 +40,14 @@ MODULES = ("fcntl", "pty", "resource", "termios")
 # a shell.
 WORDS = re.compile(
     r"\b(?:mkfifo|symlink_to|killpg|preexec_fn|start_new_session|SIGKILL|chmod|shell)\b|\bos\.kill\b|\"bash\"|/dev/|/proc/"
+)
+# What macOS lacks. Others are taken to lack what is named here, so that it can be imitated.
+DEVICES = ("/dev/full", "/proc/")
+PRETENDED = os.environ.get("BALLPLATE_TESTS_WITHOUT", "").split()
+MISSING = tuple(
+    name
+    for name in DEVICES
+    if name in PRETENDED or not Path(name, "self" * (name == "/proc/")).exists()
 )
 # Folders whose tests take longest.
 LONGEST = ("sweeps", "docs")
@@ -61,6 +79,28 @@ def word_needed(source: str) -> str:
     return found[0] if found is not None else ""
 
 
+def sources(function: Any) -> Iterator[str]:
+    """The text of a test, and of the functions of tests that it uses, fixtures included."""
+    waiting, seen = [function], set[int]()
+    while waiting:
+        function = inspect.unwrap(waiting.pop())
+        module = getattr(function, "__module__", None) or ""
+        if id(function) in seen or not inspect.isfunction(function) or module[:6] != "tests.":
+            continue
+        seen.add(id(function))
+        source = inspect.getsource(function)
+        yield source
+        names = set(re.findall(r"\w+", source)) & function.__globals__.keys()
+        waiting += [function.__globals__[name] for name in names]
+
+
+def device_needed(item: pytest.Function, missing: tuple[str, ...] = MISSING) -> str:
+    """A device that a test needs and the system lacks; empty where none."""
+    parameters = getattr(item, "callspec", None)
+    texts = [repr(parameters.params) if parameters else "", *sources(item.function)]
+    return next((name for name in missing if any(name in text for text in texts)), "")
+
+
 def left_out() -> dict[str, str]:
     """Files of tests that cannot be loaded without POSIX, with the module that they need."""
     found = {
@@ -73,6 +113,11 @@ def left_out() -> dict[str, str]:
 def pytest_configure(config: pytest.Config) -> None:
     # Files are handed out in the order below, not by the number of their tests.
     config.option.loadscopereorder = False
+    if not os.access(ROOT, os.W_OK):
+        from hypothesis import settings
+
+        settings.register_profile("read-only", database=None)
+        settings.load_profile("read-only")
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
@@ -92,13 +137,16 @@ def pytest_report_header() -> list[str]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     # The longest first, so that several processes end together.
     items.sort(key=lambda item: item.path.parent.name not in LONGEST)
-    if IS_POSIX:
-        return
     for item in items:
-        word = (
-            word_needed(inspect.getsource(item.function))
-            if isinstance(item, pytest.Function)
-            else ""
-        )
-        if word:
-            item.add_marker(pytest.mark.skip(reason=f"needs {word}, which only POSIX has"))
+        if isinstance(item, pytest.Function):
+            word = "" if IS_POSIX else word_needed(inspect.getsource(item.function))
+            if word := word or (device_needed(item) if MISSING else ""):
+                item.add_marker(pytest.mark.skip(reason=f"needs {word}, which is missing here"))
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    for report in terminalreporter.getreports("passed") + terminalreporter.getreports("failed"):
+        for name, text in report.user_properties:
+            if name == "report" and report.when == "call":
+                terminalreporter.section(report.nodeid)
+                terminalreporter.write_line(text)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
+import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import ballplate
@@ -82,12 +85,39 @@ def test_all_packages_are_listed() -> None:
     assert names == set(settings["packages"])
 
 
+def imported(folder: Path) -> set[str]:
+    """Distributions whose modules the files below a folder import."""
+    modules = set()
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                modules |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                modules.add(node.module.partition(".")[0])
+    modules -= {*sys.stdlib_module_names, "tests"}
+    distributions = packages_distributions()
+    names = {distributions.get(module, [module])[0] for module in modules}
+    return {re.sub("[-_.]+", "-", name).lower() for name in names}
+
+
+def test_what_is_imported_is_declared() -> None:
+    project = tomllib.loads((TOP / "pyproject.toml").read_text("utf-8"))["project"]
+    groups = [project["dependencies"], *project["optional-dependencies"].values()]
+    declared = {re.split(r"[^\w-]", entry)[0].lower() for group in groups for entry in group}
+    for folder in ("simulator", "analysis", "tests", "docs/_extensions"):
+        assert imported(TOP / folder) <= {*declared, "ballplate"}, folder
+
+
 @pytest.mark.slow
 def test_a_wheel_holds_one_package(tmp_path: Path) -> None:
     build = f"from setuptools.build_meta import build_wheel; print(build_wheel({str(tmp_path)!r}))"
     copied = tmp_path / "source"
     files = subprocess.run(
-        ["git", "ls-files"], cwd=TOP, capture_output=True, text=True, check=True
+        ["git", "-c", "safe.directory=*", "ls-files"],
+        cwd=TOP,
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     for name in files.splitlines():
         if (TOP / name).is_file():

@@ -86,7 +86,6 @@ def page(
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
     from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -100,7 +99,7 @@ def page(
     context: dict[str, Any] = {
         "title": in_one_line(results.title),
         "summary": _summary(results),
-        "style": Markup(style()),
+        "style": style(),
         "facts": _facts(results),
         "answer": answer(results),
         "comparison": comparison,

@@ -62,6 +62,7 @@ SWEEPS = ("sweep.yaml", "trials.yaml", "ranges.yaml", "subsets.yaml", "variants.
 READ = ("done", "earlier", "results", "designs", "folder", "nominal")
 BESIDE_STORES = ("-wal", "-shm", "-journal", ".lock")
 STATUSES = (0, 1, 2, 3)
+STATUS = "status"
 ERROR = re.compile(FORM)
 # Of processor time; some commands compute a design again and again.
 SECONDS, LONG = 10.0, 60.0
@@ -199,7 +200,10 @@ def warm_up(kit: Path, folder: Path) -> list[tuple[tuple[str, ...], str]]:
 
 
 def trial(request: tuple[tuple[str, ...], str]) -> str | None:
-    """What is wrong with what a command makes of its folder, None where nothing is."""
+    """What is wrong with what a command makes of its folder, None where nothing is.
+
+    Its status is left in the folder, for those who count.
+    """
     arguments, name = request
     folder = Path(name)
     inside = folder / "in"
@@ -216,6 +220,7 @@ def trial(request: tuple[tuple[str, ...], str]) -> str | None:
         ),
         *[f"made outside of its folder: {one}" for one in _names(folder) - beside],
     ]
+    (folder / STATUS).write_text(str(status))
     return "\n".join(faults) or None
 
 

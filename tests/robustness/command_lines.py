@@ -390,17 +390,20 @@ def changed_line(random: Random, line: Sequence[str]) -> tuple[str, list[str]]:
     return name, changed
 
 
+# Where one of these is among a command's options, it starts other processes with that one only, and
+# takes no number of them without.
+REPEATS = {"trials", "until"}
+
+
 def quick(line: Sequence[str]) -> list[str]:
-    """The same line, in one process where the command might start others and does not say how
+    """The same line, in one process where the command would start others and does not say how
     many.
     """
-    actions = {action.dest: action for action in grammar().get(line[0], ())} if line else {}
-    alone = (
-        []
-        if "workers" not in actions or any(one.startswith("--w") for one in line)
-        else ["--workers=1"]
-    )
-    return [*line[:1], *alone, *line[1:]]
+    options = vars(parsed(line) or argparse.Namespace(workers=1))
+    starts = REPEATS & options.keys()
+    if options.get("workers", 1) or starts and not any(options[name] for name in starts):
+        return list(line)
+    return [*line[:1], "--workers=1", *line[1:]]
 
 
 def parsed(line: Sequence[str]) -> argparse.Namespace | None:

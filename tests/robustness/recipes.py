@@ -23,7 +23,7 @@ RECIPES = (
         " --json"
     ),
     (
-        "plan pool.yaml --done planned-readings.csv --moved --readings 12 --workers 1 --sheet"
+        "plan pool.yaml --done planned-readings.csv --from planned.yaml --moved --readings 12 --workers 1 --sheet"
         " sheet.md -o out.yaml"
     ),
     "next small.yaml small-readings.csv",
@@ -110,7 +110,7 @@ RECIPES = (
     "report trials.sqlite --format latex",
     "report trials.sqlite --format text",
     "sheet small.yaml",
-    "sheet small.yaml -o sheet.html --readings template.csv --points points.csv",
+    "sheet small.yaml -o sheet.html --readings template.csv --points out.csv",
     "import z-low.dmo --for quickstart.yaml -o out.csv",
     "import z-low.dmo --from dmis --unit mm -o out.csv",
     "map machine.yaml --grid 3,3,2",

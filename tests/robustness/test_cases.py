@@ -7,10 +7,12 @@ bounded memory.
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
@@ -18,15 +20,15 @@ from random import Random
 import pytest
 
 from tests.robustness import cases
-from tests.robustness.cases import Case, case, lay_out, trial, warm_up
-from tests.robustness.command_lines import drawn, grammar
+from tests.robustness.cases import STATUS, STATUSES, Case, case, lay_out, trial, warm_up
+from tests.robustness.command_lines import drawn, grammar, quick
 from tests.robustness.kit import make_kit
 from tests.robustness.recipes import RECIPES
 from tests.robustness.worker import Worker
 
 # Where a test ends, as the next may fail for the same reason.
 ENOUGH = 10
-FEW, MANY = range(300), range(20_000)
+FEW, MANY = range(200), range(20_000)
 
 
 @pytest.fixture(scope="module")
@@ -36,24 +38,49 @@ def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def faults(kit: Path, folder: Path, numbers: Iterable[int]) -> list[str]:
-    """What goes wrong with cases; the folder of each of these is kept."""
+Outcomes = Counter[tuple[str, str]]
+"""How many cases of a command ended with a status, by both."""
+
+
+def faults(kit: Path, folder: Path, tried: Iterable[Case], outcomes: Outcomes) -> list[str]:
+    """What goes wrong with cases; the folder of each of these is kept, and outcomes are counted."""
     folder.mkdir()
     found = []
     with Worker(trial, warm_up(kit, folder)) as worker:
-        for number in numbers:
-            one = case(kit, number)
-            place = folder / f"case-{number}"
+        for one in tried:
+            place = folder / f"case-{one.number}"
             lay_out(kit, one, place)
             fault = worker((one.arguments, str(place)), one.seconds)
+            status = "" if fault else (place / STATUS).read_text()
+            if not one.changes and status not in ("0", "1"):
+                fault = fault or f"status {status} of a line that is right"
             if fault is None:
+                command = next((word for word in one.arguments if word in grammar()), "none")
+                outcomes[command, status] += 1
                 shutil.rmtree(place)
                 continue
-            alone = f"{sys.executable} -m tests.robustness {number}"
+            alone = f"{sys.executable} -m tests.robustness {one.number}"
             found.append(f"{one}\nkept in {place}; alone: {alone}\n{fault}")
             if len(found) == ENOUGH:
                 break
     return found
+
+
+def idle(outcomes: Outcomes) -> list[str]:
+    """Commands most of whose cases end as wrong usage, or none of whose cases gives a result."""
+    return [
+        name
+        for name in grammar()
+        if 2 * outcomes[name, "2"] > sum(outcomes[name, str(status)] for status in STATUSES)
+        or not outcomes[name, "0"] + outcomes[name, "1"]
+    ]
+
+
+def table(outcomes: Outcomes) -> Iterator[str]:
+    yield f"{'cases by status':<16}" + "".join(f"{status:>7}" for status in STATUSES)
+    for name in sorted({name for name, _ in outcomes}):
+        counts = (outcomes[name, str(status)] for status in STATUSES)
+        yield f"{name:<16}" + "".join(f"{count:>7}" for count in counts)
 
 
 def test_every_command_and_option_comes_up(kit: Path) -> None:
@@ -171,21 +198,53 @@ def test_bounds_of_time_and_memory_hold(act: Callable[..., None], value: float, 
         assert told in (worker(value) or "")
 
 
-def test_some_cases(kit: Path, tmp_path: Path) -> None:
-    found = faults(kit, tmp_path / "cases", FEW)
+def test_commands_whose_cases_test_nothing_are_noticed() -> None:
+    outcomes = Outcomes({(name, "0"): 3 for name in grammar()})
+    assert idle(outcomes) == []
+    outcomes.update({("fit", "2"): 4, ("run", "2"): 3, ("plan", "0"): -3, ("plan", "3"): 3})
+    assert idle(outcomes) == [name for name in grammar() if name in ("fit", "plan")]
+    assert "fit                   3      0      4      0" in table(outcomes)
+
+
+def test_only_lines_that_start_processes_say_how_many() -> None:
+    for line in (["fit", "a.yaml", "b.csv"], ["run", "a.yaml"], ["check", "a.yaml"], ["no"], []):
+        assert quick(line) == line
+    for line in (["run", "a.yaml", "--trials", "3"], ["run", "a.yaml", "--unt=9%"], ["sweep", "a"]):
+        assert quick(line) == [line[0], "--workers=1", *line[1:]]
+    assert quick(["sweep", "a.yaml", "--w", "2"]) == ["sweep", "a.yaml", "--w", "2"]
+
+
+def test_some_cases(kit: Path, tmp_path: Path, record_property: Callable[..., None]) -> None:
+    """Each recipe without a change, and cases."""
+    outcomes = Outcomes()
+    tried = [Case(-k, tuple(quick(shlex.split(line))), ()) for k, line in enumerate(RECIPES, 1)]
+    tried += [case(kit, number) for number in FEW]
+    found = faults(kit, tmp_path / "cases", tried, outcomes)
     assert not found, "\n\n".join(found)
+    lines = "\n".join(table(outcomes))
+    record_property("report", lines)
+    assert not idle(outcomes), lines
 
 
 def test_cases_that_once_failed(kit: Path, tmp_path: Path) -> None:
     """A true machine too wild to be read by compare, and a picture whose name is its ending."""
-    found = faults(kit, tmp_path / "cases", (3280, 6956))
+    tried = [case(kit, number) for number in (3280, 6956)]
+    found = faults(kit, tmp_path / "cases", tried, Outcomes())
     assert not found, "\n\n".join(found)
 
 
 @pytest.mark.slow
 @pytest.mark.long
-def test_many_cases(kit: Path, tmp_path: Path) -> None:
+def test_many_cases(kit: Path, tmp_path: Path, record_property: Callable[..., None]) -> None:
+    outcomes = [Outcomes(), Outcomes()]
+
+    def part(k: int) -> list[str]:
+        tried = (case(kit, number) for number in MANY[k::2])
+        return faults(kit, tmp_path / f"cases-{k}", tried, outcomes[k])
+
     with ThreadPoolExecutor(2) as pool:
-        parts = pool.map(lambda k: faults(kit, tmp_path / f"cases-{k}", MANY[k::2]), range(2))
-        found = [one for part in parts for one in part]
+        found = [one for half in pool.map(part, range(2)) for one in half]
+    lines = "\n".join(table(outcomes[0] + outcomes[1]))
+    record_property("report", lines)
     assert not found, "\n\n".join(found)
+    assert not idle(outcomes[0] + outcomes[1]), lines

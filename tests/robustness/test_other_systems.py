@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
 import pytest
@@ -127,7 +128,7 @@ def test_files_of_windows_say_the_same(tmp_path: Path, capsys: pytest.CaptureFix
         )
         == 0
     )
-    shutil.copy(ROOT / "designs/quickstart.yaml", tmp_path / "unix.yaml")
+    (tmp_path / "unix.yaml").write_text(QUICKSTART, encoding="utf-8", newline="\n")
     points = "".join(f"{10 * k},{k % 3}\n" for k in range(30))
     (tmp_path / "unix-errors.csv").write_text(
         f"# by hand\nposition_mm,error_um\n{points}", encoding="utf-8"
@@ -249,3 +250,93 @@ def test_tests_that_need_posix_are_known() -> None:
     assert conftest.word_needed("os.killpg(process.pid, signal.SIGINT)") == "killpg"
     assert conftest.word_needed('path = Path("/dev/full")') == "/dev/"
     assert conftest.word_needed("assert shell_length == 3") == ""
+
+
+@pytest.mark.parametrize("name", [*conftest.DEVICES, "/dev/null"])
+def test_tests_that_need_a_missing_device_are_known(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    needed = conftest.device_needed(request.node, conftest.DEVICES)
+    assert needed == (name if name in conftest.DEVICES else "")
+    assert conftest.device_needed(request.node, ()) == ""
+
+
+def tried_by_another(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The tests of a folder, run by somebody who may not write there."""
+    for path in (folder / "tests", folder):
+        path.chmod(0o555)
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "--strict-config"],
+        cwd=folder,
+        env={
+            **{name: value for name, value in os.environ.items() if name[:6] != "PYTEST"},
+            "TMPDIR": str(folder.parent / "room"),
+            **environment,
+        },
+        user=NOBODY if os.geteuid() == 0 else None,
+        capture_output=True,
+        text=True,
+    )
+
+
+# Any number that is not root's: root may write everywhere.
+NOBODY = 65534
+USUAL = """\
+from hypothesis import given, strategies
+
+@given(strategies.integers())
+def test_usual(number): assert number == number
+
+def used_by_the_next(): return open("/dev/full").name
+
+def test_failing(): assert not used_by_the_next()
+"""
+
+
+def test_a_checkout_that_takes_no_files_is_enough() -> None:
+    """Neither compiled modules nor what pytest and Hypothesis keep; a device is pretended away."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "blank é"
+        (folder / "tests").mkdir(parents=True)
+        (folder.parent / "room").mkdir()
+        for path, mode in ((folder.parent, 0o755), (folder.parent / "room", 0o777)):
+            path.chmod(mode)
+        for name in ("pyproject.toml", "tests/conftest.py"):
+            shutil.copyfile(ROOT / name, folder / name)
+        (folder / "tests/test_usual.py").write_text(USUAL)
+        try:
+            found = tried_by_another(folder, BALLPLATE_TESTS_WITHOUT=conftest.DEVICES[0])
+        except PermissionError:
+            pytest.skip("another user cannot run this Python")
+        assert "1 passed, 1 skipped" in found.stdout, found.stdout + found.stderr
+        assert f"needs {conftest.DEVICES[0]}, which is missing here" in found.stdout
+        folder.chmod(0o755)
+        assert sorted(path.name for path in folder.rglob("*")) == [
+            "conftest.py",
+            "pyproject.toml",
+            "test_usual.py",
+            "tests",
+        ]
+
+
+def test_git_gives_line_feeds_whatever_the_system() -> None:
+    listed = subprocess.run(
+        ["git", "-c", "safe.directory=*", "ls-files", "-z", "--eol"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+    )
+    if listed.returncode:
+        pytest.skip("no checkout of git")
+    files = [line.split("\t") for line in listed.stdout.split("\0") if line]
+    kinds = {name: facts.split("attr/")[1].strip() for facts, name in files}
+    changed = {name for name, kind in kinds.items() if kind not in ("text=auto eol=lf", "-text")}
+    assert not changed
+    # Bytes that other programs have written, line ends included.
+    left = {name for name, kind in kinds.items() if kind == "-text"}
+    assert left == {
+        name
+        for facts, name in files
+        if facts.startswith("i/-text") or name.startswith("tests/readings/samples/")
+    }

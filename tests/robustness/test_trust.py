@@ -109,7 +109,7 @@ READ: dict[str, dict[str, Any]] = {
     "a map as prior": {"priors": [{"kind": "map", "file": "map.yaml"}]},
     # Found where Python looks for modules.
     "an installed module": {"error_model": {"kind": "python", "object": "canary:build"}},
-    "the current folder": {"error_model": python("/proc/self/cwd")},
+    "/proc/self/cwd": {"error_model": python("/proc/self/cwd")},
 }
 # Keys with the word that name neither.
 OTHERS = {

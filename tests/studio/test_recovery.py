@@ -41,7 +41,8 @@ SETTINGS = "{kind: python, object: 'model:build'}"
 @pytest.fixture
 def design(tmp_path: Path) -> Path:
     path = tmp_path / "plate.yaml"
-    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    text = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
