@@ -277,6 +277,9 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
     balls = _balls(settings, layout, (*steps, "balls"), references) if layout is not None else ()
     if artefact is None or layout is None or len(references.problems.messages) > before:
         return None
+    if set(planes) - probes.keys():
+        # Whoever names no probes is told where these are missing.
+        return None
     is_list = isinstance(settings.quarter_turns, tuple)
     turns = (
         settings.quarter_turns

@@ -503,3 +503,14 @@ def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
     assert line.startswith(
         "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
     )
+
+
+def test_a_group_without_probes_is_told_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "pool.yaml"
+    text = GOOD.replace("probes: {down: [0 mm, 0 mm, -50 mm], right: [-50 mm, 0 mm, 0 mm]}\n", "")
+    text = text.replace("      probes: {z: [[down]], x: [right]}\n", "").replace(
+        ", probes: [down]", ""
+    )
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ExperimentError, match="probes: missing; add"):
+        load(path, planning=True)

@@ -397,6 +397,17 @@ def test_temperatures_of_readings_are_those_of_their_positions(
             },
             "nothing expands",
         ),
+        (
+            {"positions": {"z low": {"artefact": "21 degC", "scales": ["21 degC"] * 3}}},
+            "positions[z low].scales: has one temperature for each axis, and other positions one for",
+        ),
+        (
+            {
+                "scale_temperature": {"value": ["21 degC"] * 3},
+                "positions": {"z low": {"scales": "21 degC"}},
+            },
+            "has one temperature for all axes, and other positions one for each; state all in the",
+        ),
     ],
 )
 def test_what_is_wrong_is_told_at_its_place(

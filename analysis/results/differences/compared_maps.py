@@ -259,6 +259,8 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
     """
     at = fit.functions.at
     design, own = at.design, at.layout.model
+    # Such as those of maps that are prior knowledge.
+    doubts = () if fit.experiment is None else fit.experiment.doubts
     return ComparedMap(
         label or fit.label,
         fit.title,
@@ -275,7 +277,7 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
         fit,
         data=data_of(fit.observed, fit.experiment),
         lack_of_fit=fit.lack_of_fit,
-        cautions=(*fit.cautions, fit.complaint),
+        cautions=(*doubts, *fit.cautions, fit.complaint),
         sigma=fit.sigma,
     )
 

@@ -157,6 +157,33 @@ class TemperaturesSettings(InfluenceSettings):
         self._doubt(steps, references)
         for path, value in listed:
             references.has_axes(value, (*steps, *path))
+        self._check_forms(steps, positions, references)
+
+    def _check_forms(
+        self, steps: Steps, positions: Mapping[str, str], references: References
+    ) -> None:
+        """Report scales with one sensor in some positions and several in others."""
+        if self.scale_temperature is None:
+            return
+        stated = {name: place.scales for name, place in (self.positions or {}).items()}
+        by_axis = {
+            name: isinstance(
+                self.scale_temperature.value if stated.get(name) is None else stated[name], tuple
+            )
+            for name in positions
+        }
+        if len(set(by_axis.values())) > 1:
+            usual = isinstance(self.scale_temperature.value, tuple)
+            name = next(name for name, one in by_axis.items() if one != usual)
+            text = (
+                "has one temperature for each axis, and other positions one for all"
+                if by_axis[name]
+                else "has one temperature for all axes, and other positions one for each"
+            )
+            references.problems.add(
+                (*steps, "positions", name, "scales"),
+                f"{text}; state all in the same form, which says how many sensors there are",
+            )
 
     def _doubt(self, steps: Steps, references: References) -> None:
         """Doubt temperatures, expansions and uncertainties that no laboratory has."""
