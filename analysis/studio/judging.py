@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -92,7 +93,7 @@ class Judge:
         if isinstance(found, ExperimentError):
             raise found
         if isinstance(found, str):
-            raise refused(self._document.path, found)
+            raise refused(self._document.path, f"no figures: {found}")
         return found[0]
 
     def stop(self) -> None:
@@ -109,7 +110,7 @@ class Judge:
         can_fork = "forkserver" in multiprocessing.get_all_start_methods()
         context = multiprocessing.get_context("forkserver" if can_fork else "spawn")
         if can_fork:
-            context.set_forkserver_preload(["__main__", __name__])
+            context.set_forkserver_preload(["__main__", f"{__package__}.prepared"])
         self._connection, other = context.Pipe()
         self._process = context.Process(target=_serve, args=(other,), daemon=True)
         with interruptions_blocked():
@@ -119,17 +120,16 @@ class Judge:
 
 def _serve(connection: Connection) -> None:
     begin_worker(os.getppid())
-    while True:
-        try:
+    # The studio may end at any moment.
+    with suppress(EOFError, OSError):
+        while True:
             work, document = connection.recv()
-        except EOFError:
-            return
-        found: Any
-        try:
-            found = (work(document),)
-        except ExperimentError as error:
-            found = error
-        except Exception as error:
-            # Whatever it is, a person who waits is told of it.
-            found = f"{type(error).__name__}: {error}"
-        connection.send(found)
+            found: Any
+            try:
+                found = (work(document),)
+            except ExperimentError as error:
+                found = error
+            except Exception as error:
+                # Whatever it is, a person who waits is told of it.
+                found = f"{type(error).__name__}: {error}"
+            connection.send(found)
