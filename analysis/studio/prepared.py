@@ -1,5 +1,5 @@
-"""A design that is judged when this is imported: so a process has loaded all that judging loads, and
-copies of it begin at once.
+"""A design that is judged when this is imported, so that copies of a process that has imported it
+have loaded all that judging needs.
 """
 
 from __future__ import annotations
