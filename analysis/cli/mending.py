@@ -103,8 +103,9 @@ def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> in
         changed = "the file has changed meanwhile; nothing was written, start again"
         raise refused(path, changed)
     content = (mark + new).encode()
-    writers = {path: lambda place: place.write_bytes(content)}
-    is_written = write_outputs(writers, True, options.interruption.held)
+    is_written = write_outputs(
+        {path: lambda place: place.write_bytes(content)}, True, options.interruption.held
+    )
     return 0 if is_written else BAD_FILE
 
 

@@ -75,7 +75,9 @@ class Judge:
             self._start()
         assert self._connection is not None
         self._document, self.is_busy = document, True
-        self._connection.send((work, replace(document, back=(), forward=())))
+        # That a process has ended is found when its result is looked for.
+        with suppress(OSError):
+            self._connection.send((work, replace(document, back=(), forward=())))
 
     def look(self) -> Any:
         """What came of the work, None as long as it is under way, and if there is none.
@@ -108,7 +110,7 @@ class Judge:
         # Not a copy of this process, which would have its threads' locks without the threads, but
         # where the system can, of one that has nothing but the modules.
         can_fork = "forkserver" in multiprocessing.get_all_start_methods()
-        context = multiprocessing.get_context("forkserver" if can_fork else "spawn")
+        context: Any = multiprocessing.get_context("forkserver" if can_fork else "spawn")
         if can_fork:
             context.set_forkserver_preload(["__main__", f"{__package__}.prepared"])
         self._connection, other = context.Pipe()

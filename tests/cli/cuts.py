@@ -70,14 +70,15 @@ def run(line: list[str], folder: Path, cut: int, number: int, is_slow: bool) -> 
 def main() -> None:
     task = json.load(sys.stdin)
     folder = Path(task["folder"])
-    search, found = campaign.campaign, []
+    search = campaign.campaign
+    found: list[Any] = []
 
     def once(*arguments: Any) -> Any:
         found[:] = found or [search(*arguments)]
         return found[0]
 
     # What is tested comes after the search.
-    campaign.campaign = once
+    vars(campaign)["campaign"] = once
     for name, line in task["lines"].items():
 
         def prepare(name: str = name) -> None:
