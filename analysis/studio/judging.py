@@ -20,7 +20,7 @@ from .document import DesignDocument, data_of, experiment_of, variants_of
 
 
 @dataclass(frozen=True)
-class Judgement:
+class DesignJudgement:
     """What a page shows of a document's text; without an `answer` where the text is wrong."""
 
     answer: dict[str, Any] | None
@@ -29,15 +29,15 @@ class Judgement:
     variants: tuple[str, ...]
 
 
-def judgement(document: DesignDocument) -> Judgement:
+def judgement(document: DesignDocument) -> DesignJudgement:
     """What a page shows of a document, or what is wrong with its text."""
     variants = variants_of(document) if document.variant else ()
     try:
         experiment = experiment_of(document)
         found = answer(experiment)
     except ExperimentError as error:
-        return Judgement(None, error.messages, data_of(document), variants)
-    return Judgement(found, (), to_python(experiment.tree), variants)
+        return DesignJudgement(None, error.messages, data_of(document), variants)
+    return DesignJudgement(found, (), to_python(experiment.tree), variants)
 
 
 def figures(document: DesignDocument) -> dict[str, Any]:

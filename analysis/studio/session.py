@@ -26,7 +26,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import Judge, Judgement, figures, judgement, scale
+from .judging import Judge, DesignJudgement, figures, judgement, scale
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -76,7 +76,7 @@ class Session:
         self.revision = 0
         self._judge, self._aside, self._asked = Judge(), Judge(), 0
         self._answer: dict[str, Any] | None = None
-        self._judgement = Judgement(None, (), None, ())
+        self._judgement = DesignJudgement(None, (), None, ())
         self._document = document
         self._begin()
 
