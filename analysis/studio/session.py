@@ -26,7 +26,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import Judge, DesignJudgement, figures, judgement, scale
+from .judging import DesignJudgement, Judge, figures, judgement, scale
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
