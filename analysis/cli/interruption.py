@@ -83,6 +83,7 @@ class Interruption:
     kept: Callable[[], str] = partial(written, {})
     is_raising: bool = False
     told: threading.Lock = field(default_factory=threading.Lock)
+    placing: threading.Lock = field(default_factory=threading.Lock)
 
     @contextmanager
     def raising(self) -> Iterator[None]:
@@ -95,6 +96,19 @@ class Interruption:
             yield
         finally:
             self.is_raising = False
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let no signal end the process until the end, and answer those that have come then."""
+        is_raising, self.is_raising = self.is_raising, False
+        try:
+            # The thread that ends the process waits for it.
+            with self.placing:
+                yield
+        finally:
+            self.is_raising = is_raising
+        if is_raising:
+            self.answer()
 
     def answer(self) -> None:
         """Raise KeyboardInterrupt if there was a signal.
@@ -186,6 +200,8 @@ def _watch(interruption: Interruption, numbers: frozenset[int]) -> None:
                     _wait(reader, numbers)
                     if time.monotonic() - first > SAME_SIGNAL_LIMIT:
                         break
+            # Files of which some are in their places are not left so.
+            interruption.placing.acquire()
             # Not earlier, since the exception is raised at what is told as the first signal.
             interruption.came = number if interruption.came is None else interruption.came
             words = threading.Thread(target=tell, args=(interruption,), daemon=True)

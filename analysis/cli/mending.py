@@ -56,7 +56,7 @@ def with_repairs(
             print("".join(difference(mark + text, mark + new, str(path))), end="", flush=True)
             status, repaired = int(bool(repaired)), set()
         elif repaired:
-            status = _write(path, mark, text, new)
+            status = _write(path, mark, text, new, options)
     except ExperimentError as error:
         status = BAD_FILE
         messages += error.messages
@@ -92,17 +92,20 @@ def _text(path: Path) -> tuple[str, str]:
     return MARK if path.read_bytes().startswith(MARK.encode()) else "", text
 
 
-def _write(path: Path, mark: str, text: str, new: str) -> int:
+def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> int:
     """Put a new text in the place of a file that has still the old one; the exit status.
 
     :raises ExperimentError: it has not, or cannot be written.
     """
-    check_overwritten(path)
+    with options.interruption.held():
+        check_overwritten(path)
     if _text(path) != (mark, text):
         changed = "the file has changed meanwhile; nothing was written, start again"
         raise refused(path, changed)
     content = (mark + new).encode()
-    is_written = write_outputs({path: lambda place: place.write_bytes(content)}, force=True)
+    is_written = write_outputs(
+        {path: lambda place: place.write_bytes(content)}, True, options.interruption.held
+    )
     return 0 if is_written else BAD_FILE
 
 

@@ -17,8 +17,8 @@ import stat
 import sys
 import tempfile
 from argparse import Action, ArgumentParser, Namespace
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
@@ -167,11 +167,15 @@ def check_outputs(options: Namespace) -> None:
         raise UsageError(f"{' and '.join(screens)} both go to the screen; name a file for one")
     outputs = [one for one in given if not one.is_screen]
     _refuse_screen(outputs)
-    _refuse_same(outputs)
+    # What is tried is taken away.
+    held = options.interruption.held
+    with held():
+        _refuse_same(outputs)
     _refuse_inputs(outputs, options)
     messages = []
     for one in outputs:
-        messages += _reasons_against(one, options.force)
+        with held():
+            messages += _reasons_against(one, options.force)
     if messages:
         raise ExperimentError(messages)
 
@@ -271,19 +275,23 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
     return [Message(str(path), 0, 0, "", reason) for reason in reasons]
 
 
-def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
+def write_outputs(
+    writers: Mapping[Path, Writer],
+    force: bool,
+    held: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> bool:
     """Let each writer write its file, all of them or, as far as the system allows, none; False
     after saying why not.
 
     Each is written beside its place under another name and put there only when all have been
     written to the disk, with the permissions of the file that was there before. A link stays one:
     what it leads to is replaced. Devices and pipes are written as they are. Without `force` no file
-    is put in the place of another that has come meanwhile.
+    is put in the place of another that has come meanwhile. `held` keeps signals back while files
+    are put into their places or taken away.
     """
     from ballplate.simulator.inputs.messages import Message
 
     temporaries: dict[Path, Path] = {}
-    placed: list[Path] = []
     path = Path()
     try:
         for path, writer in writers.items():
@@ -295,23 +303,18 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
         for path, writer in writers.items():
             if _is_in_place(path):
                 _write_in_place(path, writer)
-        for path, temporary in temporaries.items():
-            target = _target(path)
-            is_new = _status(target) is None
-            _put(temporary, target, force)
-            placed += [target] if is_new else []
+        with held(), _exchange(force) as put:
+            for path, temporary in temporaries.items():
+                put(temporary, _target(path))
     except (OSError, UnicodeEncodeError, ImportError) as error:
-        for one in placed:
-            one.unlink(missing_ok=True)
         kept = (
             "" if _status(path) is None or _is_in_place(path) else "; the file there is as it was"
         )
         print(Message(str(path), 0, 0, "", _cannot(error) + kept), file=sys.stderr)
         return False
     finally:
-        for temporary in temporaries.values():
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
+        with held():
+            _remove(temporaries.values())
     return True
 
 
@@ -326,7 +329,8 @@ def write(options: Namespace, contents: Contents) -> bool:
         for path, content in contents.items()
         if path is not None
     }
-    options.is_written = write_outputs(writers, options.force) and options.is_written
+    is_written = write_outputs(writers, options.force, options.interruption.held)
+    options.is_written = is_written and options.is_written
     return bool(options.is_written)
 
 
@@ -465,6 +469,35 @@ def _settle(temporary: Path, target: Path) -> None:
         with suppress(OSError):
             os.chown(temporary, before.st_uid, before.st_gid)
     temporary.chmod(stat.S_IMODE(before.st_mode))
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _exchange(force: bool) -> Iterator[Callable[[Path, Path], None]]:
+    """Put files in the places of others; if one cannot be put, those before it go back."""
+    with ExitStack() as names, ExitStack() as back:
+
+        def put(temporary: Path, target: Path) -> None:
+            undo: Callable[[], object] = partial(target.unlink, missing_ok=True)
+            if force and _status(target) is not None:
+                kept = _beside(target)
+                undo = partial(os.replace, kept, target)
+                try:
+                    os.link(target, kept)
+                    names.callback(_remove, [kept])
+                except (OSError, NotImplementedError):
+                    # On disks without hard links the file that was there cannot come back.
+                    undo = nullcontext
+            _put(temporary, target, force)
+            back.callback(undo)
+
+        yield put
+        back.pop_all()
 
 
 def _put(temporary: Path, target: Path, force: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import multiprocessing
+import os
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.processes import begin_worker, interruptions_blocked
 from ballplate.simulator.computing.steps import ProgressStep, Report
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -184,7 +186,8 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) ->
     folder = tempfile.mkdtemp(prefix="ballplate-studio-")
     arguments = (folder, sender, name, document, dict(settings))
     process = context.Process(target=_work_in, args=arguments, daemon=True)
-    process.start()
+    with interruptions_blocked():
+        process.start()
     sender.close()
     return Job(name, document.fingerprint, process, receiver, folder)
 
@@ -197,6 +200,7 @@ def _work_in(
     settings: Mapping[str, Any],
 ) -> None:
     """Work in a process of its own, with its temporary files in a folder."""
+    begin_worker(os.getppid())
     tempfile.tempdir = folder
     _work(connection, name, document, settings)
 

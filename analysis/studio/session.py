@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import secrets
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
 from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.trust import OPENED, UNKNOWN
-from ballplate.simulator.inputs.yamltree import to_python
 
 from .actions import ActionError, done, settings_of
-from .answers import answer, scale_answer
 from .document import (
     ChangedOnDiskError,
     DesignDocument,
     data_of,
-    experiment_of,
     opened,
     redone,
     reopened,
@@ -28,30 +26,23 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
+from .judging import DesignJudgement, Judge, figures, judgement, scale
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
+
+# Seconds that a page waits for figures before it is answered without them, and between looks.
+PATIENCE, INTERVAL = 2.0, 0.005
 
 
 class RefusedError(Exception):
     """What was asked for is not allowed, or not possible now; the text says why."""
 
 
-@dataclass(frozen=True)
-class _Judged:
-    """A document with the answer to it; where its text is wrong, the answer before and what is
-    wrong.
-    """
-
-    document: DesignDocument
-    answer: dict[str, Any] | None
-    messages: tuple[Message, ...]
-    data: Any
-    variants: tuple[str, ...]
-
-
 class Session:
     """What one person does in the studio; every method may be called from any thread.
+
+    A change is kept before it is judged, in a process of its own, and a further change stops that.
 
     `revision` counts the changes, so that a page which shows an earlier state changes nothing, and
     `name` tells the session from one that was here before.
@@ -83,13 +74,21 @@ class Session:
         self._off: dict[str, dict[str, Any]] = {}
         self._jobs: dict[int, Job] = {}
         self.revision = 0
-        self._now = self._judged(document, None)
+        self._judge, self._aside, self._asked = Judge(), Judge(), 0
+        self._answer: dict[str, Any] | None = None
+        self._judgement = DesignJudgement(None, (), None, ())
+        self._document = document
+        self._begin()
 
     def state(self) -> dict[str, Any]:
-        """Everything that the page shows, as plain data."""
+        """Everything that the page shows, as plain data.
+
+        While figures are `pending`, those of the `design` are of an earlier text of the file.
+        """
+        self._await()
         with self._lock:
-            now = self._now
-            document, answer = now.document, now.answer
+            document, answer, judged = self._document, self._answer, self._judgement
+            pending = self._judge.is_busy
             there = {one["name"] for one in answer["scene"]["positions"]} if answer else set()
             return {
                 "session": self.name,
@@ -97,13 +96,14 @@ class Session:
                 "fingerprint": document.fingerprint,
                 "file": document.path.name,
                 "variant": document.variant,
-                "variants": list(now.variants),
+                "variants": list(judged.variants),
                 "text": document.text,
-                "data": now.data,
+                "data": data_of(document) if pending else judged.data,
                 "saved": document.is_saved,
                 "back": len(document.back),
                 "forward": len(document.forward),
-                "messages": [_message_data(one) for one in now.messages],
+                "messages": [] if pending else [_message_data(one) for one in judged.messages],
+                "pending": pending,
                 "design": answer,
                 "off": [name for name in self._off if name not in there],
                 "kept": self._kept,
@@ -117,12 +117,12 @@ class Session:
     def path(self) -> Path:
         """The file of the design."""
         with self._lock:
-            return self._now.document.path
+            return self._document.path
 
     @property
     def is_saved(self) -> bool:
         with self._lock:
-            return not self._now.document.has_changes
+            return not self._document.has_changes
 
     @property
     def is_recoverable(self) -> bool:
@@ -133,7 +133,7 @@ class Session:
     def kept(self) -> Path | None:
         """Where what is not saved is kept; None where nothing is, or nothing can be."""
         with self._lock:
-            return keep(self._now.document, self.name)
+            return keep(self._document, self.name)
 
     def act(self, action: Mapping[str, Any]) -> None:
         """Do something with the design; where it fails in any way all is as before.
@@ -146,7 +146,7 @@ class Session:
             self._ensure_seen(action)
             control = self._controls().get(str(action.get("do")))
             if control is None:
-                self._become(done(self._now.document, action))
+                self._become(done(self._document, action))
             else:
                 control(action)
 
@@ -157,20 +157,19 @@ class Session:
         """
         with self._lock:
             self._ensure_seen(action)
-            document = self._now.document
-        return answer(experiment_of(done(document, action)))
+            document = self._document
+        found: dict[str, Any] = self._computed(figures, done(document, action))
+        return found
 
     def scale(self) -> dict[str, Any]:
         """What carries the scale of the design, in words, and which design that is.
 
         :raises ExperimentError: the text is wrong.
+        :raises RefusedError: something else was asked for meanwhile.
         """
         with self._lock:
-            document = self._now.document
-        return {
-            "fingerprint": document.fingerprint,
-            "lines": scale_answer(experiment_of(document)),
-        }
+            document = self._document
+        return {"fingerprint": document.fingerprint, "lines": self._computed(scale, document)}
 
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
@@ -186,7 +185,7 @@ class Session:
             if sum(job.state == "running" for job in self._jobs.values()) >= MOST_RUNNING:
                 raise RefusedError(f"{MOST_RUNNING} computations are running; stop one of them")
             number = max(self._jobs, default=0) + 1
-            self._jobs[number] = started(name, self._now.document, settings)
+            self._jobs[number] = started(name, self._document, settings)
             return number
 
     def jobs(self) -> list[dict[str, Any]]:
@@ -220,19 +219,22 @@ class Session:
     def close(self) -> None:
         """Stop all computations."""
         with self._lock:
+            self._asked += 1
+            self._judge.stop()
+            self._aside.stop()
             for number in list(self._jobs):
                 self.stop(number)
 
     def _controls(self) -> dict[str, Callable[[Mapping[str, Any]], None]]:
         """What is done with the file rather than with the design in it."""
         return {
-            "undo": lambda action: self._become(undone(self._now.document)),
-            "redo": lambda action: self._become(redone(self._now.document)),
+            "undo": lambda action: self._become(undone(self._document)),
+            "redo": lambda action: self._become(redone(self._document)),
             "variant": self._choose,
             "keep": self._keep,
             "save": self._save,
             "open": self._open,
-            "reopen": lambda action: self._become(reopened(self._now.document)),
+            "reopen": lambda action: self._become(reopened(self._document)),
             "off": self._switch_off,
             "on": self._switch_on,
         }
@@ -248,41 +250,80 @@ class Session:
             raise RefusedError("the design has changed in another window; look again")
 
     def _become(self, document: DesignDocument) -> None:
-        """Go on with another document; where its text is wrong, the answer until now is shown if it
-        is of the same design.
+        """Go on with another document, which is kept at once, and begin to judge it; until that is
+        done, and where its text is wrong, the answer until now is shown if it is of the same
+        design.
         """
-        last = self._now.document
-        is_same = (document.path, document.variant) == (last.path, last.variant)
-        before = self._now.answer if is_same else None
-        self._now = self._judged(document, before)
+        last, self._document = self._document, document
+        if (document.path, document.variant) != (last.path, last.variant):
+            self._answer = None
         self.revision += 1
         self.note = ""
         keep(document, self.name)
+        self._begin()
 
-    def _judged(self, document: DesignDocument, before: dict[str, Any] | None) -> _Judged:
-        variants = variants_of(document) if document.variant else ()
+    def _begin(self) -> None:
+        self._begun = time.monotonic()
+        self._judge.begin(judgement, self._document)
+
+    def _await(self) -> None:
+        """Wait for the judgement of the present document, as long as a page waits."""
+        while True:
+            with self._lock:
+                self._look()
+                if not self._judge.is_busy or time.monotonic() > self._begun + PATIENCE:
+                    return
+            time.sleep(INTERVAL)
+
+    def _look(self) -> None:
+        """Take the judgement if there is one now."""
         try:
-            experiment = experiment_of(document)
-            found = answer(experiment)
+            found = self._judge.look()
         except ExperimentError as error:
-            return _Judged(document, before, error.messages, data_of(document), variants)
-        return _Judged(document, found, (), to_python(experiment.tree), variants)
+            self._judgement = replace(
+                self._judgement, messages=error.messages, data=data_of(self._document)
+            )
+            return
+        if found is not None:
+            self._judgement = found
+            self._answer = found.answer or self._answer
+
+    def _computed(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> Any:
+        """What comes of work on a document that is not judged; further such work stops it.
+
+        :raises RefusedError: it was stopped.
+        """
+        with self._lock:
+            self._asked += 1
+            number = self._asked
+            self._aside.begin(work, document)
+        while True:
+            with self._lock:
+                if self._asked != number:
+                    raise RefusedError("something else was asked for meanwhile")
+                found = self._aside.look()
+                if found is not None:
+                    return found
+            time.sleep(INTERVAL)
 
     def _choose(self, action: Mapping[str, Any]) -> None:
-        names = variants_of(self._now.document)
+        names = variants_of(self._document)
         if action.get("name") not in names:
             raise RefusedError(f"no variant {action.get('name')!r}; there are {', '.join(names)}")
-        self._become(replace(self._now.document, variant=action["name"]))
+        self._become(replace(self._document, variant=action["name"]))
 
     def _keep(self, action: Mapping[str, Any]) -> None:
-        if self._now.messages:
+        self._await()
+        if self._judge.is_busy:
+            raise RefusedError("the figures are being computed; wait for them")
+        if self._judgement.messages:
             raise RefusedError("the text is wrong; mend it before the design is kept")
-        self._kept = None if action.get("off") else self._now.answer
+        self._kept = None if action.get("off") else self._answer
         self.revision += 1
 
     def _switch_off(self, action: Mapping[str, Any]) -> None:
         """Take a position out, and remember what the file said of it."""
-        name, document = str(action.get("position")), self._now.document
+        name, document = str(action.get("position")), self._document
         settings = settings_of(document, name)
         self._become(done(document, {"do": "remove", "position": name}))
         self._off[name] = settings
@@ -291,13 +332,13 @@ class Session:
         name = str(action.get("position"))
         if name not in self._off:
             raise RefusedError(f'no position "{name}" was switched off')
-        self._become(done(self._now.document, {"do": "add", "settings": self._off[name]}))
+        self._become(done(self._document, {"do": "add", "settings": self._off[name]}))
         del self._off[name]
 
     def _save(self, action: Mapping[str, Any]) -> None:
         name = action.get("name")
         path = None if name is None else self._inside(str(name))
-        before = self._now.document
+        before = self._document
         try:
             document = saved(before, path)
         except ChangedOnDiskError as error:
@@ -307,12 +348,12 @@ class Session:
             raise RefusedError(
                 f"{(path or before.path).name} cannot be written: {reason}"
             ) from None
-        self._now = replace(self._now, document=document)
+        self._document = document
         self.revision += 1
         give_up(before, self.name)
 
     def _open(self, action: Mapping[str, Any]) -> None:
-        path, before = self._inside(str(action.get("name", ""))), self._now.document
+        path, before = self._inside(str(action.get("name", ""))), self._document
         if not before.is_saved and not action.get("discard"):
             raise RefusedError(f"{before.path.name} has changes that are not saved")
         document = opened(path, None, OPENED if path.resolve() == self._first else UNKNOWN)

@@ -135,7 +135,7 @@ def _signals_held() -> Iterator[None]:
             signal.signal(number, lambda *arrived: held.append(arrived))
     try:
         _start_trackers()
-        with _interruptions_blocked():
+        with interruptions_blocked():
             yield
     finally:
         for number, handler in before.items():
@@ -165,7 +165,7 @@ def _start_trackers() -> None:
 
 
 @contextmanager
-def _interruptions_blocked() -> Iterator[None]:
+def interruptions_blocked() -> Iterator[None]:
     """Let processes inherit that interruptions are blocked, until they have loaded what ignores
     them.
     """

@@ -296,13 +296,19 @@ def _check_unchanged(
         )
         problems.add(("checksum",), text)
         return
-    stated = np.array(settings.check)
     found = corner_corrections(model, values, volume)
-    if stated.size == 0:
+    if not settings.check:
         return
-    if stated.shape != found.shape:
-        problems.add(("check",), f"has not {len(found)} points of {found.shape[1]} axes")
+    count, d = found.shape
+    if len(settings.check) != count:
+        text = f"has {len(settings.check)} points instead of {count}; write the map again"
+        problems.add(("check",), text)
+    for k, row in enumerate(settings.check):
+        if len(row) != d:
+            problems.add(("check", k), f"{len(row)} numbers instead of {d}; write the map again")
+    if problems.messages:
         return
+    stated = np.array(settings.check)
     apart = np.abs(stated - found) > SAME + SAME_PART * np.abs(found)
     if apart.any():
         worst = float(np.abs(stated - found).max())

@@ -10,14 +10,16 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
+import json
 import os
 import resource
 import shutil
+import signal
 import stat
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +30,7 @@ import pytest
 from ballplate.cli import main, outputs, parser
 from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
 
+from tests.cli.test_check_fix import SHIFTED as OPEN
 from tests.planning.small_pool import TEXT as POOL
 from tests.report.stores import axis, done, made_up
 
@@ -743,6 +746,133 @@ def test_what_was_there_is_whole_when_writing_fails(
     assert main(line(command, files, written, "--force")) in (0, 1)
     assert content(folder).keys() == before.keys()
     assert all(path.stat().st_size > 50 for path in written.values())
+
+
+def cuts(
+    commands: Sequence[str], files: Path, folder: Path, is_there: bool, **task: object
+) -> Iterator[tuple[dict[str, Any], dict[str, str], dict[str, str]]]:
+    """What each cut of these commands has left, what was there before, and what is there after a
+    run that nobody disturbs.
+    """
+    force = ("--force",) if is_there else ()
+    lines = {
+        command: line(
+            command,
+            files,
+            {option: folder / name for option, name in WALK[command].writes.items()},
+            *force,
+        )
+        for command in commands
+        if WALK[command].writes
+    }
+    before = {
+        command: dict.fromkeys(WALK[command].writes.values(), "old") if is_there else {}
+        for command in lines
+    }
+    if is_there and "check" in commands:
+        lines["check"] = ["check", "--fix", str(folder / "open.yaml")]
+        before["check"] = {"open.yaml": OPEN}
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.cli.cuts"],
+        input=json.dumps({"lines": lines, "folder": str(folder), "before": before, **task}),
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )
+    after: dict[str, dict[str, str]] = {}
+    for left in map(json.loads, done.stdout.splitlines()):
+        if left["cut"]:
+            yield left, before[left["name"]], after[left["name"]]
+        else:
+            after[left["name"]] = left["there"]
+            assert all(one != "old" for one in left["there"].values())
+    assert set(after) == set(lines)
+
+
+def state(there: str, before: str, after: str, name: str) -> str:
+    """Whether a file is the old one or the new one."""
+    # Other files hold the moment at which they were written.
+    is_new = there == after if name.endswith(".csv") else len(there) > 50
+    return "old" if there == before else "new" if is_new else "spoilt"
+
+
+def ensure_whole(left: dict[str, Any], before: dict[str, str], after: dict[str, str]) -> str:
+    """Make sure that a command ended by its signal and left all files old or all new; which."""
+    there = left["there"]
+    where = f"{left['name']}: signal {left['number']} at {left['event']} {left['cut']}"
+    assert left["status"] == 128 + left["number"], (where, left["status"])
+    if not before and not there:
+        return "old"
+    assert there.keys() == after.keys(), (where, sorted(there))
+    states = {state(there[one], before.get(one, ""), after[one], one) for one in after}
+    assert states in ({"old"}, {"new"}), (where, states)
+    return states.pop()
+
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_signal_leaves_files_old_or_new_together(
+    is_there: bool, files: Path, tmp_path: Path
+) -> None:
+    """At a sample of all openings, links, changes of names and removals."""
+    task = {"signals": SIGNALS, "every": 3, "slow": is_there}
+    states = [
+        ensure_whole(*one)
+        for one in cuts(("simulate", "sheet"), files, tmp_path / "written", is_there, **task)
+    ]
+    assert states.count("old") > 5 and states.count("new") > 5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("is_there", [True, False])
+@pytest.mark.parametrize("command", WALK)
+def test_a_signal_anywhere_leaves_files_old_or_new_together(
+    command: str, is_there: bool, files: Path, tmp_path: Path
+) -> None:
+    task = {"signals": SIGNALS, "every": 1, "slow": False}
+    found = list(cuts((command,), files, tmp_path / "written", is_there, **task))
+    states = [ensure_whole(*one) for one in found]
+    if found:
+        print(f"{command}: {len(found)} cuts, {states.count('new')} of them after the work")
+        assert {"old", "new"} == set(states)
+    else:
+        assert not WALK[command].writes
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", [name for name, walk in WALK.items() if len(walk.writes) > 1])
+def test_what_is_killed_leaves_whole_files_and_the_old_ones(
+    command: str, files: Path, tmp_path: Path
+) -> None:
+    """Of a mixed set the old files are there under names of their own."""
+    task = {"signals": [signal.SIGKILL], "every": 1, "slow": False}
+    mixed = 0
+    for left, before, after in cuts((command,), files, tmp_path / "written", True, **task):
+        there = left["there"]
+        states = [state(there[one], before[one], after[one], one) for one in after]
+        kept = [one for name, one in there.items() if name.startswith(".ballplate-")]
+        assert set(states) <= {"old", "new"} and left["status"] == -signal.SIGKILL
+        if len(set(states)) > 1:
+            mixed += 1
+            assert kept.count("old") >= states.count("new")
+    assert mixed
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_exchanged_files_come_back_when_one_cannot_be_exchanged(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [tmp_path / f"{k}.csv" for k in range(3)]
+    for path in paths[:2]:
+        path.write_text("old")
+    before = content(tmp_path)
+    denied = PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    monkeypatch.setattr(os, "replace", FaultyCall(os.replace, number, denied))
+    assert not write_outputs({path: written_text("new") for path in paths}, force=True)
+    assert content(tmp_path) == before
 
 
 @pytest.mark.usefixtures("planned_once")

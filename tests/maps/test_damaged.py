@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import ballplate as bp
 import numpy as np
 import pytest
+import yaml
 from ballplate.cli import main
 from ballplate.simulator.maps.fitted_map import FittedMap
 
@@ -189,6 +190,41 @@ def test_words_may_be_corrected(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "words.yaml").write_text("# a remark\n" + changed)
     found = bp.load_map(tmp_path / "words.yaml")
     assert (found.title, found.date) == ("my machine", "2026-11-21")
+
+
+def lists_of(node: object) -> Iterator[list[object]]:
+    """Every list in plain data, outer ones first."""
+    if isinstance(node, list):
+        yield node
+    for one in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+        yield from lists_of(one)
+
+
+def test_lists_of_other_lengths_are_refused_in_place(folder: Path, tmp_path: Path) -> None:
+    """Every list of a map without a checksum, an entry shorter or longer."""
+    text, path = without_checksum((folder / "map.yaml").read_text()), tmp_path / "edited.yaml"
+    count = len(list(lists_of(yaml.safe_load(text))))
+    told = []
+    for k in range(2 * count):
+        data = yaml.safe_load(text)
+        changed = list(lists_of(data))[k // 2]
+        if k % 2:
+            changed.append(changed[-1] if changed else 0.5)
+        elif changed:
+            changed.pop()
+        path.write_text(yaml.safe_dump(data))
+        try:
+            bp.load_map(path)
+        except bp.ExperimentError as error:
+            assert all(one.line for one in error.messages), error
+            told += [one.text for one in error.messages if one.path.startswith("check")]
+    d = len(yaml.safe_load(text)["check"][0])
+    points = len(yaml.safe_load(text)["check"])
+    assert set(told) == {
+        f"{words.format(number)} instead of {meant}; write the map again"
+        for words, meant in (("{} numbers", d), ("has {} points", points))
+        for number in (meant - 1, meant + 1)
+    }
 
 
 def same(one: FittedMap, other: FittedMap) -> bool:

@@ -99,6 +99,6 @@ def until(page, expression: str, seconds: float = 60.0) -> None:
 
 
 def settled(page, revision: int) -> dict:
-    """The state when the design has reached a revision."""
-    until(page, f"window.studio?.state()?.revision >= {revision}")
+    """The state when the design has reached a revision, with its figures."""
+    until(page, f"window.studio?.state()?.revision >= {revision} && !window.studio.state().pending")
     return page.evaluate("window.studio.state()")

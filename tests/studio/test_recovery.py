@@ -170,7 +170,7 @@ def test_a_file_that_cannot_be_opened_costs_nothing_of_what_is_not_saved(design,
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr("ballplate.studio.session.answer", fail)
+    monkeypatch.setattr("ballplate.studio.session.opened", fail)
     with pytest.raises(MemoryError):
         session.act({"do": "open", "name": "other.yaml", "discard": True})
     assert session.state()["text"] == text
@@ -255,7 +255,7 @@ def test_no_change_brings_a_model_in_python_into_a_file_that_was_not_named(desig
         for name in ("suggest", "next", "monte carlo", "plan", "sweep", "fit"):
             with pytest.raises(ExperimentError):
                 work = {"axes": [{"paths": ["title"], "values": ["x"]}], "name": "", "content": ""}
-                JOBS[name](session._now.document, work, lambda step: None)
+                JOBS[name](session._document, work, lambda step: None)
         for name in ("turn", "copy", "stand"):
             with pytest.raises(ExperimentError):
                 session.preview({"do": name, "position": "z low", "across": "x"})
@@ -274,7 +274,7 @@ def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design
             {"paths": ["error_model.object"], "values": ["'model:build'"]},
         ],
     ):
-        found = swept(session._now.document, axes, lambda step: None)
+        found = swept(session._document, axes, lambda step: None)
         assert all(cell["reason"] for cell in found["cells"])
         assert len(axes) > 1 or "is code in Python" in found["cells"][0]["reason"]
     assert not ran.exists()

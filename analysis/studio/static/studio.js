@@ -14,6 +14,7 @@ let polling = null;
 let running = []; // computations as they were when they were asked after last
 let typed = false; // the text beside the design has changes that are not applied
 let lost = null; // waits for a studio that does not answer
+let watching = null; // waits for figures that are being computed
 let scaling = null; // asks for what carries scale, once nothing else is asked
 
 async function ask(path, body) {
@@ -56,10 +57,19 @@ function await_studio() {
 async function refresh() {
   try {
     const found = await ask("/api/state");
-    if (found.session !== state.session || found.revision !== state.revision) { state = found; show(); }
+    // What was asked for before the last change and answered after it is not shown.
+    const isNew = found.session !== state.session || found.revision > state.revision;
+    if (isNew || (found.revision === state.revision && found.pending !== state.pending)) { state = found; show(); }
+    else watch();
   } catch (error) {
     tell(error.message, true);
   }
+}
+
+// Figures that were not there in time are asked for until they are.
+function watch() {
+  clearTimeout(watching);
+  if (state.pending) watching = setTimeout(() => (acting ? watch() : refresh()), 500);
 }
 
 function tell(text, bad = false) {
@@ -169,7 +179,8 @@ function show() {
     $("hint").textContent = `Drag a plate along its plane${design.scene.dimension === 3 ? ", with Shift along its normal" : ""}. Drag elsewhere to turn the view.`;
     legend();
   } else view.empty();
-  figures(design, state.messages);
+  figures(design, state.messages, state.pending);
+  watch();
   places();
   if (schema) build($("forms"), state.data, schema, state.messages, (path, value, input) => act({ do: "set", path, value }).then((done) => { if (!done) input.classList.add("bad-field"); }));
   view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
@@ -214,14 +225,15 @@ function legend() {
   );
 }
 
-function figures(design, messages) {
+function figures(design, messages, pending = false) {
   const box = $("verdict");
   const rank = design?.rank;
-  const wrong = messages.length > 0;
+  const wrong = messages.length > 0 || pending;
   box.classList.toggle("bad", wrong || rank.deficiency > 0);
   box.classList.toggle("warn", !wrong && !rank.deficiency && design.within !== null && design.within < 1);
   const lines = [];
-  if (wrong) lines.push(make("strong", {}, design ? "The text is wrong; these are the figures before it." : "The text is wrong; there are no figures yet."));
+  const reason = pending ? "Computing" : messages[0]?.line ? "The text is wrong" : "The text cannot be evaluated";
+  if (wrong) lines.push(make("strong", {}, design ? `${reason}; these are the figures before it.` : `${reason}; there are no figures yet.`));
   else lines.push(make("strong", {}, rank.words), rank.deficiency === (rank.expected ?? 0) ? "" : ` (the file expects ${rank.expected ?? 0})`);
   const figured = design ? [
     `${rank.parameters} parameters, ${rank.observations} observations`,
@@ -232,15 +244,15 @@ function figures(design, messages) {
   box.replaceChildren(make("p", {}, ...lines), ...figured.map((text) => make("p", {}, text)));
   $("messages").replaceChildren(
     ...messages.map((one) => make("li", {},
-      make("button", { class: "link", "data-focus": `line ${one.line} ${one.path}`, title: "show the line", onclick: () => show_line(one.line) }, `line ${one.line}`),
-      `${one.path ? `, ${one.path}` : ""}: ${one.text}`)),
+      one.line ? make("button", { class: "link", "data-focus": `line ${one.line} ${one.path}`, title: "show the line", onclick: () => show_line(one.line) }, `line ${one.line}`) : null,
+      `${one.path ? `, ${one.path}` : ""}${one.line ? ": " : ""}${one.text}`)),
     ...(design?.doubts ?? []).map((text) => make("li", {}, text)),
   );
   if (design) quantities(design);
   else $("quantities").replaceChildren();
   if (design && !wrong) ask_scale();
   else $("scale").replaceChildren();
-  directions(design, messages);
+  directions(design, messages, pending);
 }
 
 function show_line(line) {
@@ -259,7 +271,7 @@ function unfold_text(open) {
 }
 
 const MOST_DIRECTIONS = 4; // that are told before a person asks for the others
-function directions(design, messages) {
+function directions(design, messages, pending) {
   const unfolded = $("motions").querySelector("details")?.open;
   $("motions").replaceChildren();
   const found = design?.motions.directions ?? [];
@@ -267,7 +279,7 @@ function directions(design, messages) {
   const items = found.map((one, index) => {
     const moving = index === motion;
     return make("li", {},
-      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages); refocus(`#motions [data-motion="${index}"]`); } }, moving ? "stop" : "move"),
+      make("button", { "aria-pressed": String(moving), "data-motion": String(index), onclick: () => { motion = moving ? null : index; view.move(motion); figures(design, messages, pending); refocus(`#motions [data-motion="${index}"]`); } }, moving ? "stop" : "move"),
       make("strong", {}, ` ${one.weak ? "weak" : "undetermined"} `), one.words,
     );
   });
