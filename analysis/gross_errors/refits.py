@@ -139,8 +139,17 @@ class _Refits:
         design = self.at.design
         model = design.model
         chain = model.spatial if isinstance(model, PlaneModel) else model
-        if not isinstance(chain, KinematicModel) or design.of(Priors).of_model.any():
+        if not isinstance(chain, KinematicModel):
             return None
+        priors = design.of(Priors)
+        if priors.of_model.any():
+            # What is known of these parameters, as by a map, says nothing of another arrangement's.
+            alone = design.observed(priors.select(~priors.of_model))
+            solution = estimate(alone, self.x)
+            if solution.status != "converged":
+                return None
+            at = linearised_fit(alone, solution)
+            return replace(self, at=at, freedom=at.degrees_of_freedom).arrangements()
         names: dict[Arrangement, list[str]] = {}
         for name, arrangement in ARRANGEMENTS.items():
             if arrangement != chain.arrangement:

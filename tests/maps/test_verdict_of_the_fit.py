@@ -185,6 +185,17 @@ def test_an_experiment_repeats_that_of_its_map(role: str, maps: dict[str, Path])
         assert len(doubts) == (name in ("significant", "beyond"))
 
 
+def test_diff_repeats_that_of_a_map_that_is_prior_knowledge(maps: dict[str, Path]) -> None:
+    readings = bp.simulate(bp.quickstart())
+    stated = {"kind": "map", "file": str(maps["beyond"])}
+    fits = [
+        bp.fit(bp.quickstart().with_(DESIGN | change), readings)
+        for change in ({}, {"priors": [stated]})
+    ]
+    found = bp.diff(*fits)
+    assert sum("in the fit of the map" in str(one) for one in found.notes) == 1
+
+
 @pytest.mark.parametrize("kind", ["conversion", "adjustment", "arrays"])
 def test_maps_made_of_a_map_carry_it(
     kind: str, maps: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

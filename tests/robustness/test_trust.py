@@ -293,12 +293,13 @@ def looked_at(folder: Path, sections: dict[str, Any]) -> None:
     session = Session(folder / "first.yaml")
     session.act({"do": "open", "name": "other.yaml"})
     session.state()
-    document = session._now.document
+    document = session._document
     for name, job in JOBS.items():
         work = {"axes": [{"paths": ["title"], "values": ["x"]}], "name": "", "content": ""}
         if name in ("suggest", "next", "sweep", "monte carlo"):
             with suppress(bp.ExperimentError, ValueError, RuntimeError):
                 job(document, work | {"trials": 2}, lambda step: None)
+    session.close()
 
 
 DOORS: dict[str, Callable[[Path, dict[str, Any]], None]] = {
