@@ -222,7 +222,10 @@ def _with_held(
         by_pose[d:, d:] = -rotation if d == 3 else -1.0
         turned = vector_from_rotation((rotation @ drawn[0].T)[None])[0]
         off = np.concatenate([pose[1] - rotation @ shift - drawn[1], turned])
-        rows = np.concatenate([rigid_motions(places)[stated], by_pose[held]])
+        moves = rigid_motions(places)[stated]
+        # There the turn about z stands first.
+        moves = moves[:, [0, 1, 2, 4, 5, 3]] if d == 3 else moves
+        rows = np.concatenate([moves, by_pose[held]])
         left = np.concatenate([(target[members] - places)[stated], -off[held]])
         motion = np.linalg.lstsq(rows, left, rcond=1e-9)[0]
         step = rotation_from_vector(motion[None, d:])[0]

@@ -36,6 +36,9 @@ Real = NDArray[np.float64]
 SEEDS = (1, 4)
 # Derivatives of two maps are compared at one point between them.
 RELATIVE = 1e-4
+# A turn that is held about one axis follows those about the others in the second order, and as it
+# is reached: 0.1 mrad twice is 10 nrad at the most, and of these a part.
+OF_TURNS = 2e-3
 
 
 @pytest.fixture(params=SEEDS)
@@ -80,7 +83,9 @@ def test_fit(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert unit == ("µrad" if "rotation" in name or name[1] in "ABC" else "µm")
         right = expected.standard_uncertainties[name] / FACTORS[unit]
         assert agrees(u, right, 3)
-        assert to_step(value, expected.estimates[name] / FACTORS[unit], right)
+        slack = OF_TURNS * right if "rotation" in name else 0.0
+        step = step_of(right, 3) + 2.0 * slack
+        assert within(value, expected.estimates[name] / FACTORS[unit], step), name
     left = dense.residuals(expected.problem, np.zeros(expected.problem.parameters))
     design = expected.problem.design
     own = design.readings
@@ -94,15 +99,17 @@ def test_fit(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
             AXES[axis],
         )
         assert tuple(row[:4]) == names
-        assert agrees(row[5], abs(left[k]))
-        micrometres = 1e6 * abs(left[k]) * design.machine.repeatability[axis]
+        assert agrees(row[5], left[k] / expected.sigma)
+        micrometres = 1e6 * left[k] * design.machine.repeatability[axis]
         assert agrees(row[4], micrometres)
     data = json.loads(output_of(capsys, "fit", path, readings, "--monomials", "--json"))
     judge_data(data["quantities"], expected)
     assert set(data["estimates"]) == set(expected.estimates)
     for name, told in data["estimates"].items():
         right = expected.standard_uncertainties[name]
-        assert abs(told["value"] - expected.estimates[name]) < 1e-5 * right + 1e-15, name
+        of_plate = ": rotation" in name or name[0] == "r"
+        slack = OF_TURNS if of_plate else 1e-5
+        assert abs(told["value"] - expected.estimates[name]) < slack * right + 1e-15, name
         assert told["standard_uncertainty"] == pytest.approx(right, rel=1e-6)
     sums = data["sum_of_squares"], data["sigma"], data["degrees_of_freedom"]
     right_sums = expected.sum_of_squares, expected.sigma, expected.degrees_of_freedom
