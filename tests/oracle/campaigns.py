@@ -45,10 +45,7 @@ class Expected:
 
     @cached_property
     def quantities(self) -> dict[str, Real]:
-        return {
-            symbol: self.uncertainties(function)
-            for symbol, function in self.functions.items()
-        }
+        return {symbol: self.uncertainties(function) for symbol, function in self.functions.items()}
 
     @property
     def functions(self) -> dict[str, Any]:

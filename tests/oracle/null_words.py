@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.oracle.campaigns import AXES, Expected
-from tests.oracle.printed import FACTORS, NUMBER, within, step_of
+from tests.oracle.printed import FACTORS, NUMBER, step_of, within
 from tests.reference import dense
 
 Real = NDArray[np.float64]
@@ -130,7 +130,9 @@ class Directions:
 
     def curve(self, direction: Real, name: str) -> Real:
         """Values of an error function along its axis, at 201 places."""
-        chosen = [k for k, (kind, own, _) in enumerate(self.owner) if (kind, own) == ("function", name)]
+        chosen = [
+            k for k, (kind, own, _) in enumerate(self.owner) if (kind, own) == ("function", name)
+        ]
         function = next(one for one in self.problem.functions if one.name == name)
         t = np.linspace(0.0, 1.0, 201)
         powers = np.stack([t**k for k in range(1, function.coefficients)], axis=1)
@@ -146,7 +148,9 @@ class Directions:
 
     def balls(self, direction: Real, name: str) -> tuple[Real, Real]:
         """Places and movements (n, 3) of a plate's balls."""
-        chosen = [k for k, (kind, own, _) in enumerate(self.owner) if (kind, own) == ("plate", name)]
+        chosen = [
+            k for k, (kind, own, _) in enumerate(self.owner) if (kind, own) == ("plate", name)
+        ]
         members = [self.owner[k][2] for k in chosen[::3]]
         return self.problem.balls[members], direction[chosen].reshape(-1, 3)
 

@@ -33,7 +33,8 @@ from tests.reference import dense
 from tests.reference.random_experiments import PROBES
 
 Real = NDArray[np.float64]
-SEEDS = (1, 4)
+# Coverage factors of two campaigns.
+FACTOR_OF = {1: 2.0, 4: 3.0}
 # Derivatives of two maps are compared at one point between them.
 RELATIVE = 1e-4
 # A turn that is held about one axis follows those about the others in the second order, and as it
@@ -41,9 +42,14 @@ RELATIVE = 1e-4
 OF_TURNS = 2e-3
 
 
-@pytest.fixture(params=SEEDS)
+@pytest.fixture(params=FACTOR_OF)
 def path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return campaign_file(request.param, tmp_path)
+
+
+@pytest.fixture
+def k(path: Path) -> float:
+    return FACTOR_OF[int(path.stem.removeprefix("campaign"))]
 
 
 def measured(
@@ -119,13 +125,11 @@ def test_fit(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def corrected(expected: Fitted, x: Real, probes: list[str]) -> tuple[Real, Real]:
     """Corrected points (m, 3) and a root of their covariance, each with its own probe."""
     found = [
-        expected.corrected(one[None], offset_of(name))
-        for one, name in zip(x, probes, strict=True)
+        expected.corrected(one[None], offset_of(name)) for one, name in zip(x, probes, strict=True)
     ]
     return np.concatenate([one for one, _ in found]), np.concatenate([root for _, root in found])
 
 
-@pytest.mark.parametrize("k", [2.0, 3.0])
 def test_correct(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
     expected, _, fit = measured(path, capsys, 3)
     volume = expected.problem.design.machine.volume
@@ -211,7 +215,9 @@ class Difference:
         self.offset = offset_of("right")
         ends = [np.linspace(low, up, 4) for low, up in zip(volume.lower, volume.upper, strict=True)]
         self.grid = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 3)
-        values, roots = zip(*(one.corrected(self.grid, self.offset) for one in self.maps), strict=True)
+        values, roots = zip(
+            *(one.corrected(self.grid, self.offset) for one in self.maps), strict=True
+        )
         self.values = (values[1] - values[0]).ravel()
         self.root = np.concatenate([roots[0], roots[1]], axis=1)
         middle = self.grid - self.grid.mean(axis=0)
@@ -249,16 +255,21 @@ class Difference:
     def of_function(self, name: str, share: str) -> tuple[float, float]:
         t, figures = float(share) / 100.0, []
         for one in self.maps:
-            names = [f"{name} t^{power}" for power in range(1, 4) if f"{name} t^{power}" in one.names["U3"]]
+            names = [
+                f"{name} t^{power}"
+                for power in range(1, 4)
+                if f"{name} t^{power}" in one.names["U3"]
+            ]
             powers = np.array([t ** int(each[-1]) for each in names])
             value = powers @ np.array([one.estimates[each] for each in names])
             rows = one.linear(one.functions["U3"])
-            root = one.sigma * rows[[one.names["U3"].index(each) for each in names]] @ one.spread.root
+            root = (
+                one.sigma * rows[[one.names["U3"].index(each) for each in names]] @ one.spread.root
+            )
             figures.append((value, np.linalg.norm(powers @ root)))
         return figures[1][0] - figures[0][0], math.hypot(figures[0][1], figures[1][1])
 
 
-@pytest.mark.parametrize("k", [2.0, 3.0])
 def test_diff(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
     first, _, one = measured(path, capsys, 3)
     second, _, other = measured(path, capsys, 4)
@@ -340,7 +351,8 @@ def test_adjust(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         weights[f"scale {axis}"] = [(end, lower, np.eye(3)[i] / size[i])]
     for i, j in ((0, 1), (0, 2), (1, 2)):
         weights[f"angle {AXES[i]}{AXES[j]}"] = [
-            (lower + np.eye(3)[a] * size, lower, -np.eye(3)[b] / size[a]) for a, b in ((i, j), (j, i))
+            (lower + np.eye(3)[a] * size, lower, -np.eye(3)[b] / size[a])
+            for a, b in ((i, j), (j, i))
         ]
     for signs in ("+++", "++-", "+-+", "+--"):
         up = np.array([sign == "+" for sign in signs])
@@ -386,11 +398,17 @@ def test_budget(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     inverse = np.linalg.pinv(rows / size, rcond=1e-11) / size[:, None]
     ends = [0, 3 * len(design.readings), len(dense.known(design, "distance").first)]
     ends = [0, ends[1], ends[1] + ends[2], len(rows)]
-    sources = ("readings", "calibration[0]: distances of plate", "calibration[1]: coordinates of plate")
+    sources = (
+        "readings",
+        "calibration[0]: distances of plate",
+        "calibration[1]: coordinates of plate",
+    )
     volume = design.machine.volume
     text = output_of(capsys, "budget", path)
     data = json.loads(output_of(capsys, "budget", path, "--json"))
-    told = dict(re.findall(r"^(diagonal \d): length of the body diagonal from (.* mm)$", text, re.M))
+    told = dict(
+        re.findall(r"^(diagonal \d): length of the body diagonal from (.* mm)$", text, re.M)
+    )
     assert len(told) == 4
     heads = cells(next(one for one in text.splitlines() if one.startswith("standard uncertainty,")))
     of_text = {row[0]: row[1:] for row in table(text, "standard uncertainty, µm")}
@@ -403,7 +421,9 @@ def test_budget(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
             assert np.isclose(np.abs(end - start), volume.upper - volume.lower).all()
             offset = design.probes.offsets[design.evaluation.probe]
             function = expected.displacements(np.array([start, end]), offset)
-            linear = expected.linear(lambda step, f=function: dense.length(np.diff(f(step), axis=0)))
+            linear = expected.linear(
+                lambda step, f=function: dense.length(np.diff(f(step), axis=0))
+            )
         else:
             linear = expected.linear(expected.functions[figure])
         by_row = (linear @ inverse) ** 2

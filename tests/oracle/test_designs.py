@@ -14,8 +14,9 @@ from tests.oracle.null_words import Directions, judge, resolved, sentences
 from tests.oracle.printed import agrees, output_of
 from tests.oracle.uncertainties import judge_data, judge_target, judge_text
 
-# Two of full rank, one plate and two, with and without a bar.
-DRAWN = (0, 2, 5, 6, 7, 8, 23, 28)
+# One of full rank, which has U4 and U6, and others with plates and a bar that leave one to twelve
+# directions open.
+DRAWN = (0, 2, 5, 8, 18, 23)
 
 
 @pytest.mark.parametrize("seed", DRAWN)

@@ -69,6 +69,11 @@ def judge_data(data: dict[str, Any], expected: Expected) -> None:
         np.testing.assert_allclose(one["maximum"], np.nanmax(values), rtol=1e-6)
         np.testing.assert_allclose(one["average"], np.nanmean(values), rtol=1e-6)
         _judge_name(one["largest_at"], values, names)
+        if symbol in ("U4", "U6"):
+            numbers = re.findall(r"point (\d+)", one["largest_at"])
+            assert [re.findall(r"point (\d+) at", told) for told in one["largest_places"]] == [
+                [number] for number in numbers
+            ]
 
 
 def judge_target(text: str, expected: Expected, constant: float, share: float) -> None:
@@ -85,5 +90,3 @@ def judge_target(text: str, expected: Expected, constant: float, share: float) -
     assert told is not None
     exact = 100.0 * within / len(values)
     assert exact - 0.01 - 1e-9 <= float(told[1]) <= exact + 1e-9, (line, exact)
-
-
