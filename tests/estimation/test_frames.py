@@ -161,6 +161,7 @@ def test_what_is_held_stays_as_drawn(known: str) -> None:
     state = fit.solution.state
     moved = vector_from_rotation((state.rotations[0] @ design.positions.rotations[0].T)[None])[0]
     off = np.concatenate([state.origins[0] - design.positions.origins[0], moved])
-    # Turns about several axes follow one another in the second order.
-    assert np.abs(off[held]).max() < 1e-9
+    # A step of 20 µrad after a turn of 10 mrad changes the components of both together by half their
+    # product.
+    assert np.abs(off[held]).max() < 1e-7
     assert np.abs(off[~held]).max() > 1e-3
