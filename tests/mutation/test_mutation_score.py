@@ -14,12 +14,12 @@ from tests.mutation.mutants import KINDS, mutants, mutated
 from tests.mutation.score import ROOMS, Outcome, passes, scored, summary
 from tests.reference.package_copies import package_copy
 
-SOURCE = '''
+SOURCE = """
 def share(values: list[float], limit: float) -> float:
     if limit > 0.0 and values:
         return 2.0 * max(values) - limit
     return 0.0
-'''
+"""
 SECONDS = float(os.environ.get("BALLPLATE_MUTATION_SECONDS", "1200"))
 COUNT = int(os.environ.get("BALLPLATE_MUTANTS", "3"))
 
