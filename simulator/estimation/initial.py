@@ -13,14 +13,23 @@ import numpy as np
 
 from ..computing.rounding import comparable
 from ..design.arrays import Design, State, nominal_state
+from ..design.objects import Flags
 from ..design.observations.readings import seen_places
-from ..geometry.motions import fit_motion
+from ..geometry.motions import (
+    fit_motion,
+    rigid_motions,
+    rotation_from_vector,
+    vector_from_rotation,
+)
 from ..machines.protocol import Array, Integers
 from .spheres import fit_sphere
 
 # Points whose spread across their main line is below this fraction of their length do not fix a
 # pose.
 FLAT = 1e-3
+
+# Steps of a motion to the frame of an artefact: its second-order part vanishes with the first ones.
+STEPS = 6
 
 
 def initial_state(design: Design, x: Array) -> State:
@@ -50,6 +59,8 @@ def initial_state(design: Design, x: Array) -> State:
             continue
         shape, poses = _assemble(seen[places][:, members], design.balls.places[members], d)
         turn, shift = _into_frame(design, shape, poses, places, members)
+        if _strength(seen[places[0], members][~np.isnan(seen[places[0], members, 0])], d) > 0.0:
+            turn, shift = _with_held(design, shape, poses[0], places[0], members, turn, shift)
         balls[members] = np.where(
             np.isnan(shape), design.balls.places[members], shape @ turn.T + shift
         )
@@ -166,14 +177,63 @@ def _into_frame(
         return turn, design.positions.rotations[held[0]].T @ (
             origin - design.positions.origins[held[0]]
         )
-    target, certified = design.balls.places.copy(), np.zeros(len(members), bool)
-    for one in design.observations:
-        ball, axis, value = one.fixing()
-        if len(ball):
-            target[ball, axis] = value
-            certified |= np.isin(members, ball)
+    target, certified, _ = _certified(design, members)
     known = ~np.isnan(shape[:, 0])
     chosen = certified & known
     if _strength(target[members[chosen]], design.dimension) == 0.0:
         chosen = known
     return fit_motion(shape[chosen], target[members[chosen]])
+
+
+def _certified(design: Design, members: Integers) -> tuple[Array, Flags, Flags]:
+    """Places of all balls with their calibrated co-ordinates, which of an artefact's have any, and
+    which of their co-ordinates (n, d) these are.
+    """
+    target = design.balls.places.copy()
+    stated = np.zeros(target.shape, bool)
+    for one in design.observations:
+        ball, axis, value = one.fixing()
+        if len(ball):
+            target[ball, axis] = value
+            stated[ball, axis] = True
+    return target, stated[members].any(axis=1), stated[members]
+
+
+def _with_held(
+    design: Design,
+    shape: Array,
+    pose: tuple[Array, Array],
+    position: int,
+    members: Integers,
+    turn: Array,
+    shift: Array,
+) -> tuple[Array, Array]:
+    """The motion into an artefact's frame that leaves what is held of its first pose as drawn,
+    where calibrated co-ordinates fix the rest of the frame.
+
+    Nothing moves later what is held: the readings do not show it.
+    """
+    d, held = design.dimension, design.positions.held[position]
+    target, _, stated = _certified(design, members)
+    stated &= ~np.isnan(shape)
+    if not held.any() or held.all() or not stated.any():
+        return turn, shift
+    drawn = design.positions.rotations[position], design.positions.origins[position]
+    for _ in range(STEPS):
+        places = shape @ turn.T + shift
+        rotation = pose[0] @ turn.T
+        # A motion of the frame moves the pose the other way.
+        by_pose = np.zeros((len(held), len(held)))
+        by_pose[:d, :d] = -rotation
+        by_pose[d:, d:] = -rotation if d == 3 else -1.0
+        turned = vector_from_rotation((rotation @ drawn[0].T)[None])[0]
+        off = np.concatenate([pose[1] - rotation @ shift - drawn[1], turned])
+        moves = rigid_motions(places)[stated]
+        # There the turn about z stands first.
+        moves = moves[:, [0, 1, 2, 4, 5, 3]] if d == 3 else moves
+        rows = np.concatenate([moves, by_pose[held]])
+        left = np.concatenate([(target[members] - places)[stated], -off[held]])
+        motion = np.linalg.lstsq(rows, left, rcond=1e-9)[0]
+        step = rotation_from_vector(motion[None, d:])[0]
+        turn, shift = step @ turn, step @ shift + motion[:d]
+    return turn, shift

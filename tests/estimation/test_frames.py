@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
+import yaml
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
+from ballplate.simulator.geometry.motions import vector_from_rotation
+
+TOP = Path(__file__).parents[2]
 
 LAYOUTS = {
     "one ball": "[[0 mm, 0 mm, 0 mm]]",
@@ -114,3 +119,49 @@ def test_the_order_of_positions_does_not_matter(layout: str, tmp_path: Path) -> 
         assert found[0][symbol].average == pytest.approx(
             found[1][symbol].average, rel=1e-9, nan_ok=True
         )
+
+
+@pytest.mark.parametrize("known", ["one ball", "two balls", "z of all balls"])
+def test_what_is_held_stays_as_drawn(known: str) -> None:
+    """Readings of a plate that lies 14 mm and half a degree beside its drawn pose: what the
+    certificate leaves open of the frame is that of the first pose as drawn, and nothing else fits
+    any worse.
+    """
+    balls: dict[str, object] = {
+        "one ball": {"balls": ["r1c1"], "standard_uncertainty": "0.1 um"},
+        "two balls": {"balls": ["r1c1", "r2c3"], "standard_uncertainty": "0.1 um"},
+        "z of all balls": {"balls": "all", "standard_uncertainty": {"z": "0.1 um"}},
+    }[known]
+    sides = {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.1 um"}
+    plate = {"kind": "grid", "balls": [3, 3], "size": ["600 mm", "600 mm"]}
+    drawn = bp.quickstart().with_(
+        {
+            "artefacts": {"plate": plate},
+            "calibration": [sides, {"kind": "coordinates", **balls}],
+            "error_model.position_coefficients": 3,
+            "error_model.rotation_coefficients": 3,
+        }
+    )
+    origin, turn = ["14 mm", "13 mm", "252 mm"], ["0.3 deg", "-0.2 deg", "0.4 deg"]
+    first = {
+        "name": "z low",
+        "artefact": "plate",
+        "pose": {"origin": origin, "rotation": turn},
+        "probes": ["down"],
+    }
+    others = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    lies = drawn.with_({"positions": [first, *others["positions"][1:]]})
+    fit = bp.fit(drawn, bp.simulate(lies, exact=True))
+    assert fit.converged
+    # Of exact readings nothing is left; distances that are turned out of a plane are as long.
+    assert fit.sum_of_squares < 1e-6
+    design = lay_out(drawn)
+    held = design.positions.held[0]
+    assert held.any() and not held.all()
+    state = fit.solution.state
+    moved = vector_from_rotation((state.rotations[0] @ design.positions.rotations[0].T)[None])[0]
+    off = np.concatenate([state.origins[0] - design.positions.origins[0], moved])
+    # A step of 20 µrad after a turn of 10 mrad changes the components of both together by half their
+    # product.
+    assert np.abs(off[held]).max() < 1e-7
+    assert np.abs(off[~held]).max() > 1e-3

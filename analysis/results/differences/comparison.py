@@ -277,13 +277,13 @@ def _functions(
     for name in names[0]:
         parameter = next(p for p in first.model.parameters if p.function == name)
         is_number = sum(p.function == name for p in first.model.parameters) == 1
-        ends = (one.line(name, np.array([0.0, 1.0])) for one in (first, second))
+        whole, others = (one.line(name, dense) for one in (first, second))
+        # Along the whole axis: a straightness is zero at both ends.
         constant = is_number and all(
-            one is not None and float(np.ptp(one.values)) == 0.0 for one in ends
+            one is not None and float(np.ptp(one.values)) == 0.0 for one in (whole, others)
         )
         t = np.array([1.0]) if constant else PLACES
-        lines = [(one.line(name, t), one.line(name, dense)) for one in (first, second)]
-        (one, whole), (other, others) = lines
+        one, other = (each.line(name, t) for each in (first, second))
         if one is None or other is None or whole is None or others is None:
             continue
         words = (name,) if constant else tuple(f"{name} at {100 * place:.0f} %" for place in t)

@@ -1,0 +1,1 @@
+"""Random changes of meaning in the code, and whether the tests notice them."""

@@ -1,0 +1,30 @@
+"""The mutation score from the command line: python -m tests.mutation --count 3 results rank."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from tests.mutation.score import ROOMS, scored, summary
+
+parser = argparse.ArgumentParser(prog="python -m tests.mutation")
+parser.add_argument("rooms", nargs="*", metavar="ROOM", help=", ".join(ROOMS))
+parser.add_argument("--count", type=int, default=2, help="mutants of each room")
+parser.add_argument("--seconds", type=float, default=600.0, help="begin none after these")
+parser.add_argument("--each", type=float, default=120.0, help="seconds that one may take")
+parser.add_argument("--store", type=Path, default=Path("mutants.jsonl"), help="results so far")
+options = parser.parse_args()
+unknown = set(options.rooms) - set(ROOMS)
+if unknown:
+    parser.error(f"no room {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
+with tempfile.TemporaryDirectory() as folder:
+    outcomes = scored(
+        options.rooms or list(ROOMS),
+        options.count,
+        options.store,
+        Path(folder),
+        options.seconds,
+        options.each,
+    )
+print("\n".join(summary(outcomes)))

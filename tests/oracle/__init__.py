@@ -1,0 +1,1 @@
+"""What commands print, recomputed from the dense reference."""
