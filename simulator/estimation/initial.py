@@ -196,7 +196,7 @@ def _certified(design: Design, members: Integers) -> tuple[Array, Flags, Flags]:
         if len(ball):
             target[ball, axis] = value
             stated[ball, axis] = True
-    return target, stated[members].any(axis=1), stated[members]
+    return target, np.asarray(stated[members].any(axis=1)), stated[members]
 
 
 def _with_held(
