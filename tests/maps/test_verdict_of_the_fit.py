@@ -186,7 +186,7 @@ def test_an_experiment_repeats_that_of_its_map(role: str, maps: dict[str, Path])
 
 
 def test_diff_repeats_that_of_a_map_that_is_prior_knowledge(maps: dict[str, Path]) -> None:
-    readings = bp.simulate(bp.quickstart())
+    readings = bp.simulate(bp.quickstart().with_(DESIGN))
     stated = {"kind": "map", "file": str(maps["beyond"])}
     fits = [
         bp.fit(bp.quickstart().with_(DESIGN | change), readings)
