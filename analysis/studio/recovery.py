@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ballplate.simulator.experiment.load import trees_of
-from ballplate.simulator.experiment.modules import refused_modules
+from ballplate.simulator.experiment.modules import runs_code
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import UNKNOWN
 from ballplate.simulator.inputs.yamltree import Mapping, to_python, walk
@@ -160,7 +160,7 @@ def _code(text: str, file: Path) -> list[object] | None:
         return None
     found: list[object] = []
     for tree in (root, *variants.values()):
-        if refused_modules(tree, file.parent):
+        if runs_code(tree, file.parent):
             kinds = (to_python(node) for _, node in walk(tree) if isinstance(node, Mapping))
             found += [one for one in kinds if one.get("kind") in ("python", "map")]
     return found

@@ -9,7 +9,7 @@ from typing import Any
 from ..design.objects import Volume
 from ..inputs.messages import ExperimentError, refused
 from ..inputs.problems import Problems
-from ..inputs.trust import OPENED, Trust
+from ..inputs.trust import OPENED
 from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping as MappingNode
 from ..inputs.yamltree import Mark, Node, parse_tree, read_tree, to_python
@@ -40,7 +40,7 @@ class StatedModel:
         return str(self.settings["kind"])
 
 
-def stated_model(text: str, volume: Volume, source: str, trust: Trust = OPENED) -> StatedModel:
+def stated_model(text: str, volume: Volume, source: str) -> StatedModel:
     """The error model of a text for a volume: a kind such as "kinematic", settings such as "{kind:
     kinematic, position_coefficients: 3}", or the path of a file with a section `error_model`.
 
@@ -59,7 +59,7 @@ def stated_model(text: str, volume: Volume, source: str, trust: Trust = OPENED) 
     problems = Problems(root)
     kinds: Any = ErrorModelSettings
     settings = validated(kinds, root, problems)
-    model = None if settings is None else _built(settings, volume, folder, problems, trust)
+    model = None if settings is None else _built(settings, volume, folder, problems)
     if model is None:
         raise ExperimentError(problems.messages)
     return StatedModel(absolute(to_python(root), folder), model)
@@ -72,9 +72,7 @@ def _section(root: Node, source: str) -> Node:
     return found
 
 
-def _built(
-    settings: Any, volume: Volume, folder: Path, problems: Problems, trust: Trust
-) -> ErrorModel | None:
+def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> ErrorModel | None:
     """The model, or None after saying what is wrong."""
     kind, d = kind_of(settings), len(volume.lower)
     if d not in kind.dimensions:
@@ -82,9 +80,9 @@ def _built(
         return None
     try:
         if isinstance(settings, MachineFileSettings):
-            settings.of(load_machine(trust.file(folder, settings.file), trust=trust))
+            settings.of(load_machine(folder / settings.file))
         elif isinstance(settings, PythonSettings):
-            settings.beside(folder, trust)
+            settings.beside(folder, OPENED)
         for steps, text in kind.wrong(settings, d):
             problems.add(steps, text)
         if not problems.messages:
