@@ -7,10 +7,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 VOID = {"br", "col", "hr", "img", "input", "link", "meta", "wbr"}
+TEXTS = {"p", "li", "figcaption"}
 
 
 class _Page(HTMLParser):
-    """Collects tables by the id of their caption, and paragraphs."""
+    """Collects tables by the id of their caption, and texts."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -30,7 +31,7 @@ class _Page(HTMLParser):
             self.tables[self.name].append([])
         elif tag in ("th", "td"):
             self.tables[self.name][-1].append("")
-        elif tag in ("p", "li"):
+        elif tag in TEXTS:
             self.paragraphs.append("")
 
     def handle_endtag(self, tag: str) -> None:
@@ -42,12 +43,12 @@ class _Page(HTMLParser):
             return
         if "th" in self.open or "td" in self.open:
             self.tables[self.name][-1][-1] += data
-        elif "p" in self.open or "li" in self.open:
+        elif not TEXTS.isdisjoint(self.open) and self.paragraphs:
             self.paragraphs[-1] += data
 
 
 def page_of(path: Path) -> tuple[dict[str, list[list[str]]], list[str]]:
-    """Tables of a page by name, each with its heads, and paragraphs and entries of lists."""
+    """Tables of a page by name, each with its heads, and paragraphs, entries of lists, and captions of pictures."""
     parsed = _Page()
     parsed.feed(path.read_text(encoding="utf-8"))
     return parsed.tables, [re.sub(r"\s+", " ", one).strip() for one in parsed.paragraphs]
