@@ -359,7 +359,7 @@ def test_a_report_in_xml_may_be_one_line(tmp_path: Path) -> None:
     text = Path("tests/readings/samples/qif_3_0.qif").read_text(encoding="utf-8")
     path = tmp_path / "long.qif"
     path.write_text(" ".join(text.splitlines()) + MOST_IN_LINE * " ", encoding="utf-8")
-    assert bp.read_report(path).features
+    assert len(bp.read_report(path).to_frame())
 
 
 def test_the_longest_lines() -> None:
