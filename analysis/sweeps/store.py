@@ -34,6 +34,7 @@ from .store_file import (
     format_of,
     in_words,
     is_damage,
+    unnumbered,
 )
 from .stored import (
     OF_RESULT,
@@ -145,7 +146,7 @@ def _prepare(path: Path, connection: sqlite3.Connection, found: int | None) -> N
     :raises StoreError: the store is damaged.
     """
     if found is not None:
-        wrong = damage(connection)
+        wrong = damage(connection) or unnumbered(connection)
         if wrong:
             raise StoreError(f"{path}: is damaged ({wrong}); {GO_ON}")
     connection.execute("PRAGMA journal_mode = WAL")

@@ -295,6 +295,15 @@ def _check_columns(path: Path, connection: sqlite3.Connection, number: int) -> N
             raise StoreError(f"{path}: {words}, which every store has; restore a copy, or {MEND}")
 
 
+def unnumbered(connection: sqlite3.Connection) -> str:
+    """That SQLite does not number the texts of a store, by which results refer to them; empty where
+    it does.
+    """
+    columns = connection.execute("PRAGMA table_info(text)").fetchall()
+    keys = [(name, str(kind).upper()) for _, name, kind, _, _, place in columns if place]
+    return "" if keys == [("id", "INTEGER")] else "its texts are not numbered"
+
+
 def damage(connection: sqlite3.Connection) -> str:
     """What SQLite's integrity check finds wrong with a database, in short; empty where it is
     sound.

@@ -194,7 +194,8 @@ def _check_parameters(settings: MapSettings, model: ErrorModel, problems: Proble
         if (one.name, one.unit) != (stated.name, stated.unit):
             text = (
                 f'is "{shorten(stated.name)}" in {stated.unit}, but the error model has'
-                f' "{one.name}" in {one.unit} there'
+                f' "{one.name}" in {one.unit} there: the file was edited; write it again with'
+                " fit -o"
             )
             problems.add(("parameters", k), text)
 

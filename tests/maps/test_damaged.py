@@ -126,7 +126,7 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         lambda text: re.sub(r'- \{"name": "[^"]*"', '- {"name": "EXX"', text, count=1),
         "parameters:",
         2,
-        'is "EXX" in',
+        "there: the file was edited; write it again with fit -o",
     ),
     "unit": (
         lambda text: text.replace('"unit": "rad"', '"unit": "degrees"', 1),

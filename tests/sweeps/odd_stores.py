@@ -197,6 +197,17 @@ NO_STORES: dict[str, Damage] = {
     "versions of SQLite": overwritten(18, b"\x07\x07"),
 }
 
+
+def loosened(numbers: str) -> tuple[str, ...]:
+    """Statements that make a table of texts without constraints, with other numbers."""
+    return (
+        "CREATE TABLE loose (id, value)",
+        f"INSERT INTO loose SELECT {numbers}, value FROM text",
+        "DROP TABLE text",
+        "ALTER TABLE loose RENAME TO text",
+    )
+
+
 # What is a store still, in parts.
 DAMAGED: dict[str, Damage] = {
     **{f"cut to {share}": cut(share) for share in (0.3, 0.5, 0.7, 0.9, 0.99)},
@@ -208,6 +219,8 @@ DAMAGED: dict[str, Damage] = {
     "no keys": by_sql("DELETE FROM cell"),
     "no texts": by_sql("DELETE FROM text"),
     "no files": by_sql("DELETE FROM bundle"),
+    "numbers of texts ill": by_sql(*loosened("CAST(x'ff41fe' AS TEXT)")),
+    "texts not numbered": by_sql(*loosened("id"), "DELETE FROM text WHERE id = 1"),
     "definition no JSON": by_sql("UPDATE sweep SET definition = '{'"),
     "definition of bytes": by_sql("UPDATE sweep SET definition = x'00ff'"),
     "definition a list": by_sql("UPDATE sweep SET definition = '[]'"),
