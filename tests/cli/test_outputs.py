@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
-import json
 import os
 import resource
 import shutil
@@ -30,6 +29,7 @@ import pytest
 from ballplate.cli import main, outputs, parser
 from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
 
+from tests.cli.cuts import remains
 from tests.cli.test_check_fix import SHIFTED as OPEN
 from tests.planning.small_pool import TEXT as POOL
 from tests.report.stores import axis, done, made_up
@@ -772,16 +772,8 @@ def cuts(
     if is_there and "check" in commands:
         lines["check"] = ["check", "--fix", str(folder / "open.yaml")]
         before["check"] = {"open.yaml": OPEN}
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.cli.cuts"],
-        input=json.dumps({"lines": lines, "folder": str(folder), "before": before, **task}),
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )
     after: dict[str, dict[str, str]] = {}
-    for left in map(json.loads, done.stdout.splitlines()):
+    for left in remains(lines=lines, folder=str(folder), before=before, **task):
         if left["cut"]:
             yield left, before[left["name"]], after[left["name"]]
         else:

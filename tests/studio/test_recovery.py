@@ -1,6 +1,8 @@
 """What is not saved when a studio ends, however it ends."""
 
+import base64
 import json
+import signal
 import sys
 from pathlib import Path
 
@@ -8,10 +10,13 @@ import pytest
 from ballplate.cli.studio import unsaved
 from ballplate.designs import shipped
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.studio.document import opened
 from ballplate.studio.jobs import JOBS
-from ballplate.studio.recovery import kept_in
+from ballplate.studio.recovery import kept_in, recovered
 from ballplate.studio.session import RefusedError, Session
 from ballplate.studio.sweeping import swept
+
+from tests.cli.cuts import ACTED, remains
 
 MODEL = """import numpy as np
 from ballplate.models import Parameter, Reported
@@ -89,6 +94,61 @@ def test_a_new_file_is_not_written_before_it_is_saved_and_not_lost(tmp_path):
     session.act({"do": "set", "path": ["title"], "value": "mine"})
     again = Session(design, beginning=beginning)
     assert again.state()["data"]["title"] == "mine" and not design.exists()
+
+
+# What is done, and which text each file has then and its recovery takes up.
+EDITS = [
+    (None, {"plate.yaml": (0, 1)}),
+    ({"do": "text", "text": 2}, {"plate.yaml": (0, 2)}),
+    ({"do": "save"}, {"plate.yaml": (2, 2)}),
+    ({"do": "text", "text": 3}, {"plate.yaml": (2, 3)}),
+    ({"do": "undo"}, {"plate.yaml": (2, 2)}),
+    ({"do": "redo"}, {"plate.yaml": (2, 3)}),
+    ({"do": "save", "name": "copy.yaml"}, {"plate.yaml": (2, 2), "copy.yaml": (3, 3)}),
+    ({"do": "text", "text": 4}, {"plate.yaml": (2, 2), "copy.yaml": (3, 4)}),
+]
+
+
+@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.long)])
+def test_a_studio_that_is_cut_anywhere_loses_nothing_that_it_has_taken(tmp_path, every):
+    """From one that takes up what an earlier one has left; by SIGTERM and SIGKILL."""
+    pytest.importorskip("starlette", reason="the studio is an extra")
+    beginning = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
+    texts = [f"{beginning}# {k}\n" for k in range(5)]
+    actions = [dict(one, text=texts[one.get("text", 0)]) for one, _ in EDITS if one]
+    content = base64.b64encode(texts[0].encode()).decode()
+    unsaved = json.dumps({"owner": "another", "content": content, "text": texts[1]})
+    folder = tmp_path / "cut"
+    _, *found = remains(
+        lines={"studio": ["studio", str(folder / "plate.yaml"), "--no-browser"]},
+        before={"studio": {"plate.yaml": texts[0], ".plate.yaml.unsaved": unsaved}},
+        actions=actions,
+        folder=str(folder),
+        signals=[signal.SIGKILL, signal.SIGTERM],
+        every=every,
+        slow=False,
+    )
+    for left in found:
+        assert left["status"] in (-signal.SIGKILL, 128 + signal.SIGTERM)
+        acted = left["met"].count(ACTED)
+        near = [states for _, states in EDITS[acted : acted + 2]]
+        for name in ("plate.yaml", "copy.yaml"):
+            given = laid_out(tmp_path / f"{left['number']}-{left['cut']}", left["there"], name)
+            known = [[texts[k] for k in one[name]] if name in one else [None] * 2 for one in near]
+            for text, expected in zip(given, zip(*known, strict=True), strict=True):
+                assert text in expected, (name, left["number"], left["cut"], left["met"])
+    assert len({left["met"].count(ACTED) for left in found}) >= len(EDITS) - 1
+
+
+def laid_out(folder: Path, there: dict[str, str], name: str) -> tuple[str | None, str | None]:
+    """The text of a file, and the one that is taken up, in a copy of what is there."""
+    folder.mkdir(exist_ok=True)
+    for one, content in there.items():
+        (folder / one).write_bytes(content.encode("latin-1"))
+    if name not in there:
+        return None, None
+    document = opened(folder / name)
+    return document.text, recovered(document, "next")[0].text
 
 
 def test_changes_that_are_left_on_purpose_are_gone(design):

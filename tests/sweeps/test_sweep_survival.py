@@ -7,14 +7,20 @@ from __future__ import annotations
 import os
 import random
 import resource
+import shutil
 import signal
+import sqlite3
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from tests.cli.cuts import COMMIT, remains
+from tests.cli.test_outputs import BALLS, DESIGN
 
 from .support import (
     ROOT,
@@ -76,6 +82,57 @@ def started(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
         for stream in (process.stdout, process.stderr):
             if stream is not None:
                 stream.close()
+
+
+CUT = """\
+title: cut short
+base: design.yaml
+axes: {read: {path: machine.repeatability, values: [1 um, 2 um]}}
+trials: 6
+"""
+
+
+def row_seconds(store: Path) -> dict[tuple[str, int], float]:
+    """How long each row took, by key and block; none before there are rows."""
+    with closing(sqlite3.connect(store)) as connection:
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        found = connection.execute("SELECT key, block, seconds FROM result") if any(tables) else []
+        return {(key, block): seconds for key, block, seconds in found}
+
+
+# At each commit, or at each statement.
+@pytest.mark.parametrize("every", [10**6, pytest.param(1, marks=pytest.mark.long)])
+def test_killed_before_a_statement(tmp_path: Path, every: int) -> None:
+    """No row that was stored is lost or computed twice, that of a replicate block neither."""
+    for name, text in (("design.yaml", DESIGN), ("balls.csv", BALLS), ("cut.yaml", CUT)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+
+    def laid_out(left: dict[str, Any]) -> Path:
+        folder = tmp_path / "left"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for name, content in left["there"].items():
+            (folder / name).write_bytes(content.encode("latin-1"))
+        return folder / "store.sqlite"
+
+    store = tmp_path / "cut" / "store.sqlite"
+    line = ["sweep", str(tmp_path / "cut.yaml"), "--store", str(store), "--workers", "1"]
+    task = {"lines": {"sweep": line}, "before": {"sweep": {}}, "folder": str(store.parent)}
+    how = {"signals": [signal.SIGKILL], "every": every, "slow": False, "blocks": 4}
+    whole, *found = remains(**task, **how)
+    expected, commits = rows(laid_out(whole)), whole["met"].count(COMMIT)
+    assert list(expected["status"]) == ["done", "done"] and len(found) >= 2 * commits
+    for killed, continued in zip(found[::2], found[1::2], strict=True):
+        assert (killed["status"], continued["status"]) == (-signal.SIGKILL, 0)
+        before = row_seconds(laid_out(killed))
+        path = laid_out(continued)
+        assert_same(rows(path), expected)
+        after, cut = row_seconds(path), killed["cut"]
+        assert all(after[one] == spent for one, spent in before.items() if one[1] == 0)
+        # Of the three before the rows, the last, which looks for damage, is there each time.
+        left = whole["met"][cut - 1 :].count(COMMIT)
+        assert continued["met"].count(COMMIT) == left + (left < commits - 2), cut
 
 
 @pytest.mark.slow
