@@ -14,9 +14,9 @@ from ballplate.gross_errors.redundancy import reliability
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.named_files import named_by
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import UNKNOWN
-from ballplate.sweeps.named_files import named_by
 from scipy.stats import norm
 
 from tests.observations.test_joint_values import agree, problem, stacked, written
