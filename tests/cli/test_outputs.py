@@ -705,15 +705,19 @@ def fault(
 FAULTS = ("limit of size", "full disk at the last", "held open by another program", "interrupted")
 # What becomes of several files is the same whatever command writes them.
 SEVERAL = ("simulate", "lengths")
+WRITING = [command for command, walk in WALK.items() if walk.writes]
 
 
 @pytest.mark.usefixtures("planned_once")
 @pytest.mark.parametrize(
     ("command", "faults"),
     [
-        (command, FAULTS if command in SEVERAL else FAULTS[:2])
-        for command, walk in WALK.items()
-        if walk.writes
+        *((command, FAULTS if command in SEVERAL else FAULTS[:2]) for command in WRITING),
+        *(
+            pytest.param(command, FAULTS[2:], marks=pytest.mark.long)
+            for command in WRITING
+            if command not in SEVERAL
+        ),
     ],
 )
 def test_what_was_there_is_whole_when_writing_fails(
