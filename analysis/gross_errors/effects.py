@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.rounding import first_largest_of_columns
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.readings import offset_sensitivity
 from ballplate.simulator.estimation.functions import (
@@ -86,8 +86,9 @@ class Changes:
             if self.direct is not None:
                 # The estimate moves against the response.
                 moved -= self.direct[:, response.index[some]].toarray()
-            values = np.abs(self.operator @ moved)
-            where[some] = comparable(values, axis=0).argmax(axis=0)
+            values = self.operator @ moved
+            np.abs(values, out=values)
+            where[some] = first_largest_of_columns(values)
             change[some] = values.max(axis=0)
         uncertainty = self.uncertainty[where] if len(self.uncertainty) else np.full(count, np.nan)
         return Largest(change, where, uncertainty)
@@ -121,7 +122,6 @@ def changes_of(
             ),
         )
         return lambda asked: of_points
-    own = _own_parts(at, made, places.index)
     kept: dict[bytes, Changes] = {}
 
     def among(asked: Integers) -> Changes:
@@ -134,7 +134,11 @@ def changes_of(
         key = pairs.tobytes()
         if key not in kept:
             kept.clear()
-            kept[key] = _distances(made, own, pairs, places.labels)
+            # Moving all balls in each batch would take time with the square of their number.
+            used = np.union1d(some, pairs)
+            moved, pairs = made.select(used), np.searchsorted(used, pairs)
+            own = _own_parts(at, moved, places.index[used])
+            kept[key] = _distances(moved, own, pairs, places.labels[used])
         return kept[key]
 
     return among

@@ -71,6 +71,7 @@ def reliability_of(
     report: Report = unreported,
 ) -> Reliability:
     """Reliability of a design at zero machine error, where sigma is known or estimated."""
+    report(ProgressStep("observations", 0, row_count(design)))
     at = linearise(design)
     given = patterns(design, at.state, None)
     functions = {

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -156,7 +157,7 @@ class Reliability(Result):
         words = f"{self.title}: minimal detectable biases of readings, and their effects on U6"
         return draw_rows(panels, words, path)
 
-    @property
+    @cached_property
     def found_by_fit(self) -> Array:
         """The same of the tests that `fit` makes, which are many together; NaN for drifts, which it
         looks for as smooth errors.
@@ -164,7 +165,7 @@ class Reliability(Result):
         as_smooth = np.isin(self.patterns.kind, DRIFTS)
         return np.where(as_smooth, np.nan, self._biases(self.fit_noncentrality))
 
-    @property
+    @cached_property
     def minimal_detectable(self) -> Array:
         """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can
         be detected.
@@ -311,16 +312,17 @@ def _table(
         ]
     ]
     rows[0].append("U6 at")
+    effects = {symbol: _effect(result, symbol) for symbol in result.effects}
     for k in chosen:
         unit = result.patterns.unit(k)
         cells = [name(result.patterns, k)]
         if with_redundancy:
             cells.append(number(result.left[k], 3))
         cells += [_shown(result.minimal_detectable[k]), _shown(result.found_by_fit[k]), SHOWN[unit]]
-        for symbol in result.effects:
-            effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
-            told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
-            cells.append("-" if math.isnan(effect) else told)
+        for symbol, effect in effects.items():
+            change = _effect_number(result, symbol, k, effect[k])
+            uncertainty = number(1e6 * result.effects[symbol].uncertainty[k], 3)
+            cells.append("-" if math.isnan(effect[k]) else f"{change} ({uncertainty})")
         cells.append("" if math.isinf(result.minimal_detectable[k]) else _where(result, "U6", k))
         rows.append(cells)
     right = [
@@ -335,11 +337,11 @@ def _table(
     return aligned(rows, right)
 
 
-def _effect_number(result: Reliability, symbol: str, k: int) -> str:
+def _effect_number(result: Reliability, symbol: str, k: int, effect: float) -> str:
     """An effect in micrometres, 0 where there is none but rounding."""
     if result.effects[symbol].change[k] <= 1e-9 * result.size(k):
         return "0"
-    return number(1e6 * _effect(result, symbol)[k], 3)
+    return number(1e6 * effect, 3)
 
 
 def _effect(result: Reliability, symbol: str) -> np.ndarray:

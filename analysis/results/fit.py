@@ -186,7 +186,7 @@ class Fit(FitResult):
         if self.variance_components is not None:
             lines += ["", *self.variance_components.lines()]
             lines += [REWEIGHTED] if self.is_reweighted else []
-        lines += ["", *uncertainty_table(self.quantities), ""]
+        lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
         lines += [*task_table(self.tasks), ""] if self.tasks else []
         rows = [["parameter", "value", "standard uncertainty", "unit"]]
         for estimate in (one for one in self.estimates if one.kind not in ("origin", "ball")):

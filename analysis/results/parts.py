@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 MOST_BALLS = 100
 
 
-def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
-    """U1 to U6 as lines of text."""
+def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list[str]:
+    """U1 to U6 as lines of text; a `caveat` is added to what is said of the target."""
     rows = [["", "standard uncertainty of", "maximum", "average", "unit", "count", "largest at"]]
     told: set[str] = set()
     for symbol, quantity in quantities.items():
@@ -73,7 +73,7 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
             by = uncertainty_words(quantity.coverage_factor)
             lines.append(
                 f"within the target uncertainty ({by}): {percent(quantity.within_target)} of"
-                f" {quantity.symbol}"
+                f" {quantity.symbol}{caveat}"
             )
     return lines
 

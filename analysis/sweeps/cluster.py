@@ -32,7 +32,8 @@ WAITING = 4
 TRIES = 10
 # Of the folders that files are unpacked in.
 PREFIX = "ballplate-sweep-"
-# Seconds until a worker comes.
+# Seconds until a scheduler answers, and until a worker comes.
+CONNECTION_TIMEOUT = 10.0
 PATIENCE = 30.0
 
 LOGGERS = ("distributed", "tornado", "asyncio")
@@ -79,7 +80,7 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
         )
         raise ClusterError(text) from None
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except Exception as error:
         # Of an address that makes no sense there may come anything.
         text = (

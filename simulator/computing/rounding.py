@@ -58,6 +58,23 @@ def first_largest(values: Array) -> int:
     return int(near[comparable(values[near]).argmax()])
 
 
+def first_largest_of_columns(values: Array) -> NDArray[np.int64]:
+    """Row (k,) of the largest of each column of values (m, k), none of which is a NaN, as
+    `first_largest` takes it.
+
+    >>> first_largest_of_columns(np.array([[0.1, 3e-9], [0.3, 0.0], [0.1 + 0.2, 2e-9]])).tolist()
+    [1, 0]
+    """
+    largest = values.max(axis=0)
+    is_near = values >= largest - 4.0 * 2.0**-DIGITS * np.abs(largest)
+    # Several times as fast as `nonzero` of two dimensions.
+    row, column = np.divmod(np.flatnonzero(is_near), len(largest))
+    # By powers of two, so that no column is nothing beside another.
+    near = comparable(np.ldexp(values[row, column], -np.frexp(largest)[1][column]))
+    order = np.lexsort((row, -near, column))
+    return row[order[np.searchsorted(column[order], np.arange(len(largest)))]]
+
+
 def above(values: ArrayLike, limit: float) -> NDArray[np.bool_]:
     """Which of `values` exceed a limit by more than rounding.
 

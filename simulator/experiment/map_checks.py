@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,8 @@ from .model_files import absolute, fingerprints
 NEGATIVE = 1e-10
 # Corrections of the same model, in metres, agree within this; and within this part of them.
 SAME, SAME_PART = 1e-12, 1e-9
+# Sums of squares agree with sigma within this part: another program may round both.
+SAME_SQUARES = 1e-3
 
 
 # In one piece: what is checked needs what was found right before it.
@@ -80,6 +83,8 @@ def map_of_tree(
         _check_covariance(covariance, undetermined, size, problems)
     if not problems.messages:
         _check_unchanged(settings, root, model, values, volume, covariance, undetermined, problems)
+    if not problems.messages:
+        _check_squares(settings, problems)
     if problems.messages:
         return None
     data, lack = settings.data, settings.lack_of_fit
@@ -192,6 +197,22 @@ def _check_parameters(settings: MapSettings, model: ErrorModel, problems: Proble
                 f' "{one.name}" in {one.unit} there'
             )
             problems.add(("parameters", k), text)
+
+
+def _check_squares(settings: MapSettings, problems: Problems) -> None:
+    """Report sums of squares that an estimated sigma does not come from."""
+    if not settings.sigma.estimated:
+        return
+    for key, stated in (("sigma", settings.sigma), ("lack_of_fit", settings.lack_of_fit)):
+        if stated is None or stated.sum_of_squares is None:
+            continue
+        found = settings.sigma.value**2 * stated.degrees_of_freedom
+        if not math.isclose(stated.sum_of_squares, found, rel_tol=SAME_SQUARES):
+            text = (
+                f"contradicts sigma, whose square times {stated.degrees_of_freedom} degrees of"
+                f" freedom is {found:.6g}: the file was edited; write it again with fit -o"
+            )
+            problems.add((key, "sum_of_squares"), text)
 
 
 def _triangle(settings: MapSettings, size: int, problems: Problems) -> Array:

@@ -22,6 +22,8 @@ CONTROL = re.compile("[\x00-\x08\x0b\x0e-\x1f\x7f]")
 LINE_END = re.compile("\r\n|\r|\n")
 # What DOS writes at the end of a text.
 END_OF_FILE = "\x1a"
+# Characters of a line: room for a thousand columns, or for thousands of positions.
+MOST_IN_LINE = 1_000_000
 
 
 def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[str, str]:
@@ -30,13 +32,21 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
     A file without a mark of its encoding is in UTF-8 if it can be, in UTF-16 if every other byte of
     it is zero, and otherwise in the encoding of western European systems.
 
-    :raises ExperimentError: it is no text, is damaged, or is not in the encoding stated.
+    :raises ExperimentError: it is no text, is damaged, is not in the encoding stated, or has too
+        long a line.
 
     >>> decoded("Lage;1,5 µm".encode("cp1252"), "a.csv")
     ('Lage;1,5 µm', 'cp1252')
     >>> decoded("Lage".encode("utf-16"), "a.csv")
     ('Lage', 'UTF-16')
     """
+    text, name = text_and_encoding(content, file, encoding)
+    refuse_long_lines(text, file)
+    return text.rstrip(END_OF_FILE), name
+
+
+def text_and_encoding(content: bytes, file: object, encoding: str | None = None) -> tuple[str, str]:
+    """`decoded`, with lines of any length, as XML has them, and what DOS writes at the end."""
     if content.startswith(OTHERS):
         text = "is a workbook, an archive or a document, and no text; save its table as CSV"
         raise refused(file, text)
@@ -45,7 +55,7 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
         # With its mark, which is no letter of the text.
         used = marked if marked[:6] == codecs.lookup(encoding).name[:6] else encoding
         try:
-            return content.decode(used).rstrip(END_OF_FILE), encoding
+            return content.decode(used), encoding
         except UnicodeError:
             text = f"is not in the encoding {encoding}; correct readings.encoding, or leave it out"
             raise refused(file, text) from None
@@ -57,10 +67,25 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
         except UnicodeError:
             continue
         if "\0" not in text:
-            return text.rstrip(END_OF_FILE), told
+            return text, told
     raise refused(
         file, "is no text in any encoding known; take a whole copy of it, or save it as UTF-8"
     )
+
+
+def refuse_long_lines(text: str, file: object) -> None:
+    """Refuse a line of more than `MOST_IN_LINE` characters, in time in proportion to the text.
+
+    :raises ExperimentError: it has one.
+    """
+    start = 0
+    while len(text) - start > MOST_IN_LINE:
+        end = max(text.rfind(mark, start, start + MOST_IN_LINE + 1) for mark in "\n\r")
+        if end < 0:
+            line = sum(1 for _ in LINE_END.finditer(text, 0, start)) + 1
+            told = f"has more than {MOST_IN_LINE} characters in a line; break it into several"
+            raise refused(file, told, line=line)
+        start = end + 1
 
 
 def refuse_controls(text: str, file: object) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 
 import yaml
 
+from .decoding import refuse_long_lines
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, refused
 from .settings import listing, shorten
 
@@ -172,10 +173,10 @@ def read_text(path: Path | GivenText) -> str:
 def decoded(content: bytes, file: str) -> str:
     """The text of a UTF-8 file's content; ``file`` is named in messages.
 
-    :raises ExperimentError: it is not UTF-8.
+    :raises ExperimentError: it is not UTF-8, or has too long a line.
     """
     try:
-        return content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = content[: error.start].decode("utf-8", errors="replace")
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
@@ -183,6 +184,8 @@ def decoded(content: bytes, file: str) -> str:
             f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
         )
         raise ExperimentError([Message(file, line, column, "", text)]) from None
+    refuse_long_lines(text, file)
+    return text
 
 
 def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node:

@@ -66,6 +66,13 @@ class LackOfFit:
         )
 
     @property
+    def caveat(self) -> str:
+        """What is added to a verdict on results of the fit; empty where it has not failed."""
+        if not self.is_beyond_limit:
+            return ""
+        return ", of which nothing can be relied on: lack of fit is beyond the limit"
+
+    @property
     def caution(self) -> str:
         """The warning that a user of the fit's map needs; empty without one."""
         found = []

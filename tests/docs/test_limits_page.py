@@ -34,7 +34,7 @@ from ballplate.simulator.experiment import (
 )
 from ballplate.simulator.experiment.compensation import table_formats
 from ballplate.simulator.geometry import artefacts, directions
-from ballplate.simulator.inputs import messages, tables, yamltree
+from ballplate.simulator.inputs import decoding, messages, tables, yamltree
 from ballplate.simulator.inputs import settings as input_settings
 from ballplate.simulator.splines import read
 from ballplate.sweeps import axes, bundle, load
@@ -44,6 +44,7 @@ PAGE = Path("docs/reference/limits.md")
 
 LIMITS = {
     "size of a file": (yamltree.MOST_BYTES // 10**6,),
+    "characters of a line": (decoding.MOST_IN_LINE,),
     "values in a YAML file": (yamltree.MOST_NODES,),
     "depth of a YAML file": (yamltree.DEEPEST,),
     "rows of a table": (tables.MOST_ROWS,),

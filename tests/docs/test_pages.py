@@ -110,64 +110,46 @@ def test_examples_have_run(built: Path) -> None:
     assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("example", "message"),
-    [
-        (
-            "```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```",
-            "exit status 0 instead of 1",
-        ),
-        (
-            "```{picture} none.svg\n:alt: nothing\n```",
-            "none.svg is no SVG, PNG or HTML file that an example has written",
-        ),
-    ],
-)
-def test_an_example_that_fails_ends_the_build(tmp_path: Path, example: str, message: str) -> None:
+def test_an_example_that_fails_ends_the_build(tmp_path: Path) -> None:
+    example = "```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```"
     (tmp_path / "index.md").write_text(f"# Wrong\n\n{example}\n", encoding="utf-8")
-    found = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "sphinx",
-            "-q",
-            "-c",
-            DOCS,
-            "-b",
-            "html",
-            tmp_path,
-            tmp_path / "built",
-        ],
-        capture_output=True,
-        text=True,
+    command = [sys.executable, "-m", "sphinx", "-q", "-c", DOCS, "-b", "html"]
+    found = subprocess.run([*command, tmp_path, tmp_path / "built"], capture_output=True, text=True)
+    assert found.returncode != 0 and "exit status 0 instead of 1" in found.stderr
+
+
+PROGRAMS = (
+    ("", "import math\nlost = open('a.txt', 'w')\nx = 6"),
+    (":continued:\n\n", "y = int(math.pow(x, 2)) + 1\nprint(f'y is {y}')"),
+    (":continued:\n\n", "print(f'x and y are {x + y}', 'lost' in dir())"),
+    ("", "print('kept:', [name for name in ('x', 'y', 'math') if name in dir()])"),
+)
+DRAWING = "<svg xmlns='http://www.w3.org/2000/svg'/>"
+
+
+@pytest.fixture(scope="module")
+def example_pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page with pictures and a page with programs."""
+    folder = tmp_path_factory.mktemp("examples")
+    blocks = "\n\n".join(
+        f"```{{python-run}}\n{option}{program}\n```" for option, program in PROGRAMS
     )
-    assert found.returncode != 0 and message in found.stderr
-
-
-def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) -> None:
-    drawing = "<svg xmlns='http://www.w3.org/2000/svg'/>"
+    (folder / "programs.md").write_text(f"# Right\n\n{blocks}\n", encoding="utf-8")
     page = (
-        f"# Right\n\n```{{file}} one.svg\n{drawing}\n```\n\n```{{picture}} one.svg\n:alt: a < b\nA"
+        "# Right\n\n```{toctree}\nprograms\n```\n\n"
+        f"```{{file}} one.svg\n{DRAWING}\n```\n\n```{{picture}} one.svg\n:alt: a < b\nA"
         ' *caption*.\n```\n\n```{file} one.html\n<p title="x">&amp;</p>\n```\n\n'
         "```{picture} one.html\n:alt: a < b\n```\n"
     )
-    (tmp_path / "index.md").write_text(page, encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "-q",
-        "-c",
-        DOCS,
-        "-b",
-        "html",
-        tmp_path,
-        tmp_path / "built",
-    ]
-    subprocess.run(command, check=True, capture_output=True)
-    built = (tmp_path / "built/index.html").read_text(encoding="utf-8")
-    data = base64.b64encode(f"{drawing}\n".encode()).decode()
+    (folder / "index.md").write_text(page, encoding="utf-8")
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-c", DOCS, "-b", "html"]
+    subprocess.run([*command, folder, folder / "built"], check=True, capture_output=True)
+    return folder / "built"
+
+
+def test_a_picture_that_an_example_has_written_is_in_the_page(example_pages: Path) -> None:
+    built = (example_pages / "index.html").read_text(encoding="utf-8")
+    data = base64.b64encode(f"{DRAWING}\n".encode()).decode()
     assert (
         f'src="data:image/svg+xml;base64,{data}" alt="a &lt; b"' in built
         and "A <em>caption</em>." in built
@@ -176,35 +158,11 @@ def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) ->
     assert f'srcdoc="{framed}" title="a &lt; b"></iframe>' in built
 
 
-def test_a_program_goes_on_with_the_names_of_the_last_one(tmp_path: Path) -> None:
+def test_a_program_goes_on_with_the_names_of_the_last_one(example_pages: Path) -> None:
     """Values, modules and classes of modules, but nothing of programs before one that does not go
     on.
     """
-    programs = (
-        ("", "import math\nlost = open('a.txt', 'w')\nx = 6"),
-        (":continued:\n\n", "y = int(math.pow(x, 2)) + 1\nprint(f'y is {y}')"),
-        (":continued:\n\n", "print(f'x and y are {x + y}', 'lost' in dir())"),
-        ("", "print('kept:', [name for name in ('x', 'y', 'math') if name in dir()])"),
-    )
-    blocks = "\n\n".join(
-        f"```{{python-run}}\n{option}{program}\n```" for option, program in programs
-    )
-    (tmp_path / "index.md").write_text(f"# Right\n\n{blocks}\n", encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "-q",
-        "-c",
-        DOCS,
-        "-b",
-        "html",
-        tmp_path,
-        tmp_path / "built",
-    ]
-    subprocess.run(command, check=True, capture_output=True)
-    text = Page(tmp_path / "built/index.html").text
+    text = Page(example_pages / "programs.html").text
     assert "y is 37" in text and "x and y are 43 False" in text and "kept: []" in text
 
 

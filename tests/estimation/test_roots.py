@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.computing.rounding import comparable, first_largest
+from ballplate.simulator.computing.rounding import (
+    comparable,
+    first_largest,
+    first_largest_of_columns,
+)
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from hypothesis import given
@@ -45,7 +49,7 @@ def test_a_root_without_singular_vectors_gives_the_dense_uncertainties() -> None
     design = grid_experiment(3, points=5)
     at = linearise(design)
     own = np.sqrt((at.spectrum.root[at.layout.poses] ** 2).sum(axis=1))
-    expected = dense.standard_uncertainties(dense.planned(design, 5, 5))["U2"]
+    expected = dense.standard_uncertainties(dense.planned(design, 5, 5), symbols=["U2"])["U2"]
     np.testing.assert_allclose(own, expected, rtol=1e-8)
 
 
@@ -74,3 +78,10 @@ def test_the_first_of_the_largest_is_that_of_all_compared(values: list[float]) -
     if np.isnan(array).all():
         return
     assert first_largest(array) == int(np.nanargmax(comparable(array)))
+
+
+@given(rows=st.lists(st.tuples(*3 * [NUMBERS.filter(np.isfinite)]), min_size=1, max_size=12))
+def test_the_first_of_the_largest_of_columns_is_that_of_each(rows: list[tuple[float, ...]]) -> None:
+    array = np.array(rows) * [1.0, 1e-15, 1e15]
+    expected = [first_largest(column) for column in array.T]
+    assert first_largest_of_columns(array).tolist() == expected

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from sys import modules
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.simulator.design.parameters import shared_layout
@@ -16,6 +17,7 @@ from ballplate.simulator.estimation.elimination import SMALL, eliminate
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_balls
+from ballplate.simulator.inputs.decoding import MOST_IN_LINE, refuse_long_lines
 from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError
 from ballplate.simulator.inputs.yamltree import parse_tree, read_text
 from ballplate.simulator.readings.generate import true_artefacts
@@ -261,15 +263,15 @@ def test_a_table_of_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
     )
 
 
-def test_tables_of_a_million_columns(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text("x_mm," * 10**6 + "\n1,2\n")
+def test_tables_of_many_columns(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("x_mm," * 10**5 + "\n1,2\n")
     text = replaced(
         "{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: t.csv}"
     )
     text += "true_machine: {kind: curves, files: [t.csv]}\n"
     lines = refusals(tmp_path, text)
     assert lines == [
-        f"{tmp_path}/t.csv:1:1: 1000001 columns are too many; the first line should be {example}"
+        f"{tmp_path}/t.csv:1:1: 100001 columns are too many; the first line should be {example}"
         for example in ("ball,x_mm,y_mm", "position_mm,EXX_um,EYX_um,EAX_urad")
     ]
 
@@ -324,6 +326,50 @@ def test_what_is_no_file(tmp_path: Path, make: Callable[[Path], None], text: str
     with pytest.raises(ExperimentError) as caught:
         read_text(path)
     assert str(caught.value) == f"{path}: {text}"
+
+
+READINGS = "position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,"
+
+
+@pytest.mark.parametrize(
+    ("read", "before", "filler"),
+    [
+        (load, GOOD + "# ", "x"),
+        (load, "title:\n  ", "x"),
+        (lambda path: bp.fit(bp.quickstart(), path), READINGS, "1"),
+        (lambda path: bp.fit(bp.quickstart(), path), READINGS.replace(",", ";"), " "),
+        (bp.load_map, "map: 1\ntitle: ", "a "),
+        (bp.read_report, Path("tests/readings/samples/dmis_mm.dmo").read_text() + "$$ ", "-"),
+        (bp.read_report, Path("tests/readings/samples/pcdmis_mm.txt").read_text() + " ", " "),
+    ],
+    ids=["experiment", "text", "readings", "table", "map", "dmis", "pcdmis"],
+)
+def test_long_lines(
+    tmp_path: Path, read: Callable[[Path], object], before: str, filler: str
+) -> None:
+    path, line = tmp_path / "long", before.count("\n") + 1
+    path.write_text(before + MOST_IN_LINE // len(filler) * filler + "\n", encoding="utf-8")
+    with pytest.raises(ExperimentError) as caught:
+        read(path)
+    told = f"has more than {MOST_IN_LINE} characters in a line; break it into several"
+    assert str(caught.value) == f"{path}:{line}:1: {told}"
+
+
+def test_a_report_in_xml_may_be_one_line(tmp_path: Path) -> None:
+    text = Path("tests/readings/samples/qif_3_0.qif").read_text(encoding="utf-8")
+    path = tmp_path / "long.qif"
+    path.write_text(" ".join(text.splitlines()) + MOST_IN_LINE * " ", encoding="utf-8")
+    assert len(bp.read_report(path).to_frame())
+
+
+def test_the_longest_lines() -> None:
+    """Lines that are just short enough, however they end, between short ones."""
+    long = MOST_IN_LINE * "x"
+    for end in ("\n", "\r", "\r\n"):
+        text = end.join(["a", long, "", long, long, "b"])
+        refuse_long_lines(text, "f")
+        with pytest.raises(ExperimentError, match="f:4:1: "):
+            refuse_long_lines(text.replace(f"{end}{end}x", f"{end}{end}xx"), "f")
 
 
 def test_many_balls_at_one_place() -> None:

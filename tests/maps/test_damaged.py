@@ -158,6 +158,20 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         1,
         "at least 0",
     ),
+    "squares": (
+        lambda text: without_checksum(text).replace(
+            ', "sum_of_squares": ', ', "sum_of_squares": 2'
+        ),
+        "sigma:",
+        1,
+        "contradicts sigma, whose square times",
+    ),
+    "squares of the fit": (
+        lambda text: re.sub('_fit: {"sum_of_squares": [0-9]', r"\g<0>7", without_checksum(text)),
+        "lack_of_fit:",
+        1,
+        "contradicts sigma, whose square times",
+    ),
     "version": (lambda text: text.replace("map: 1", "map: 2"), "map:", 1, "found the number 2"),
     "key": (lambda text: text.replace("frame:", "fame:"), "fame:", 1, "unknown key"),
     "twice": (

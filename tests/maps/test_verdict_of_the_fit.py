@@ -113,6 +113,16 @@ def test_no_setting_of_sigma_hides_it() -> None:
     assert not fit("significant", components="probe", reweight=True).complaint
 
 
+def test_a_target_is_not_simply_met_beyond_the_limit() -> None:
+    """With sigma as given U6 is that of the plan, however large the residuals."""
+    caveat = "of which nothing can be relied on: lack of fit is beyond the limit"
+    for name in SHIFTS:
+        result = fit(name, sigma="given")
+        assert result.quantities["U6"].within_target == 1.0
+        (line,) = (one for one in result.lines() if one.startswith("within the target"))
+        assert ("100 % of U6" in line) and (caveat in line) == (name == "beyond")
+
+
 def test_a_reversal_has_the_verdict_of_multiple_redundancy() -> None:
     """Real readings, stated to a microinch, twelve times what they scatter; and a slip of 10 mil."""
     folder = bp.quickstart().source.parent / "hocken_borchardt"

@@ -166,6 +166,19 @@ class Fitted(Expected):
         values = [self.quantities[symbol] for symbol in ("U3", "U2", "U1")]
         return dict(zip(names, np.concatenate(values).tolist(), strict=True))
 
+    @cached_property
+    def coefficient_root(self) -> Real:
+        """A root of the covariance of the coefficients behind U3."""
+        return np.asarray(self.sigma * self.linear(self.functions["U3"]) @ self.spread.root)
+
+    def curve(self, name: str, t: Real) -> tuple[Real, Real]:
+        """Values of an error function at places (m,) of its axis, with standard uncertainties."""
+        names = [one for one in self.names["U3"] if one.startswith(f"{name} t^")]
+        powers = np.stack([t ** int(one[-1]) for one in names], axis=1)
+        root = self.coefficient_root[[self.names["U3"].index(one) for one in names]]
+        u = np.linalg.norm(powers @ root, axis=1)
+        return powers @ np.array([self.estimates[one] for one in names]), u
+
 
 def fitted(path: Path, readings: Path) -> Fitted:
     """The least squares of a file of readings in millimetres, sigma estimated."""

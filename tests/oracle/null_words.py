@@ -18,11 +18,9 @@ from tests.oracle.printed import FACTORS, NUMBER, step_of, within
 from tests.reference import dense
 
 Real = NDArray[np.float64]
+POSE_AMOUNT = re.compile(rf"({NUMBER}) (µm|µrad)(?: (along|about) ([xyz]))?")
 DEGREES = {"linear": 1, "quadratic": 2, "cubic": 3}
 
-# Parts below one hundredth of the largest are not printed; levers differ by a few times between
-# what the program and what this file calls the effect of a parameter.
-UNPRINTED = 0.03
 # Three digits are printed.
 DIGITS = 3
 
@@ -36,7 +34,12 @@ class Sentence:
     functions: dict[str, tuple[str, str, str]]
     plates: dict[str, tuple[str, str, str]]
     positions: dict[str, str]
-    is_whole: bool
+    more_functions: bool
+    more_positions: bool
+
+    @property
+    def is_whole(self) -> bool:
+        return not (self.more_functions or self.more_positions)
 
 
 def sentences(text: str) -> tuple[list[Sentence], int]:
@@ -68,9 +71,9 @@ def _sentence(text: str) -> Sentence:
             assert every, part
             for name, meaning, peak, unit in every:
                 functions[name] = meaning.rpartition(", ")[2], peak, unit
-    is_whole = not re.search(r"and \d+ (errors )?more", words)
+    more = [bool(re.search(rf"and \d+ {word}more", words)) for word in ("errors ", "")]
     assert end.startswith("changes") == (len(plates) + bool(positions) + bool(functions) == 1), text
-    return Sentence(functions, plates, positions, is_whole)
+    return Sentence(functions, plates, positions, *more)
 
 
 class Directions:
@@ -79,9 +82,11 @@ class Directions:
     def __init__(self, expected: Expected):
         problem = self.problem = expected.problem
         self.null = expected.spread.null
+        volume = problem.design.machine.volume
+        self.span = float((volume.upper - volume.lower).max())
         balls, poses = 3 * len(problem.plate_balls), len(problem.free_poses)
         design = problem.design
-        # In metres, by what each parameter moves a point at the most.
+        # In metres, by what each parameter of a plate or position moves a point at the most.
         self.size = np.ones(problem.parameters)
         self.owner: list[tuple[str, str, int]] = []
         for b in problem.plate_balls:
@@ -93,9 +98,6 @@ class Directions:
             self.size[len(self.owner) - 1] = np.ptp(own, axis=0).max() if j >= 3 else 1.0
         for function in problem.functions:
             self.owner += [("function", function.name, power) for power in range(function.free)]
-            if function.zero_at_one:
-                start = len(self.owner) - function.free
-                self.size[start : len(self.owner)] = 0.25
         assert balls + poses + len(problem.a) == len(self.owner)
 
     def allowed(self, sentence: Sentence) -> NDArray[np.bool_]:
@@ -106,124 +108,169 @@ class Directions:
         for kind, name, place in self.owner:
             if kind == "function":
                 degree = DEGREES.get(degrees.get(name, ""), 0)
-                found.append(name in degrees and place + 1 + zero_at_one[name] <= degree)
+                is_named = name in degrees and place + 1 + zero_at_one[name] <= degree
+                found.append(is_named or (sentence.more_functions and name not in degrees))
             elif kind == "position":
-                found.append(name in sentence.positions)
+                found.append(name in sentence.positions or sentence.more_positions)
             else:
                 found.append(name in sentence.plates)
         return np.array(found)
 
-    def moving_only(self, sentence: Sentence) -> tuple[Real, float]:
-        """Null directions (n, k) that move nothing unnamed, and how far they move it, relative."""
+    def moving_only(self, sentence: Sentence) -> Real:
+        """Null directions (n, k) that move nothing unnamed."""
         orthonormal = np.linalg.qr(self.null * self.size[:, None])[0]
         unnamed = orthonormal[~self.allowed(sentence)]
-        if not len(unnamed):
-            return orthonormal / self.size[:, None], 0.0
         _, values, rows = np.linalg.svd(unnamed, full_matrices=True)
         values = np.concatenate([values, np.zeros(len(rows) - len(values))])
-        kept = values < 1e-7
-        rest = 0.0
-        if not kept.any():
-            kept = values < UNPRINTED
-            rest = float(values[kept].max(initial=0.0))
-        return orthonormal @ rows[kept].T / self.size[:, None], rest
+        return np.asarray(orthonormal @ rows[values < 1e-7].T / self.size[:, None])
+
+    def moves_all(self, sentence: Sentence, basis: Real) -> bool:
+        """Whether directions (n, k) move all that a sentence names."""
+        named = {"function": sentence.functions, "plate": sentence.plates}
+        named["position"] = sentence.positions
+        moved = (np.abs(basis) * self.size[:, None]).max(axis=1, initial=0.0) > 1e-7
+        moving = {
+            (kind, name) for (kind, name, _), one in zip(self.owner, moved, strict=True) if one
+        }
+        return all((kind, name) in moving for kind, names in named.items() for name in names)
+
+    @staticmethod
+    def powers(function: dense.Function, t: Real) -> Real:
+        """Values (t, free) of an error function for each of its coefficients."""
+        powers = np.stack([t**k for k in range(1, function.coefficients)], axis=1)
+        return np.asarray(powers @ dense.monomial_matrix(function))
 
     def curve(self, direction: Real, name: str) -> Real:
-        """Values of an error function along its axis, at 201 places."""
+        """Values (201, ...) of an error function along its axis."""
         chosen = [
             k for k, (kind, own, _) in enumerate(self.owner) if (kind, own) == ("function", name)
         ]
         function = next(one for one in self.problem.functions if one.name == name)
-        t = np.linspace(0.0, 1.0, 201)
-        powers = np.stack([t**k for k in range(1, function.coefficients)], axis=1)
-        return np.asarray(powers @ dense.monomial_matrix(function) @ direction[chosen])
+        return np.asarray(self.powers(function, np.linspace(0.0, 1.0, 201)) @ direction[chosen])
 
     def pose(self, direction: Real, name: str) -> Real:
-        """Shift and rotation vector (6,) of a position."""
-        values = np.zeros(6)
+        """Shift and rotation vector (6, ...) of a position."""
+        values = np.zeros((6, *direction.shape[1:]))
         for k, (kind, own, place) in enumerate(self.owner):
             if (kind, own) == ("position", name):
                 values[place] = direction[k]
         return values
 
     def balls(self, direction: Real, name: str) -> tuple[Real, Real]:
-        """Places and movements (n, 3) of a plate's balls."""
+        """Places (n, 3) and movements (3 n, ...) of a plate's balls."""
         chosen = [
             k for k, (kind, own, _) in enumerate(self.owner) if (kind, own) == ("plate", name)
         ]
         members = [self.owner[k][2] for k in chosen[::3]]
-        return self.problem.balls[members], direction[chosen].reshape(-1, 3)
+        return self.problem.balls[members], direction[chosen]
 
 
-def peak(values: Real) -> float:
-    """The largest value of a curve, with its sign."""
-    return float(values[np.abs(values).argmax()])
-
-
-def resolved(directions: Directions, sentence: Sentence) -> tuple[Real, float] | None:
-    """The one direction with the printed amounts, and how far it moves what is not named; None
-    where the words leave several.
+@dataclass(frozen=True)
+class Described:
+    """The direction (n,) of a sentence, and what half of the last digit of each amount that it
+    comes from changes of it (n, amounts).
     """
-    basis, rest = directions.moving_only(sentence)
-    assert basis.shape[1], "what is named cannot move without a change of observations"
-    if not sentence.functions:
-        return None
-    name, (_, told, unit) = next(iter(sentence.functions.items()))
-    wanted = float(told) * FACTORS[unit]
-    if basis.shape[1] == 1:
-        direction = basis[:, 0]
-        return direction * wanted / peak(directions.curve(direction, name)), rest
-    # Amounts of straight lines, at the end of their axes, fix what the names leave open.
-    rows, amounts = [], []
-    for name, (shape, told, unit) in sentence.functions.items():
-        if shape == "linear":
-            rows.append([directions.curve(one, name)[-1] for one in basis.T])
-            amounts.append(float(told) * FACTORS[unit])
-    if not rows or np.linalg.matrix_rank(np.array(rows), 1e-6) < basis.shape[1]:
-        return None
-    return basis @ np.linalg.lstsq(np.array(rows), np.array(amounts), rcond=None)[0], rest
+
+    direction: Real
+    doubts: Real
 
 
-def judge(directions: Directions, sentence: Sentence, direction: Real, rest: float) -> None:
+def resolved(directions: Directions, sentence: Sentence) -> Described | None:
+    """The one direction that moves nothing unnamed and has the printed amounts of errors; None
+    where there is none or several.
+    """
+    basis = directions.moving_only(sentence)
+    count = basis.shape[1]
+    if not count or not directions.moves_all(sentence, basis):
+        return None
+    curves = {name: directions.curve(basis, name) for name in sentence.functions}
+    # Straight lines are largest at their ends; where others are follows from these.
+    at = {name: -1 for name, (shape, _, _) in sentence.functions.items() if shape == "linear"}
+    if count == 1:
+        at = {name: int(np.abs(curve[:, 0]).argmax()) for name, curve in curves.items()}
+    for _ in range(10):
+        rows = np.array([curves[name][place] for name, place in at.items()])
+        if not at or np.linalg.matrix_rank(rows, 1e-6) < count:
+            return None
+        amounts, halves = np.array([amount_of(*sentence.functions[name][1:]) for name in at]).T
+        inverse = np.linalg.pinv(rows / halves[:, None])
+        mixture = inverse @ (amounts / halves)
+        at = {name: int(np.abs(curve @ mixture).argmax()) for name, curve in curves.items()}
+    if (np.abs(rows @ mixture - amounts) > 1.2 * halves).any():
+        # What is described has parts, too, that are not printed.
+        return None
+    return Described(basis @ mixture, basis @ inverse)
+
+
+def amount_of(figure: str, unit: str) -> tuple[float, float]:
+    """A printed amount and half of its last digit, in metres or radians.
+
+    >>> amount_of("-250", "µm")
+    (-0.00025, 5e-07)
+    """
+    value = float(figure)
+    return value * FACTORS[unit], 0.5 * step_of(value, DIGITS) * FACTORS[unit]
+
+
+def judge(directions: Directions, sentence: Sentence, described: Described) -> None:
     """Every amount, axis and shape of a sentence, for the direction that it describes."""
+    direction, doubts = described.direction, described.doubts
     largest = float(np.abs(direction * directions.size).max())
 
-    def same(told: str, value: float, unit: str) -> None:
-        # What is printed starts from an amount of three digits, and leaves out what hardly moves.
-        value /= FACTORS[unit]
-        step = step_of(value, DIGITS) + 0.004 * abs(value)
-        slack = 3.0 * rest * largest / FACTORS[unit]
-        assert within(told, value, step + 2.0 * slack), (sentence, told, value)
+    def same(told: str, value: float, doubt: float, unit: str) -> None:
+        # `doubt` is what the digits leave open from which the value is computed.
+        value, doubt = value / FACTORS[unit], doubt / FACTORS[unit]
+        step = step_of(value, DIGITS) + doubt / 0.6
+        assert within(told, value, step), (sentence, told, value, doubt)
 
     for name, (shape, told, unit) in sentence.functions.items():
         values = directions.curve(direction, name)
         assert unit == ("µrad" if name[1] in "ABC" else "µm")
-        same(told, peak(values), unit)
+        place = int(np.abs(values).argmax())
+        doubt = sum(abs(directions.curve(one, name)[place]) for one in doubts.T)
+        same(told, float(values[place]), doubt, unit)
         t = np.linspace(0.0, 1.0, 201)
         left = values - np.polyval(np.polyfit(t, values, max(DEGREES[shape] - 1, 0)), t)
         assert np.abs(left).max() > 1e-4 * np.abs(values).max(), (name, shape)
     for name, told in sentence.positions.items():
         pose = directions.pose(direction, name)
-        amounts = re.findall(rf"({NUMBER}) (µm|µrad)(?: (along|about) ([xyz]))?", told)
+        of_doubts = np.array([directions.pose(one, name) for one in doubts.T])
+        amounts = POSE_AMOUNT.findall(told)
         units = [unit for _, unit, _, _ in amounts]
-        for part, unit in ((pose[:3], "µm"), (pose[3:], "µrad")):
-            size = float(np.linalg.norm(part))
+        parts = {"µm": slice(0, 3), "µrad": slice(3, 6)}
+        doubt_of = {
+            unit: float(np.linalg.norm(of_doubts[:, part], axis=1).sum())
+            for unit, part in parts.items()
+        }
+        for unit, part in parts.items():
+            size = float(np.linalg.norm(pose[part]))
             if unit not in units:
-                assert size < 1e-3 * largest + rest * largest, (name, told, part)
+                least = 1e-3 * largest + doubt_of[unit]
+                assert size < least, (name, told, pose[part])
         assert amounts, (name, told)
         for figure, unit, word, axis in amounts:
-            part = pose[:3] if unit == "µm" else pose[3:]
-            same(figure, float(np.linalg.norm(part)), unit)
+            part = pose[parts[unit]]
+            size, doubt = float(np.linalg.norm(part)), doubt_of[unit]
+            same(figure, size, doubt, unit)
+            # A doubt turns a vector of a size by this at the most.
+            turned = doubt / size
             if word:
                 assert word == ("along" if unit == "µm" else "about")
-                along = abs(part[AXES.index(axis)]) / np.linalg.norm(part)
-                assert along > 0.998 - rest, (name, told, part)
-            elif rest == 0.0:
-                assert np.abs(part).max() < 0.9995 * np.linalg.norm(part), (name, told, part)
+                along = abs(part[AXES.index(axis)]) / size
+                assert along > 0.998 - turned, (name, told, part)
+            elif turned < 0.01:
+                assert np.abs(part).max() < 0.9995 * size, (name, told, part)
     for name, (words, figure, unit) in sentence.plates.items():
         places, moved = directions.balls(direction, name)
-        same(figure, float(np.linalg.norm(moved, axis=1).max()), unit)
-        if rest == 0.0:
+        moved = moved.reshape(-1, 3)
+        of_balls = [
+            np.linalg.norm(directions.balls(one, name)[1].reshape(-1, 3), axis=1)
+            for one in doubts.T
+        ]
+        sizes = np.linalg.norm(moved, axis=1)
+        doubt = float(np.sum(of_balls, axis=0).max())
+        same(figure, float(sizes.max()), doubt, unit)
+        if doubt < 1e-2 * sizes.max():
             _judge_deformation(words, places, moved)
 
 

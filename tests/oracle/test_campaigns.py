@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import fdtrc, fdtri, stdtr, stdtrit
 
 from tests.oracle.campaigns import AXES, Fitted, campaign_file, fitted, planned
 from tests.oracle.printed import (
@@ -253,21 +253,58 @@ class Difference:
         return float(value), float(u)
 
     def of_function(self, name: str, share: str) -> tuple[float, float]:
-        t, figures = float(share) / 100.0, []
-        for one in self.maps:
-            names = [
-                f"{name} t^{power}"
-                for power in range(1, 4)
-                if f"{name} t^{power}" in one.names["U3"]
-            ]
-            powers = np.array([t ** int(each[-1]) for each in names])
-            value = powers @ np.array([one.estimates[each] for each in names])
-            rows = one.linear(one.functions["U3"])
-            root = (
-                one.sigma * rows[[one.names["U3"].index(each) for each in names]] @ one.spread.root
-            )
-            figures.append((value, np.linalg.norm(powers @ root)))
+        figures = [
+            [float(part[0]) for part in one.curve(name, np.array([float(share) / 100.0]))]
+            for one in self.maps
+        ]
         return figures[1][0] - figures[0][0], math.hypot(figures[0][1], figures[1][1])
+
+
+def judge_joint_test(text: str, first: Fitted, second: Fitted) -> None:
+    """One test of all that two maps say of all probes at points through the volume, whatever the
+    frame and the offsets of the probes.
+    """
+    line = re.search(
+        rf"^errors through the volume, one joint test: chi-squared ({NUMBER}) of (\d+) independent"
+        rf" differences \(sigma of (\d+) degrees of freedom\), p = (below )?({NUMBER}): ",
+        text,
+        re.M,
+    )
+    assert line is not None
+    volume = first.problem.design.machine.volume
+    points = np.random.default_rng(7).uniform(volume.lower, volume.upper, (25, 3))
+    blocks, values, roots = [], [], []
+    middle = points - points.mean(axis=0)
+    for k, name in enumerate(PROBES):
+        block = np.zeros((len(points), 3, 3 + 3 * len(PROBES)))
+        for axis in range(3):
+            block[:, :, axis] = np.cross(np.eye(3)[axis], middle)
+            block[:, axis, 3 + 3 * k + axis] = 1.0
+        blocks.append(block.reshape(-1, block.shape[2]))
+        (one, root), (other, other_root) = (
+            each.corrected(points, offset_of(name)) for each in (first, second)
+        )
+        values.append((other - one).ravel())
+        roots.append(np.hstack([root, other_root]))
+    free = np.linalg.qr(np.vstack(blocks))[0]
+    whole = np.vstack(roots)
+    left = whole - free @ (free.T @ whole)
+    difference = np.concatenate(values)
+    vectors, sizes, _ = np.linalg.svd(left, full_matrices=False)
+    kept = sizes > 1e-7 * sizes[0]
+    count = int(kept.sum())
+    statistic = float(((vectors[:, kept].T @ difference / sizes[kept]) ** 2).sum())
+    assert int(line[2]) == count
+    # The directions that are known best follow the point at which both maps are linear.
+    assert within(line[1], statistic, step_of(statistic, 4) + 0.01 * statistic)
+    freedom = [one.degrees_of_freedom for one in (first, second)]
+    # Of campaigns of one plan the variances are alike: Welch's formula for shares of one ratio, and
+    # Fisher's distribution for the sum of both residuals.
+    share = first.sigma**2 / (first.sigma**2 + second.sigma**2)
+    welch = 1.0 / (share**2 / freedom[0] + (1.0 - share) ** 2 / freedom[1])
+    assert abs(int(line[3]) - welch) < 1.0
+    chance = float(fdtrc(count, sum(freedom), float(line[1]) / count))
+    assert not line[4] and float(line[5]) == pytest.approx(chance, rel=0.06)
 
 
 def test_diff(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
@@ -278,6 +315,7 @@ def test_diff(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
     text = output_of(capsys, *line, "--csv", out)
     data = json.loads(output_of(capsys, *line, "--json"))
     assert f"U = {k:g} u, E_n = difference / U" in text and data["coverage_factor"] == k
+    judge_joint_test(text, first, second)
     motion, u_motion = found.by(found.to_motion)
     for row, told, value, u in zip(
         table(text, "free motion"), data["motion"], motion, u_motion, strict=False
@@ -336,14 +374,17 @@ def test_diff(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_adjust(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     expected, _, fit = measured(path, capsys, 3)
+    second, _, after_fit = measured(path, capsys, 4)
     volume = expected.problem.design.machine.volume
     lower, upper = volume.lower, volume.upper
     size = upper - lower
     changes = {"scale": 22e-6, "turn": 12.0 * FACTORS["arcsec"]}
+    # Nobody adjusted the machine, which the second campaign shows.
     line = ["adjust", fit, "--scale", "x=22 um/m", "--turn", "y-x=12 arcsec"]
-    line += ["--uncertainty", "2%"]
-    text = output_of(capsys, *line)
-    data = json.loads(output_of(capsys, *line, "--json"))["quantities"]
+    line += ["--uncertainty", "2%", "--after", after_fit]
+    text = output_of(capsys, *line, status=1)
+    whole = json.loads(output_of(capsys, *line, "--json", status=1))
+    data = whole["quantities"]
     rows = {row[0]: row[1:] for row in table(text, "quantity ")}
     weights: dict[str, list[tuple[Real, Real, Real]]] = {}
     for i, axis in enumerate(AXES):
@@ -359,13 +400,23 @@ def test_adjust(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         start, end = np.where(up, lower, upper), np.where(up, upper, lower)
         weights[f"diagonal {signs}"] = [(end, start, (end - start) / np.linalg.norm(end - start))]
     assert list(rows) == list(data) == list(weights)
+    ends = np.array(
+        [point for parts in weights.values() for end, start, _ in parts for point in (end, start)]
+    )
+    # Of the tip of the map's probe.
+    both = [
+        (value, root.reshape(*value.shape, -1))
+        for value, root in (one.corrected(ends, offset_of("right")) for one in (expected, second))
+    ]
+    apart_of, roots, first = [], [], 0
     for name, parts in weights.items():
-        points = np.array([point for end, start, _ in parts for point in (end, start)])
+        which = slice(first, first := first + 2 * len(parts))
+        points = ends[which]
         row = np.array([sign * w for _, _, w in parts for sign in (1.0, -1.0)])
-        # Of the tip of the map's probe.
-        value, root = expected.corrected(points, offset_of("right"))
-        before = float((row * (value - points)).sum())
-        u = float(np.linalg.norm(row.ravel() @ root))
+        (before, root), (found, other) = (
+            ((row * (value[which] - points)).sum(), np.tensordot(row, blocks[which], 2))
+            for value, blocks in both
+        )
         # X reads more, so that true lengths less readings fall; Y leans towards -X.
         apart = points - lower
         moved = {
@@ -374,19 +425,58 @@ def test_adjust(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         }
         effects = [float((row * moves).sum()) for moves in moved.values()]
         after = before + sum(effects)
+        u, u_found = np.linalg.norm(root), np.linalg.norm(other)
         u_after = math.hypot(u, *(0.02 * one for one in effects))
         told = data[name]
         assert told["unit"] == {"s": "1", "a": "rad", "d": "m"}[name[0]]
-        for key, figures in (("before", (before, u)), ("predicted", (after, u_after))):
+        shown = {"before": (before, u), "predicted": (after, u_after), "found": (found, u_found)}
+        for key, figures in shown.items():
             assert told[key]["value"] == pytest.approx(figures[0], abs=2e-3 * figures[1]), name
             assert told[key]["standard_uncertainty"] == pytest.approx(figures[1], rel=1e-3), name
-        unit = rows[name][4]
+        error = (found - after) / (2.0 * math.hypot(u_after, u_found))
+        assert told["normalised_error"] == pytest.approx(error, rel=2e-3, abs=2e-3), name
+        assert within(rows[name][6], error, step_of(error, 4) + 5e-3 * (1.0 + abs(error))), name
+        unit = rows[name][7]
         assert unit == {"s": "µm/m", "a": "arcsec", "d": "µm"}[name[0]]
-        shown = [before, 2 * u, after, 2 * u_after]
-        for figure, right, spread in zip(rows[name], shown, (u, u, u_after, u_after), strict=False):
+        cells_of = [
+            one
+            for value, spread in shown.values()
+            for one in ((value, spread), (2 * spread, spread))
+        ]
+        for figure, (right, spread) in zip(rows[name], cells_of, strict=False):
             right /= FACTORS[unit]
             slack = 5e-3 * spread / FACTORS[unit]
             assert within(figure, right, step_of(right, 4) + slack), (name, figure, right)
+        if name[0] != "d":
+            apart_of.append(found - after)
+            roots.append(np.concatenate([root, [0.02 * one for one in effects], other]))
+    judge_comparison(whole, text, np.array(apart_of), np.array(roots), expected)
+    # Both campaigns have the same freedom, by which every figure is widened alike.
+    assert second.degrees_of_freedom == expected.degrees_of_freedom
+
+
+def judge_comparison(
+    data: dict[str, Any], text: str, apart: Real, roots: Real, expected: Fitted
+) -> None:
+    """How scales and angles compare together, of two campaigns with the same degrees of freedom."""
+    freedom, count = expected.degrees_of_freedom, len(apart)
+    squares = apart @ np.linalg.solve(roots @ roots.T, apart)
+    overall = math.sqrt(squares / (count * fdtri(count, freedom, 0.95)))
+    largest = max(1.0, -float(stdtrit(freedom, 0.005 / data["compared"])) / 2.0)
+    errors = [one["normalised_error"] for one in data["quantities"].values()]
+    assert data["compared"] == len(errors)
+    assert data["overall"] == pytest.approx(overall, rel=1e-2)
+    assert data["largest_by_chance"] == pytest.approx(largest, rel=1e-6)
+    assert data["within"] is (overall <= 1.0 and max(map(abs, errors)) <= largest) is False
+    told = re.search(
+        rf"^not as predicted: \|E_n\| at most ({NUMBER}) \(of (\d+), above ({NUMBER}) at most once in"
+        rf" a hundred\), overall ({NUMBER}) ",
+        text,
+        re.M,
+    )
+    assert told is not None
+    assert agrees(told[1], max(map(abs, errors)), 3) and int(told[2]) == len(errors)
+    assert agrees(told[3], largest, 3) and agrees(told[4], data["overall"], 3)
 
 
 def test_budget(path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,7 +37,7 @@ def judge_text(text: str, expected: Expected) -> None:
         factor = FACTORS[shown]
         assert agrees(maximum, np.nanmax(values) / factor), (symbol, row)
         assert agrees(average, np.nanmean(values) / factor), (symbol, row)
-        _judge_name(rest[1], values, names)
+        judge_name(rest[1], values, names)
     told = dict(re.findall(r"point (\d+) at (\([^)]*\) mm)", text))
     named = {number for row in of_table for number in re.findall(r"point (\d+)", row[-1])}
     assert set(told) == named
@@ -46,7 +46,7 @@ def judge_text(text: str, expected: Expected) -> None:
         assert np.abs(np.array(place(where)) - points[int(number) - 1]).max() < 0.051e-3
 
 
-def _judge_name(name: str, values: Any, names: list[str]) -> None:
+def judge_name(name: str, values: Any, names: list[str]) -> None:
     """The named one is as large as any, and the first of those that are equal but for rounding."""
     largest = np.nanmax(values)
     equal = [names[k] for k in np.flatnonzero(values > largest * (1 - 1e-5))]
@@ -68,7 +68,7 @@ def judge_data(data: dict[str, Any], expected: Expected) -> None:
             continue
         np.testing.assert_allclose(one["maximum"], np.nanmax(values), rtol=1e-6)
         np.testing.assert_allclose(one["average"], np.nanmean(values), rtol=1e-6)
-        _judge_name(one["largest_at"], values, names)
+        judge_name(one["largest_at"], values, names)
         if symbol in ("U4", "U6"):
             numbers = re.findall(r"point (\d+)", one["largest_at"])
             assert [re.findall(r"point (\d+) at", told) for told in one["largest_places"]] == [

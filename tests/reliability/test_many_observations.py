@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from ballplate.gross_errors import effects
 from ballplate.gross_errors.leftover import entries, leftover
+from ballplate.gross_errors.patterns import patterns
 from ballplate.gross_errors.redundancy import reliability
+from ballplate.gross_errors.response import responses
 from ballplate.results.study import fit
+from ballplate.simulator.estimation.functions import BallPlaces, Distances, displacements
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -60,3 +65,28 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
         and "fit the means of repeated" in found.cautions[0]
     )
     assert found.estimates == tested.estimates and not found.diagnosis
+
+
+def test_time_is_in_proportion_to_readings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a large plate a batch of observations moves the balls of its distances, and no others;
+    what a result has of all biases is computed once.
+    """
+    (experiment,) = load(QUICKSTART)
+    monkeypatch.setattr(effects, "MOST_PLACES", 5)
+    at = linearise(lay_out(experiment))
+    given = patterns(at.design, at.state, None)
+    places = BallPlaces(np.arange(25))
+    changes = effects.changes_of(at, Distances(places), given)(np.array([3, 7]))
+    assert len(changes.common) == 3 * len({0, 6, 12, 18, 24, 3, 7})
+    every = displacements(at, places, narrow=False)
+    apart = every.places[changes.first] - every.places[changes.second]
+    unit = apart / np.linalg.norm(apart, axis=1)[:, None]
+    for response in responses(at, given):
+        own = np.einsum("nde,kne->knd", every.own, response.own.toarray().reshape(-1, 25, 3))
+        moved = np.einsum("ndr,kr->knd", every.common, response.common) + own
+        change = np.einsum("fd,kfd->kf", unit, moved[:, changes.first] - moved[:, changes.second])
+        expected = np.abs(change).max(axis=1)
+        np.testing.assert_allclose(changes.largest(response).change, expected, rtol=1e-7, atol=1e-9)
+    found = reliability(experiment)
+    assert found.minimal_detectable is found.minimal_detectable
+    assert found.found_by_fit is found.found_by_fit

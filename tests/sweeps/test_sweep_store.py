@@ -399,13 +399,13 @@ def with_own_model(folder: Path, name: str, values: str) -> Path:
 
 def test_what_a_users_model_imports_counts(tmp_path: Path) -> None:
     path = with_own_model(tmp_path, "imports_another", "[false]")
-    assert run("sweep", path).returncode == 0
+    assert run("sweep", path, "--workers", 1).returncode == 0
     (tmp_path / "imports_another_helper.py").write_text("SIZE = 4\n", encoding="utf-8")
     changed = run("sweep", path)
     assert (
         changed.returncode == 3 and "imports_another_helper.py: another content" in changed.stderr
     )
-    assert run("sweep", path, "--beside").returncode == 0
+    assert run("sweep", path, "--beside", "--workers", 1).returncode == 0
     store = open_store(tmp_path / "small.sqlite")
     few, more = (results(store, k).figures["parameters"][0] for k in (1, 2))
     store.close()
@@ -438,10 +438,8 @@ def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> N
             *command("sweep", name, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
         ]
         subprocess.run(command_line, cwd=where, env=environment, capture_output=True, check=False)
-    assert (
-        run("sweep", tmp_path / "sweeps" / "s.yaml", "--store", tmp_path / "3.sqlite").returncode
-        == 1
-    )
+    elsewhere = ("--store", tmp_path / "3.sqlite", "--workers", 1)
+    assert run("sweep", tmp_path / "sweeps" / "s.yaml", *elsewhere).returncode == 1
     first = rows(tmp_path / "1.sqlite")
     assert first["reason"][2].startswith("../quickstart.yaml:41:5: positions[1]: ")
     for k in (2, 3):

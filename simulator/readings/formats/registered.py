@@ -7,7 +7,7 @@ from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
-from ...inputs.decoding import decoded
+from ...inputs.decoding import text_and_encoding
 from ...inputs.messages import refused
 from ...inputs.settings import hint, listing
 from ...inputs.yamltree import GivenText, read_bytes
@@ -63,7 +63,7 @@ def read_report(
         if name not in chosen:
             raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
         return chosen[name].read(content, file, unit)
-    text = decoded(content, file)[0]
+    text = text_and_encoding(content, file)[0]
     found = recognised(text)
     if found is not None:
         return found.read(content, file, unit)
