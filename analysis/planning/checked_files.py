@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from .repair.scale import ScaleCertificate
     from .requirements.goals import Goal
 
+WITH_MODULES = "leave --no-modules out if you trust the file"
+
 
 @dataclass(frozen=True)
 class CheckedDesign:
@@ -71,7 +73,8 @@ class Wanted:
         if self.with_modules:
             return OPENED
         here, own = Path.cwd(), path.resolve().parent
-        return Trust(within=here if own.is_relative_to(here) else own)
+        within = here if own.is_relative_to(here) else own
+        return Trust(within=within, remedy=WITH_MODULES)
 
 
 @dataclass(frozen=True)
