@@ -49,7 +49,7 @@ if TYPE_CHECKING:
         write_map,
     )
     from .estimators.estimator_choice import ESTIMATORS
-    from .results.variance_components.groupings import GROUPINGS
+    from .results.groupings import GROUPINGS
     from .simulator.experiment.model import Experiment
     from .stores import stored, sweep, sweep_report
     from .sweeps.running import OtherSweepError
@@ -106,7 +106,7 @@ _PLACES = {
     "ESTIMATORS": "ballplate.estimators.estimator_choice",
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
-    "GROUPINGS": "ballplate.results.variance_components.groupings",
+    "GROUPINGS": "ballplate.results.groupings",
     "OtherSweepError": "ballplate.sweeps.running",
     "StoreError": "ballplate.sweeps.store_file",
     "stored": "ballplate.stores",

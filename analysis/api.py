@@ -39,7 +39,7 @@ from .estimators.estimator_choice import (
     misused,
     takers,
 )
-from .results.variance_components.groupings import GROUPINGS, Grouping
+from .results.groupings import GROUPINGS, Grouping
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
 
@@ -181,7 +181,7 @@ def check(
     >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
     ('goal not met: average U6 at most 0.1 µm; average U6 0.1426 µm',)
     """
-    from .planning.repair.checked_files import Wanted, checked_design
+    from .planning.checked_files import Wanted, checked_design
     from .planning.requirements.goals import parse_goal
     from .simulator.experiment.load import with_pool
 

@@ -34,6 +34,10 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
         compileall.compile_dir(ROOT / folder, quiet=2)
 os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
 
+# The program takes one thread of linear algebra, dense references would take all: beside other
+# processes these wait for each other a hundred times as long as they compute.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Modules of Python that only POSIX has.
 MODULES = ("fcntl", "pty", "resource", "termios")
 # What only POSIX has: pipes with names, links that anybody may make, groups of processes, devices,

@@ -20,6 +20,8 @@ from ballplate.results.fit import Fit
 from ballplate.simulator.computing.steps import ProgressStep
 from matplotlib.colors import to_hex
 
+from tests.sweeps.support import small_sweep
+
 QUICKSTART = "designs/quickstart.yaml"
 MACHINE = "designs/park/machines/npl-like.yaml"
 TABLE = "designs/gilsinn/table-1.csv"
@@ -280,9 +282,7 @@ def test_every_function_reports_steps_alike(tmp_path: Path) -> None:
         lambda report: bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability", report=report),
         lambda report: bp.compare(QUICKSTART, trials=2, points=5, report=report),
         lambda report: bp.lengths(QUICKSTART, "1 um", grid=3, report=report),
-        lambda report: bp.sweep(
-            "designs/sweeps/plate-size.yaml", tmp_path / "a.sqlite", report=report
-        ),
+        lambda report: bp.sweep(small_sweep(tmp_path, 2), tmp_path / "a.sqlite", report=report),
     ):
         told: list[ProgressStep] = []
         call(told.append)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..results.variance_components.groupings import GROUPINGS
+from ..results.groupings import GROUPINGS
 from .common import add_json, show, single
 from .outputs import UsageError
 from .reading_options import add_readings, observed_readings, warn_of

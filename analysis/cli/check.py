@@ -15,7 +15,7 @@ from .outputs import UsageError
 from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
-    from ..planning.repair.checked_files import CheckedFile
+    from ..planning.checked_files import CheckedFile
     from ..planning.requirements.goals import Goal
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
@@ -102,7 +102,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..planning.repair.checked_files import Wanted, check_files
+    from ..planning.checked_files import Wanted, check_files
     from .common import print_json
     from .file_patterns import matching_files
     from .progress import progress
@@ -154,10 +154,12 @@ def _name_suggestions(checked: CheckedFile, options: Namespace) -> None:
 
 
 def _goals(options: Namespace) -> tuple[Goal, ...]:
-    from ..planning.requirements.goals import GoalError, parse_goal
-
     if options.share is not None and "lengths" not in options.goal:
         raise UsageError("--share goes with --goal lengths; add it")
+    if not options.goal:
+        return ()
+    from ..planning.requirements.goals import GoalError, parse_goal
+
     with_share = {"lengths": options.share}
     try:
         return tuple(parse_goal(text, with_share.get(text)) for text in options.goal)

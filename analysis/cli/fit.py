@@ -15,7 +15,7 @@ from ..estimators.estimator_choice import (
     misused,
     takers,
 )
-from ..results.variance_components.groupings import GROUPINGS
+from ..results.groupings import GROUPINGS
 from .common import (
     add_json,
     add_page,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
-from ..planning.repair.checked_files import CheckedDesign, CheckedFile
+from ..planning.checked_files import CheckedDesign, CheckedFile
 from ..results.parts import scale_lines, scale_warnings, target_lines, verdict_lines
 
 

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 from ballplate.simulator.inputs.messages import in_one_line
 
-from ..planning.repair.checked_files import CheckedDesign, CheckedFile
+from ..planning.checked_files import CheckedDesign, CheckedFile
 from ..results.parts import verdict_lines
 
 # No XML document can hold these, not even as character references.

@@ -11,7 +11,7 @@ from pathlib import Path
 from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.yamltree import read_text
 
-from ..planning.repair.checked_files import CheckedDesign, CheckedFile, Wanted, advised, check_files
+from ..planning.checked_files import CheckedDesign, CheckedFile, Wanted, advised, check_files
 from ..planning.repair.mending import mended, to_write
 from ..planning.repair.repair_tables import changes_in_words
 from .outputs import check_overwritten, write_outputs

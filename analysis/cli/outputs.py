@@ -238,7 +238,7 @@ def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
 
 def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
     """Files that the options name and that are not written, and those that these files name."""
-    from ..sweeps.named_files import named_by
+    from ballplate.simulator.experiment.named_files import named_by
 
     for name, path in named_paths(options):
         if name in outputs:

@@ -59,7 +59,8 @@ def told(options: Namespace) -> Iterator[None]:
     if not options.verbose:
         yield
         return
-    from ..sweeps.task import versions
+    from ballplate.simulator.computing.versions import versions
+
     from .outputs import inputs
 
     for name, version in versions():

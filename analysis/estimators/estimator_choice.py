@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
     from ..presentation.result import FitResult
-    from ..results.variance_components.groupings import Grouping
+    from ..results.groupings import Grouping
 
 EstimatorName = Literal[
     "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"

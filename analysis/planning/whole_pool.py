@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
@@ -17,8 +17,9 @@ from ballplate.simulator.inputs.settings import listing
 from ..rank.verdict import Verdict
 from ..results.study import check
 from .information import Information
-from .repair.repair_search import Repair, repairs
-from .repair.repair_tables import changed_names, changes_in_words
+
+if TYPE_CHECKING:
+    from .repair.repair_search import Repair
 
 # Names of errors, and cures, that are told.
 MOST_NAMES, MOST_CURES = 8, 2
@@ -54,6 +55,8 @@ class PoolGap:
     @property
     def words(self) -> str:
         """What stays open, by the names of the errors."""
+        from .repair.repair_tables import changed_names
+
         null = self.verdict.null
         names = dict.fromkeys(name for direction in null for name in changed_names(direction))
         count = "one direction" if len(null) == 1 else f"{len(null)} directions"
@@ -65,6 +68,8 @@ class PoolGap:
     @property
     def remedy(self) -> str:
         """What would determine it."""
+        from .repair.repair_tables import changes_in_words
+
         if self.verdict.as_expected:
             return "the file expects that"
         if not self.sought:
@@ -80,6 +85,8 @@ class PoolGap:
         return f"what would determine {all_of_it}, offered or done beside these: {told}"
 
     def to_dict(self) -> dict[str, Any]:
+        from .repair.repair_tables import changes_in_words
+
         return {
             "deficiency": self.verdict.deficiency,
             "undetermined": [str(one) for one in self.verdict.null],
@@ -121,6 +128,8 @@ def pool_gap(
         return None
     size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
     is_sought = size <= MOST_WORK and not judged.as_expected
+    from .repair.repair_search import repairs
+
     try:
         found = repairs(design, report=report) if is_sought else None
     except UNTOLD:

@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.model import Experiment
 
 from ..error_maps.length_map import length_map, length_settings
 from ..gross_errors.redundancy import reliability_of
-from ..planning.repair.checked_files import Wanted, checked_design
+from ..planning.checked_files import Wanted, checked_design
 from ..planning.sheet import sheet_of
 from ..presentation.pages.design_page import DesignContents, design_page
 from ..rank.motions import null_motions, weak_motions

@@ -26,8 +26,8 @@ from ..uncertainty.quantities import evaluation_points, task_distances
 from ..uncertainty.tasks import expansion
 from .adjustments import few_degrees_of_freedom
 from .fit import Fit
+from .groupings import Grouping
 from .source_sums import SourceSums, source_sums, sources_of
-from .variance_components.groupings import Grouping
 
 # Evaluation points of which all distances are looked at; of more, some are chosen evenly.
 MOST_PLACES = 200

@@ -25,7 +25,6 @@ from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
 from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
-from ..presentation.pages.fit_page import fit_page
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
@@ -42,7 +41,7 @@ from .estimates import (
     estimate_rows,
     labels,
 )
-from .fit_contents import fit_contents
+from .groupings import GROUPINGS, Grouping
 from .map_of_fit import counted_twice, map_of
 from .parts import (
     adjustment_data,
@@ -61,7 +60,6 @@ from .parts import (
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals, residual_groups
-from .variance_components.groupings import GROUPINGS, Grouping
 
 if TYPE_CHECKING:
     import pandas
@@ -323,6 +321,9 @@ class Fit(FitResult):
             raise ValueError(
                 "the fit does not know its experiment, which a page names; fit it anew"
             )
+        from ..presentation.pages.fit_page import fit_page
+        from .fit_contents import fit_contents
+
         return fit_page(
             fit_contents(
                 self.experiment,

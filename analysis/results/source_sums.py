@@ -26,8 +26,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 
-from .variance_components.groupings import Grouping
-from .variance_components.groups import ObservationGroup, groups_of, kinds_of_rows
+from .groupings import Grouping
+from .observation_groups import ObservationGroup, groups_of, kinds_of_rows
 
 # Lengths of standards are formed of readings and compared with certificates; each row mixes both.
 READ_STANDARDS = "readings of length standards"

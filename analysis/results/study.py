@@ -23,9 +23,9 @@ from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, adjustments
+from .groupings import Grouping
 from .influences import influence_uncertainties
 from .prediction import Prediction
-from .variance_components.groupings import Grouping
 
 if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -123,9 +123,9 @@ def fit(
     from .campaign_sigmas import campaign_sigmas
     from .estimates import estimated_functions, parameter_estimates
     from .fit import Fit, lack_of_fit
+    from .observation_groups import groups_of, reweighted
     from .plates import plate_coordinates
     from .residuals import largest_residuals
-    from .variance_components.groups import groups_of, reweighted
 
     is_estimated = (sigma or experiment.sigma) == "estimated"
     campaigns = campaign_sigmas(experiment, observed) if is_estimated and not reweight else None

@@ -17,6 +17,7 @@ from typing import Any
 
 from ballplate.simulator.computing.steps import Report
 from ballplate.simulator.experiment.changes import node_of
+from ballplate.simulator.experiment.named_files import named_in
 from ballplate.simulator.experiment.variants import node_at
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import Trust
@@ -27,7 +28,6 @@ from ..presentation.formatting import finite
 from ..sweeps.bundle import Bundle, bundle_of, names_of, unpack
 from ..sweeps.load import load_sweep
 from ..sweeps.local import local_runner
-from ..sweeps.named_files import named_in
 from ..sweeps.running import SweepResult, compute_sweep, enter, result_of, writable_store
 from ..sweeps.store import Store
 from .actions import ActionError, value_of

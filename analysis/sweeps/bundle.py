@@ -13,11 +13,12 @@ from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from ballplate.simulator.experiment.modules import python_models
+from ballplate.simulator.experiment.named_files import is_rooted
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.yamltree import Node, read_tree, to_list, to_python
 
 from .model import Sweep
-from .named_files import is_rooted, named_files
+from .named_files import named_files
 
 # Of all files together, as they are kept in the store and sent to workers.
 MOST_BYTES = 100_000_000

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import platform
 import time
 import traceback
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.memory import want_of_memory
 from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.versions import versions
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.unusable import UnusableError
@@ -239,29 +238,3 @@ def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[s
         add("sum_of_squares", outcome.misfit.mean)
     figures["degrees_of_freedom"] = float(outcome.misfit.degrees_of_freedom)
     return figures
-
-
-@cache
-def versions() -> tuple[tuple[str, str], ...]:
-    """Versions of what the figures were computed with."""
-    import importlib.metadata
-
-    import numpy.linalg  # noqa: F401
-    import scipy
-    import scipy.linalg
-    from threadpoolctl import threadpool_info
-
-    blas = sorted(
-        {
-            f"{one['internal_api']} {one.get('version')} {one.get('architecture', '')}".strip()
-            for one in threadpool_info()
-            if one["user_api"] == "blas"
-        }
-    )
-    return (
-        ("ballplate", importlib.metadata.version("ballplate")),
-        ("python", platform.python_version()),
-        ("numpy", np.__version__),
-        ("scipy", scipy.__version__),
-        ("blas", "; ".join(blas)),
-    )

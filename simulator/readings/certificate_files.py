@@ -12,6 +12,7 @@ is of) and value:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +44,6 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, read_table
 from ..inputs.yamltree import GivenText, read_text
 from ..machines.protocol import Array, ErrorModel
-from .other_files import is_calibration_table
 from .simulated import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
@@ -278,3 +278,18 @@ def _unknown(row: FileRow, known: list[CertifiedValue]) -> str:
         )
     names = [f"{one.first}, {one.second}" for one in own]
     return f'{item} has no "{first}, {second}"; {hint(f"{first}, {second}", names)}'
+
+
+def is_calibration_table(source: GivenText) -> bool:
+    """Whether a table has the certified values of one calibration, which name no item."""
+    names = headings(source.text)
+    of_pairs = names >= {"first", "second", "value"}
+    return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
+
+
+def headings(text: str) -> set[str]:
+    """Names of the columns in the first line that is no comment, without their units."""
+    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
+    line = next(lines, "")
+    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
+    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}

@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 
 from ..inputs.yamltree import GivenText
+from .certificate_files import headings
 from .formats.registered import recognised
 from .formats.report import Format
 
@@ -47,18 +48,3 @@ def what_it_is(source: GivenText) -> str:
 def is_program(form: Format, text: str) -> bool:
     """Whether a file of a format moves a machine, and has nothing that was measured."""
     return form.name == "dmis" and not re.search(r"^[ \t]*FA\(", text, re.MULTILINE)
-
-
-def is_calibration_table(source: GivenText) -> bool:
-    """Whether a table has the certified values of one calibration, which name no item."""
-    names = headings(source.text)
-    of_pairs = names >= {"first", "second", "value"}
-    return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
-
-
-def headings(text: str) -> set[str]:
-    """Names of the columns in the first line that is no comment, without their units."""
-    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
-    line = next(lines, "")
-    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
-    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}

@@ -26,8 +26,6 @@ from .coordinate_kinds import controller_offsets
 from .heading_words import heading, is_clock
 from .headings import Vocabulary
 from .name_matching import with_known_names
-from .other_files import what_it_is
-from .report_sources import report_rows, with_coordinates
 from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
@@ -79,6 +77,8 @@ def source_rows(
     }
 
     def of_report(source: Source, text: GivenText) -> TableRows | None:
+        from .report_sources import report_rows
+
         return report_rows(source, text, design, settings, units)
 
     d = design.dimension
@@ -90,7 +90,11 @@ def source_rows(
     if messages:
         return SourceRows(tuple(rows), (), settings)
     _refuse_wrong_times(sources, tables)
-    settings, said = with_coordinates(settings, sources, tables)
+    said: tuple[str, ...] = ()
+    if any(table.coordinates is not None for table in tables):
+        from .report_sources import with_coordinates
+
+        settings, said = with_coordinates(settings, sources, tables)
     diameters = [d for table in tables for d in table.diameters]
 
     def places(own: Sequence[FileRow]) -> Array:
@@ -188,6 +192,8 @@ def read_source(
     except ExperimentError:
         if (report := of_report(source, text)) is not None:
             return report
+        from .other_files import what_it_is
+
         # Who names columns knows what the file is.
         if settings.columns is None and (other := what_it_is(text)):
             raise refused(source, other, line=1) from None

@@ -87,7 +87,9 @@ def all_pairs(experiment: Experiment, **changes: object) -> np.ndarray:
 def test_every_length_against_a_dense_computation(experiment: Experiment) -> None:
     design = lay_out(experiment)
     problem = dense.planned(design, 4, 4)
-    expected = dense.standard_uncertainties(problem, dense.linearised(problem))["U6"]
+    expected = dense.standard_uncertainties(problem, dense.linearised(problem), symbols=["U6"])[
+        "U6"
+    ]
     found = all_pairs(experiment)
     np.testing.assert_array_equal(found[:, :2], list(combinations(range(18), 2)))
     np.testing.assert_allclose(found[:, 3], expected, rtol=1e-8)

@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import json
 import shutil
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ballplate import quickstart
+import yaml
+from ballplate import experiment
 from ballplate.simulator.experiment.layout import lay_out
 
 from tests.reference import dense
@@ -55,7 +57,7 @@ def said(*arguments):
 
 folder = Path(sys.argv[1])
 places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
-start = bp.quickstart()
+start = bp.load(folder / "base.yaml")
 pool = start.with_(pool={"candidates": [places | {"probes": ["down"]}]})
 sweep, store = str(folder / "sweep.yaml"), str(folder / "store")
 said("sweep", sweep, "--store", store, "--workers", "1")
@@ -78,6 +80,15 @@ print(json.dumps({
 """
 
 
+def small() -> dict[str, Any]:
+    """The quickstart with few balls, coefficients and points."""
+    found: dict[str, Any] = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text("utf-8"))
+    found["artefacts"]["plate"]["balls"] = [4, 4]
+    found["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    found["evaluation"]["points"] = {"random": 20, "seed": 1}
+    return found
+
+
 def package(folder: Path) -> Path:
     """A copy of the package, and the file of quantities in it."""
     return package_copy(folder) / "uncertainty" / "quantities.py"
@@ -88,7 +99,7 @@ def told(folder: Path) -> dict[str, Any]:
     work = folder / "work"
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
-    shutil.copy(TOP / "designs" / "quickstart.yaml", work / "base.yaml")
+    (work / "base.yaml").write_text(yaml.safe_dump(small()), encoding="utf-8")
     (work / "sweep.yaml").write_text(SWEEP)
     return said_by_copy(folder, SCRIPT, work)
 
@@ -107,12 +118,13 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict
     return added, told(folder)
 
 
+@cache
 def diagonals() -> np.ndarray:
     """Standard uncertainties of the four lengths between opposite corrected corners, by the dense
     reference.
     """
-    design = lay_out(quickstart())
-    problem = dense.planned(design, 5, 5)
+    design = lay_out(experiment(small()))
+    problem = dense.planned(design, 3, 3)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (
         design.machine.volume.size
     )

@@ -16,6 +16,8 @@ import pandas
 import pytest
 from ballplate.cli import main
 from ballplate.gross_errors.leftover import Leftover, leftover
+from ballplate.results.groupings import GROUPINGS, Grouping
+from ballplate.results.observation_groups import ObservationGroup, groups_of, reweighted
 from ballplate.results.variance_components.components import (
     AS_STATED,
     LARGER,
@@ -24,8 +26,6 @@ from ballplate.results.variance_components.components import (
     judged,
     told_apart,
 )
-from ballplate.results.variance_components.groupings import GROUPINGS, Grouping
-from ballplate.results.variance_components.groups import ObservationGroup, groups_of, reweighted
 from ballplate.results.variance_components.restricted_likelihood import (
     at_ratios,
     estimated_ratios,

@@ -16,7 +16,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.cli.github import annotation_lines, in_message, in_property
 from ballplate.cli.junit import junit_report
-from ballplate.planning.repair.checked_files import CheckedFile, check_files
+from ballplate.planning.checked_files import CheckedFile, check_files
 from ballplate.planning.repair.repair_search import Repairs, repairs
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import Message

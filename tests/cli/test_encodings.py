@@ -58,6 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lines = (ROOT / "designs/quickstart.yaml").read_text(encoding="utf-8").splitlines()
     text = "\n".join(f"title: '{TITLE}'" if line.startswith("title:") else line for line in lines)
     text = text.replace("z low", "µ ü").replace("_coefficients: 5", "_coefficients: 3")
+    text = text.replace("balls: [5, 5]", "balls: [3, 3]")
     (top / "plate.yaml").write_text(text, encoding="utf-8")
     lines = (ROOT / "designs/park/machines/gec-like.yaml").read_text(encoding="utf-8").splitlines()
     text = "\n".join(f"title: '{TITLE}'" if line.startswith("title:") else line for line in lines)
@@ -65,7 +66,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (top / "machine.yaml").write_text(text, encoding="utf-8")
     (top / "sizes.yaml").write_text(
         f"title: '{TITLE}'\nbase: plate.yaml\naxes: {{µ: {{paths: ['artefacts.plate.balls[0]',"
-        " 'artefacts.plate.balls[1]'], values: [4, 5]}}\n",
+        " 'artefacts.plate.balls[1]'], values: [3, 4]}}\n",
         encoding="utf-8",
     )
     points = "\n".join(f"{10 * k},{k % 3}" for k in range(30))

@@ -211,7 +211,19 @@ def interrupted(
     return True
 
 
-@pytest.mark.parametrize("name", [*ENDLESS, *ENDING])
+# With workers and without, with files and without, with a store; the others are as these.
+SOME = (
+    "run by two",
+    "plan by one",
+    "plan by two",
+    "sweep by one",
+    "report",
+    "lengths",
+    "reproduce",
+)
+
+
+@pytest.mark.parametrize("name", SOME)
 def test_a_signal_at_a_random_moment(name: str, small: Path, tmp_path: Path, start: Start) -> None:
     chance = random.Random(name)
     arguments, most = (ENDLESS | ENDING)[name]

@@ -128,11 +128,20 @@ def test_options_that_would_be_ignored(capsys: pytest.CaptureFixture[str]) -> No
     assert out == "" and "--trials or --until" in err
 
 
+# Lines of progress come at once.
+IMPATIENT = """
+import sys
+from ballplate.cli import main, progress
+progress.LINE_INTERVAL = 0.0
+sys.exit(main())
+"""
+
+
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_an_interruption_reports_what_is_done(workers: str) -> None:
     arguments = ["run", QUICKSTART, "--trials", "1000000", "--workers", workers, "--json"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "ballplate", *arguments],
+        [sys.executable, "-c", IMPATIENT, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

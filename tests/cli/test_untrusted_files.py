@@ -55,7 +55,7 @@ def test_modules_are_refused_before_they_are_run(
     assert main(["check", "--no-modules", str(path)]) == 3
     told = capsys.readouterr().err
     assert told.startswith(f"{path}:")
-    assert "modules are not allowed here" in told
+    assert "modules are not allowed here; leave --no-modules out" in told
     assert not Path("intruder").exists()
 
 

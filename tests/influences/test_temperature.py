@@ -148,7 +148,7 @@ def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -
     own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
     np.testing.assert_allclose(own, np.sqrt(np.diag(found.covariance))[-16:], rtol=1e-4)
     # Of no use if temperatures had no part in them.
-    without = dense.standard_uncertainties(of)["U6"].mean()
+    without = dense.standard_uncertainties(of, symbols=["U6"])["U6"].mean()
     assert widened["U6"].mean() > 1.1 * without
 
 

@@ -12,8 +12,8 @@ import pytest
 import yaml
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.experiment.named_files import named_by
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.sweeps.named_files import named_by
 
 from tests.observations.test_joint_values import BALLS, Real, covariance_file, written
 from tests.reference import certificates as dcc

@@ -137,7 +137,9 @@ def test_covariance_matters(correlated: tuple[Experiment, Real], tmp_path: Path)
     experiment, covariance = correlated
     of = problem(experiment)
     both = [
-        dense.standard_uncertainties(of, dense.spread(stacked(of, lengths, weight)))["U6"].mean()
+        dense.standard_uncertainties(
+            of, dense.spread(stacked(of, lengths, weight)), symbols=["U6"]
+        )["U6"].mean()
         for weight in (inverse_root(covariance), np.diag(1 / np.sqrt(np.diag(covariance))))
     ]
     assert abs(both[0] / both[1] - 1.0) > 0.05

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from ballplate.planning.checked_files import Wanted, check_files
 from ballplate.planning.repair.changes import Change, ChangeKind, apply_all
-from ballplate.planning.repair.checked_files import Wanted, check_files
 from ballplate.planning.repair.judging import examine, judge
 from ballplate.planning.repair.mending import mended, to_write
 from ballplate.planning.repair.offers import offers

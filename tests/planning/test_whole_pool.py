@@ -12,6 +12,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.planning import whole_pool
 from ballplate.planning.information import pool_information
+from ballplate.planning.repair import repair_search
 from ballplate.planning.repair.changes import ChangeKind, apply_all
 from ballplate.planning.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.results.study import planned_uncertainty
@@ -119,7 +120,7 @@ def test_a_few_candidates_leave_open_what_all_of_them_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the rank of a design with all, for pools at random and for parts of them."""
-    monkeypatch.setattr(whole_pool, "repairs", lambda *_, **__: None)
+    monkeypatch.setattr(repair_search, "repairs", lambda *_, **__: None)
     fewer = told = 0
     for seed in range(60):
         experiment = random_pool(tmp_path, seed).experiment
@@ -161,7 +162,7 @@ def test_words_that_cannot_be_had_do_not_stop_a_plan(
     assert main(arguments) == 1
     told = capsys.readouterr().out
     assert "even all 8 candidates" in told and "what would determine it" in told
-    monkeypatch.setattr(whole_pool, "repairs", refuses)
+    monkeypatch.setattr(repair_search, "repairs", refuses)
     assert main(arguments) == 1
     assert "even all 8 candidates" in capsys.readouterr().out
     monkeypatch.setattr(whole_pool, "MOST_WORK", 1.0)

@@ -20,15 +20,15 @@ from ballplate.reproduction.published import npl
 from ballplate.reproduction.shipped import Shipped
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("trials", [30, pytest.param(100, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     "difference", npl().statements.differences, ids=lambda difference: difference.design
 )
-def test_the_reports_differences_lie_in_the_distribution(difference) -> None:  # type: ignore[no-untyped-def]
+def test_the_reports_differences_lie_in_the_distribution(difference, trials: int) -> None:  # type: ignore[no-untyped-def]
     found = compare_difference(
-        npl(), Shipped(Path("designs/npl")), difference, 100, lambda *_: None
+        npl(), Shipped(Path("designs/npl")), difference, trials, lambda *_: None
     )
-    assert found.agrees and len(found.comparison.rms) == 100
+    assert found.agrees and len(found.comparison.rms) == trials
     print(f"\n{difference.design}: quantiles {QUANTILES} in um")
     for part in found.parts:
         shown = " ".join(f"{1e6 * value:.3f}" for value in np.quantile(part.values, QUANTILES))

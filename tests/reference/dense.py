@@ -12,7 +12,7 @@ right-handed rotations.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import comb
@@ -25,6 +25,7 @@ Real = NDArray[np.float64]
 # Parameters and all that follows from them are complex while derivatives are taken.
 Values = NDArray[Any]
 
+SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 STEP = 1e-30
 OPEN = 1e-7
 
@@ -155,7 +156,7 @@ class Problem:
     balls: Real
     a: Real
 
-    @property
+    @cached_property
     def plate_balls(self) -> list[int]:
         design = self.design
         return [
@@ -164,7 +165,7 @@ class Problem:
             if design.artefacts.is_plate[design.balls.artefact[b]]
         ]
 
-    @property
+    @cached_property
     def free_poses(self) -> list[tuple[int, int]]:
         """Position and place among (origin, rotation vector) of every free pose parameter."""
         design = self.design
@@ -426,13 +427,12 @@ def linearised(problem: Problem) -> Spread:
     return spread(jacobian(lambda step: residuals(problem, step), problem.parameters))
 
 
-def standard_uncertainties(problem: Problem, found: Spread | None = None) -> dict[str, Real]:
-    """Every single standard uncertainty behind U1 to U6."""
-    found = found or linearised(problem)
-    return {
-        symbol: found.of(jacobian(function, problem.parameters))
-        for symbol, function in quantities(problem).items()
-    }
+def standard_uncertainties(
+    problem: Problem, found: Spread | None = None, symbols: Iterable[str] = SYMBOLS
+) -> dict[str, Real]:
+    """Every single standard uncertainty behind U1 to U6, or some of these."""
+    found, functions = found or linearised(problem), quantities(problem)
+    return {symbol: found.of(jacobian(functions[symbol], problem.parameters)) for symbol in symbols}
 
 
 def least_squares_step(problem: Problem) -> tuple[Real, float]:

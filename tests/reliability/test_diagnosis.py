@@ -5,6 +5,7 @@ what is harmless.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -60,16 +61,17 @@ def is_finite(one: Suspect) -> bool:
     )
 
 
+@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", ["ball-bar", "two-dimensions", "bryan-gauge"])
-def test_sizes_are_finite_whatever_reading_is_wrong(name: str) -> None:
+def test_sizes_are_finite_whatever_reading_is_wrong(name: str, every: int) -> None:
     observed, estimated = certified(name)
     found = []
-    for reading, axis in np.ndindex(observed.x.shape):
+    for reading, axis in islice(np.ndindex(observed.x.shape), 0, None, every):
         one = diagnosed(observed.design, with_one_wrong(observed.x, reading, axis), estimated)[1]
         assert all(is_finite(suspect) for suspect in one.suspects), (reading, axis)
         assert "nan" not in " ".join(diagnosis_lines(one))
         found += one.suspects
-    assert len(found) > 10
+    assert len(found) > 10 // every
 
 
 @pytest.mark.parametrize(("reading", "axis"), [(0, 0), (1, 0), (10, 0), (10, 1), (12, 0), (13, 1)])

@@ -123,15 +123,15 @@ def test_some_mutants(trial: Any, numbers: range, folder: Path) -> None:
 
 
 def test_some_sweeps(folder: Path) -> None:
-    try_sweeps(range(40), folder)
+    try_sweeps(range(20), folder)
 
 
 def test_some_tables_of_readings(folder: Path) -> None:
-    try_readings(range(10), folder)
+    try_readings(range(6), folder)
 
 
 def test_some_trees(folder: Path) -> None:
-    try_trees(40, folder)
+    try_trees(20, folder)
 
 
 @pytest.mark.slow

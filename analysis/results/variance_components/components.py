@@ -15,8 +15,8 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ...gross_errors.leftover import leftover, too_many_entries
 from ...presentation.formatting import aligned, finite, number, picked
 from ...presentation.result import Result
-from .groupings import Grouping
-from .groups import ObservationGroup, groups_of
+from ..groupings import Grouping
+from ..observation_groups import ObservationGroup, groups_of
 from .restricted_likelihood import (
     SMALLEST,
     GroupSums,

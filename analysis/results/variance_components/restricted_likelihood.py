@@ -21,7 +21,7 @@ from ballplate.simulator.computing.threads import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ...gross_errors.leftover import Leftover
-from .groups import ObservationGroup
+from ..observation_groups import ObservationGroup
 
 # Ratios of variances that are looked at; outside these, a group has no scatter or no weight.
 SMALLEST, LARGEST = 1e-4, 1e6

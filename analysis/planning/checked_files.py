@@ -18,19 +18,15 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
-from ...results.prediction import Advice, Prediction
-from ...results.study import check, planned_uncertainty
-from ..requirements.goals import Goal, GoalError, check_goal, judge
-from .repair_tables import (
-    certificate_data,
-    certificate_lines,
-    repair_data,
-    repair_lines,
-)
+from ..results.prediction import Advice, Prediction
+from ..results.study import check
 
 if TYPE_CHECKING:
-    from .repair_search import Repairs
-    from .scale import ScaleCertificate
+    from .repair.repair_search import Repairs
+    from .repair.scale import ScaleCertificate
+    from .requirements.goals import Goal
+
+WITH_MODULES = "leave --no-modules out if you trust the file"
 
 
 @dataclass(frozen=True)
@@ -77,7 +73,8 @@ class Wanted:
         if self.with_modules:
             return OPENED
         here, own = Path.cwd(), path.resolve().parent
-        return Trust(within=here if own.is_relative_to(here) else own)
+        within = here if own.is_relative_to(here) else own
+        return Trust(within=within, remedy=WITH_MODULES)
 
 
 @dataclass(frozen=True)
@@ -153,12 +150,12 @@ def checked_design(
     prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
-        from .repair_search import repairs
-        from .scale import scale_certificate
+        from .repair.repair_search import repairs
+        from .repair.scale import scale_certificate
 
         found = repairs(with_pool, report=report)
         certificate = scale_certificate(with_pool, prediction.scale)
-    goals, missed = _goals(experiment, wanted.goals)
+    goals, missed = _judged(experiment, wanted.goals)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (number_of(count, "weakly determined direction"),)
@@ -176,32 +173,30 @@ def checked_design(
 
 def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
     """A design whose prediction tells what it was checked for besides the rank."""
-    prediction, repairs, certificate = design.prediction, design.repairs, design.certificate
-    lines = [*design.goals, *certificate_lines(certificate)]
-    lines += repair_lines(repairs, prediction.verdict)
+    prediction = design.prediction
+    lines = [*design.goals]
     data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
     if with_repairs:
-        data["repairs"] = repair_data(repairs)
-        data["scale_certificate"] = certificate_data(certificate)
+        from .repair.repair_tables import (
+            certificate_data,
+            certificate_lines,
+            repair_data,
+            repair_lines,
+        )
+
+        lines += certificate_lines(design.certificate)
+        lines += repair_lines(design.repairs, prediction.verdict)
+        data["repairs"] = repair_data(design.repairs)
+        data["scale_certificate"] = certificate_data(design.certificate)
     advice = Advice(design.missed, tuple(lines), data)
     return replace(design, prediction=replace(prediction, advice=advice))
 
 
-def _goals(
+def _judged(
     experiment: Experiment, goals: Sequence[Goal]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """How goals are met, in words, and those of them that are not."""
-    found = planned_uncertainty(experiment) if goals else None
-    told, missed = [], []
-    for goal in goals:
-        assert found is not None
-        try:
-            check_goal(goal, found)
-        except GoalError as error:
-            told.append(f"goal not met: {goal}; {error}")
-            missed.append(told[-1])
-            continue
-        judged = judge(goal, found)
-        told.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
-        missed += [] if judged.is_met else [told[-1]]
-    return tuple(told), tuple(missed)
+    if not goals:
+        return (), ()
+    from .requirements.judged_goals import judged_goals
+
+    return judged_goals(experiment, goals)

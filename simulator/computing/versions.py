@@ -1,0 +1,32 @@
+"""Versions of the libraries that figures are computed with."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from functools import cache
+
+
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """Return pairs of a library and its version, BLAS with its architecture."""
+    import numpy
+    import numpy.linalg
+    import scipy
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
+
+    blas = sorted(
+        {
+            f"{one['internal_api']} {one.get('version')} {one.get('architecture', '')}".strip()
+            for one in threadpool_info()
+            if one["user_api"] == "blas"
+        }
+    )
+    return (
+        ("ballplate", importlib.metadata.version("ballplate")),
+        ("python", platform.python_version()),
+        ("numpy", numpy.__version__),
+        ("scipy", scipy.__version__),
+        ("blas", "; ".join(blas)),
+    )
