@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
+import os
 from pathlib import Path
 
-from tests.mutation.score import ROOMS, scored, summary
+from tests.mutation.score import ROOMS, files_of_tests, scored, summary
 
 parser = argparse.ArgumentParser(prog="python -m tests.mutation")
 parser.add_argument("rooms", nargs="*", metavar="ROOM", help=", ".join(ROOMS))
 parser.add_argument("--count", type=int, default=2, help="mutants of each room")
 parser.add_argument("--seconds", type=float, default=600.0, help="begin none after these")
-parser.add_argument("--each", type=float, default=120.0, help="seconds that one may take")
+parser.add_argument("--each", type=float, default=60.0, help="seconds of tests for a mutant")
 parser.add_argument("--store", type=Path, default=Path("mutants.jsonl"), help="results so far")
+parser.add_argument("--tests", nargs="+", default=files_of_tests(), help="files or folders")
 options = parser.parse_args()
 unknown = set(options.rooms) - set(ROOMS)
 if unknown:
     parser.error(f"no room {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
-with tempfile.TemporaryDirectory() as folder:
-    outcomes = scored(
-        options.rooms or list(ROOMS),
-        options.count,
-        options.store,
-        Path(folder),
-        options.seconds,
-        options.each,
-    )
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+outcomes = scored(
+    options.rooms or list(ROOMS),
+    options.count,
+    options.store,
+    options.seconds,
+    options.each,
+    options.tests,
+)
 print("\n".join(summary(outcomes)))
