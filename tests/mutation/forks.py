@@ -18,7 +18,7 @@ import resource
 import signal
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -99,8 +99,10 @@ def probed(every: Sequence[Mutant]) -> set[int]:
     paths: dict[str, dict[int, Mutant]] = {}
     for k, mutant in enumerate(every):
         paths.setdefault(mutant.path, {})[k] = mutant
-    for path, by_number in paths.items():
-        exchange(path, probed_tree(path, by_number, "__reached__"), {"__reached__": places.add})
+    trees = {
+        path: probed_tree(path, by_number, "__reached__") for path, by_number in paths.items()
+    }
+    exchange(trees, {"__reached__": places.add})
     return places
 
 
@@ -124,22 +126,24 @@ def reached(items: Sequence[pytest.Item], every: Sequence[Mutant]) -> Iterator[d
 
 def change(mutant: Mutant) -> None:
     """Make a change in this process."""
-    exchange(mutant.path, changed_tree(mutant), {})
+    exchange({mutant.path: changed_tree(mutant)}, {})
 
 
-def exchange(path: str, tree: ast.Module, names: dict[str, Any]) -> None:
-    """Give the loaded functions of a file the code of a tree, which may use further names."""
-    file = source_of(path)
-    module = importlib.import_module("ballplate." + path.removesuffix(".py").replace("/", "."))
-    vars(module).update(names)
-    codes = dict(_functions(compile(tree, str(file), "exec")))
-    for function in gc.get_objects():
-        if isinstance(function, FunctionType) and Path(function.__code__.co_filename) == file:
-            old = function.__code__
-            function.__code__ = codes.get((old.co_qualname, old.co_firstlineno), old)
-    for cached in gc.get_objects():
-        if isinstance(cached, functools._lru_cache_wrapper):
-            cached.cache_clear()
+def exchange(trees: Mapping[str, ast.Module], names: dict[str, Any]) -> None:
+    """Give the loaded functions of files the codes of trees, which may use further names."""
+    codes: dict[str, dict[tuple[str, int], CodeType]] = {}
+    for path, tree in trees.items():
+        file = str(source_of(path))
+        module = importlib.import_module("ballplate." + path.removesuffix(".py").replace("/", "."))
+        vars(module).update(names)
+        codes[file] = dict(_functions(compile(tree, file, "exec")))
+    for some in gc.get_objects():
+        if isinstance(some, FunctionType) and some.__code__.co_filename in codes:
+            old = some.__code__
+            key = old.co_qualname, old.co_firstlineno
+            some.__code__ = codes[old.co_filename].get(key, old)
+        elif isinstance(some, functools._lru_cache_wrapper):
+            some.cache_clear()
 
 
 def _functions(code: CodeType) -> Iterator[tuple[tuple[str, int], CodeType]]:
