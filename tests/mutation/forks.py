@@ -99,9 +99,7 @@ def probed(every: Sequence[Mutant]) -> set[int]:
     paths: dict[str, dict[int, Mutant]] = {}
     for k, mutant in enumerate(every):
         paths.setdefault(mutant.path, {})[k] = mutant
-    trees = {
-        path: probed_tree(path, by_number, "__reached__") for path, by_number in paths.items()
-    }
+    trees = {path: probed_tree(path, by_number, "__reached__") for path, by_number in paths.items()}
     exchange(trees, {"__reached__": places.add})
     return places
 
