@@ -11,6 +11,8 @@ from ballplate.rank.proposed_bars import bar_directions
 from ballplate.rank.verdict import deformation
 
 GRID = np.array([[0.1 * x, 0.15 * y, 0.0] for x in range(4) for y in range(3)])
+# Equal moments, so that a shear is half a turn and half a symmetric strain.
+SQUARE = np.array([[0.1 * x, 0.1 * y, 0.0] for x in range(3) for y in range(3)])
 BODY = np.array(list(product([0.0, 0.1, 0.2], [0.0, 0.15, 0.3], [0.0, 0.2])))
 X, Y, Z = np.eye(3)
 
@@ -24,9 +26,9 @@ X, Y, Z = np.eye(3)
         (GRID, np.diag([1.0, -0.5, 0.0]), "stretches along its x and shrinks along its y"),
         (GRID, np.diag([1.0, 0.5, 0.0]), "stretches along its x and its y"),
         (GRID, np.diag([1.0, 1.0, 0.0]), "changes its size as a whole"),
-        (GRID, np.outer(X, Y), "shears in its xy plane"),
+        (SQUARE, np.outer(X, Y), "shears in its xy plane"),
         (GRID, np.outer(X, Y) - np.outer(Y, X), "moves as a whole"),
-        (GRID, np.outer(X, X) + np.outer(Y, X), "stretches along its x, shears in its xy plane"),
+        (SQUARE, np.outer(X, X) + np.outer(Y, X), "stretches along its x, shears in its xy plane"),
         (BODY, np.eye(3), "changes its size as a whole"),
         (BODY, np.diag([1.0, -1.0, 1.0]), "stretches along its x and its z and shrinks along its y"),
         (BODY, np.outer(X, Z), "shears in its xz plane"),

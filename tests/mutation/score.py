@@ -68,7 +68,7 @@ def scored(
     turns = [
         (room, samples[room][k]) for k in range(count) for room in rooms if k < len(samples[room])
     ]
-    kept = {line["mutant"]: Outcome(**line) for line in _lines(store)}
+    kept = {one.mutant: one for one in stored(store)}
     end = time.monotonic() + seconds
 
     def try_each(items: list[pytest.Item]) -> None:
@@ -81,6 +81,11 @@ def scored(
 
     collected(paths, try_each)
     return [kept[mutant.name] for _, mutant in turns if mutant.name in kept]
+
+
+def stored(store: Path) -> list[Outcome]:
+    """The outcomes so far."""
+    return [Outcome(**line) for line in _lines(store)]
 
 
 def summary(outcomes: list[Outcome]) -> list[str]:
@@ -125,20 +130,13 @@ def _reaching(
         and runs[item.nodeid]["passes"]
         and mutant.name in runs[item.nodeid]["reaches"]
     ]
-    # Tests that reach little else are about the mutant's place; the first of each file come before
-    # the second ones, as others notice other things.
+    # Tests that reach little else are about the mutant's place.
     some.sort(key=lambda item: _cost(runs[item.nodeid]))
-    of_file = Counter[Path]()
-    turn = {}
-    for item in some:
-        turn[item] = of_file[item.path]
-        of_file[item.path] += 1
-    some.sort(key=turn.__getitem__)
     total, few = 0.0, []
     for item in some:
-        total += runs[item.nodeid]["seconds"]
-        if total < each or not few:
-            few.append(item)
+        more = total + runs[item.nodeid]["seconds"]
+        if more < each or not few:
+            total, few = more, [*few, item]
     return few
 
 
