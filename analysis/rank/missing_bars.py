@@ -70,7 +70,7 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
         [points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
         2,
     )
-    wanted = without_rigid_motion(points, basis - basis.mean(axis=0))
+    wanted = without_rigid_motion(points, basis)
     flat = fields.reshape(-1, fields.shape[2])
     flat = flat[:, (flat**2).sum(axis=0) > 0.0]
     if not flat.shape[1]:

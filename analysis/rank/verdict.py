@@ -63,7 +63,6 @@ class ArtefactPart:
     name: str
     peak: float
     words: str
-    balls: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -340,10 +339,9 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
         members = design.balls.of(artefact)
         moved = np.linalg.norm(balls[members], axis=1)
         if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
-            touched = tuple(design.balls.names[b] for b in members[above(moved, 0.1 * moved.max())])
             words = deformation(design.balls.places[members], balls[members])
             artefacts.append(
-                ArtefactPart(design.artefacts.names[artefact], float(moved.max()), words, touched)
+                ArtefactPart(design.artefacts.names[artefact], float(moved.max()), words)
             )
     probes = []
     for k, columns in enumerate(layout.offset_columns):

@@ -113,17 +113,14 @@ def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
 
 
 def relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
-    """Places, displacements, those along undetermined directions, and places as drawn, without what
-    all do together.
+    """Places, displacements and those along undetermined directions without what all do together,
+    and places as drawn.
     """
-    if not len(moved.places):
-        return moved.places, moved.common, moved.null, moved.drawn
-    places, drawn = moved.places - moved.places.mean(axis=0), moved.drawn - moved.drawn.mean(axis=0)
     return (
-        places,
-        without_rigid_motion(places, moved.common),
-        without_rigid_motion(drawn, moved.null),
-        drawn,
+        moved.places,
+        without_rigid_motion(moved.places, moved.common),
+        without_rigid_motion(moved.drawn, moved.null),
+        moved.drawn,
     )
 
 

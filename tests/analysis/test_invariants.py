@@ -57,6 +57,14 @@ def judged(
     return uncertainties(at, sigma), at, at.layout
 
 
+def test_all_uncertainties_are_in_proportion_to_sigma() -> None:
+    design = small_design()
+    one, twice = (judged(design, sigma)[0] for sigma in (1.0, 2.0))
+    for symbol, quantity in one.items():
+        assert twice[symbol].maximum == pytest.approx(2.0 * quantity.maximum), symbol
+        assert twice[symbol].average == pytest.approx(2.0 * quantity.average), symbol
+
+
 def assert_same(found: Quantity, expected: Quantity, relative: float = 1e-9) -> None:
     assert found.count == expected.count
     assert found.maximum == pytest.approx(expected.maximum, rel=relative)

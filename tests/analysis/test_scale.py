@@ -13,7 +13,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation.functions import Distances, MeasuredPoints, linear_functions
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
@@ -257,3 +258,32 @@ def test_a_certificate_is_suggested_and_does_what_is_told(
     assert f"average U6 {1e6 * average:.4f} µm with 1 µm on the probe offsets" in told
     assert main(["check", str(file), "--suggest"]) == 0
     assert "warning" not in capsys.readouterr().out
+
+
+def with_points(at: Linearisation, points: np.ndarray) -> Linearisation:
+    """The same with other evaluation points (n, d)."""
+    evaluation = replace(at.design.evaluation, points=points)
+    return replace(at, design=replace(at.design, evaluation=evaluation))
+
+
+def test_the_scale_is_the_mean_change_of_distances_also_in_a_plane() -> None:
+    """Weighted by their squares; of one point or none, or of points that coincide, that of the
+    corners of the volume.
+    """
+    at = linearise(lay_out(load("designs/quickstart.yaml")[0]))
+    volume = at.design.machine.volume
+    corners = np.array(list(itertools.product(*zip(volume.lower, volume.upper, strict=True))))
+    for few in (corners[:0], corners[:1], corners[[3, 3]]):
+        np.testing.assert_array_equal(
+            scale_row(with_points(at, few)), scale_row(with_points(at, corners))
+        )
+    for points in (corners, corners[:4], corners[[0, 2, 6]]):
+        moved = with_points(at, points)
+        pairs = np.stack(np.triu_indices(len(points), 1), axis=1)
+        probes = np.full(len(points), at.design.evaluation.probe)
+        distances = Distances(MeasuredPoints(points, probes), pairs, ("",) * len(pairs))
+        changes = linear_functions(moved, distances).shared
+        places = MeasuredPoints(points, probes).at(at.design, at.state)
+        lengths = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+        row = (lengths @ changes) / (lengths**2).sum()
+        np.testing.assert_allclose(scale_row(moved), row, atol=1e-6 * np.abs(row).max())

@@ -95,6 +95,9 @@ def test_what_is_neglected_is_told(beta: float) -> None:
         assert wrong < values.std() * (neglected / 1e-7 + 4 / np.sqrt(200))
     # A warning is due where the bound is noticeable, and it is a bound that is nearly reached.
     assert (noisy[0].bias > 0.5) == (beta > 5e-4)
+    # A linear function whose coefficients are as what is neglected changes by all of it.
+    size = np.sqrt((noisy[0].neglected ** 2).sum())
+    assert noisy[0].bias == pytest.approx(size / noisy[0].scatter)
 
 
 @pytest.mark.parametrize("beta", [1e-3, 0.2, -0.7])

@@ -12,6 +12,7 @@ from ballplate.simulator.machines.bases import (
     Spline,
     whole_values,
 )
+from ballplate.simulator.machines.basis_settings import SplineSettings
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
@@ -157,3 +158,17 @@ def test_constrained_ends_hold_for_every_function_and_for_no_fewer(basis: Spline
     assert basis.size == 0 or np.linalg.cond(ours) < 1e3
     np.testing.assert_allclose(ours - wanted @ (wanted.T @ ours), 0.0, atol=1e-12)
     np.testing.assert_allclose(basis.values(T), all_(T) @ ours, atol=1e-12)
+
+
+@pytest.mark.parametrize("knots", [(0.5, 0.3), (0.5, 1.2), (-0.1, 0.5), (0.0,), (1.0,)])
+def test_knots_out_of_order_or_range_are_refused(knots: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="out of order or range"):
+        Spline(4, knots)
+
+
+@pytest.mark.parametrize("slopes", [{"start": 0}, {"end": 0}, {"start": 0, "end": 0}])
+def test_slopes_of_zero_are_held_at_the_ends_that_state_them(slopes: dict[str, int]) -> None:
+    spline = SplineSettings(knots=(0.3, 0.6), slopes=slopes).spline()
+    for at, other, end in ((0.0, 1e-6, "start"), (1.0, 1.0 - 1e-6, "end")):
+        change = np.abs(np.diff(spline.values(np.array([at, other])), axis=0)).max()
+        assert (change < 1e-10) == (end in slopes)

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.reference.package_copies import TOP
+
 COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.GtE,
     ast.GtE: ast.Lt,
@@ -57,6 +59,33 @@ def mutants(path: Path, name: str) -> list[Mutant]:
 
 def mutated(path: Path, mutant: Mutant) -> str:
     """The source of a file with the change."""
+    return ast.unparse(_changed_tree(path, mutant))
+
+
+def changed_tree(mutant: Mutant) -> ast.Module:
+    """The module of a file of the package with the change."""
+    return _changed_tree(source_of(mutant.path), mutant)
+
+
+def probed_tree(path: str, by_number: dict[int, Mutant], probe: str) -> ast.Module:
+    """The module of a file where each place of a change calls a probe with the change's number."""
+    tree = ast.parse(source_of(path).read_text(encoding="utf-8"))
+    nodes = list(ast.walk(tree))
+    for number, mutant in by_number.items():
+        node = nodes[mutant.node]
+        value = node.value if isinstance(node, ast.Return) else node
+        call = ast.Call(ast.Name(probe, ast.Load()), [ast.Constant(number)], [])
+        pair = ast.Tuple([call, value], ast.Load())
+        _exchange(tree, value, ast.Subscript(pair, ast.Constant(1), ast.Load()))
+    return ast.fix_missing_locations(tree)
+
+
+def source_of(path: str) -> Path:
+    """The file of a path below the package."""
+    return TOP / path if path.startswith("simulator/") else TOP / "analysis" / path
+
+
+def _changed_tree(path: Path, mutant: Mutant) -> ast.Module:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     nodes = list(ast.walk(tree))
     target = nodes[mutant.node]
@@ -67,12 +96,16 @@ def mutated(path: Path, mutant: Mutant) -> str:
     ]
     changed = _changed(target, mutant.kind, within[-1])
     assert changed is not None
+    _exchange(tree, target, changed)
+    return ast.fix_missing_locations(tree)
 
+
+def _exchange(tree: ast.Module, target: ast.AST, changed: ast.AST) -> None:
     class Exchange(ast.NodeTransformer):
         def visit(self, node: ast.AST) -> ast.AST:
             return changed if node is target else self.generic_visit(node)
 
-    return ast.unparse(ast.fix_missing_locations(Exchange().visit(tree)))
+    Exchange().visit(tree)
 
 
 def drawn(every: list[Mutant], count: int, seed: int) -> list[Mutant]:

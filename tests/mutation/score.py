@@ -1,154 +1,175 @@
 """The share of random mutants that tests notice, by room.
 
-Each mutant is made in a copy of the package, and the tests of its room are run against the copy, in
-one process, until one of them fails. Results are kept in a file, a line each, so that a run that was
-stopped goes on where it was.
+Each test runs once to learn which mutants it reaches. The fast tests that reach a mutant then run
+with it, the fastest first, until one of them fails. Both are kept in files, a line each, so that a
+run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import time
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
-from tests.mutation.mutants import Mutant, drawn, mutants, mutated
-from tests.reference.package_copies import TOP, package_copy
+import pytest
 
-# Folders of a room below the package, and fast tests of it; those of the oracle are of all.
+from tests.mutation.forks import change, collected, first_failure, in_fork, reached
+from tests.mutation.mutants import Mutant, drawn, mutants, source_of
+
 ROOMS = {
-    "estimation": (("simulator/estimation",), ("tests/estimation/test_against_dense.py",)),
-    "design": (
-        ("simulator/design",),
-        ("tests/observations/test_joint_values.py", "tests/influences/test_temperature.py"),
-    ),
-    "geometry": (("simulator/geometry",), ("tests/geometry",)),
-    "machines": (("simulator/machines",), ("tests/machines",)),
-    "uncertainty": (
-        ("uncertainty",),
-        ("tests/analysis/test_tasks.py", "tests/analysis/test_scale.py"),
-    ),
-    "rank": (
-        ("rank",),
-        ("tests/analysis/test_bar_directions.py", "tests/analysis/test_canonical.py"),
-    ),
-    "montecarlo": (("montecarlo",), ("tests/montecarlo/test_noise.py",)),
-    "results": (
-        ("results",),
-        ("tests/analysis/test_budget.py", "tests/maps/test_correct.py"),
-    ),
-    "planning": (
-        ("planning",),
-        ("tests/planning/test_smallest_budgets.py", "tests/planning/test_information.py"),
-    ),
+    **{name: f"simulator/{name}" for name in ("estimation", "design", "geometry", "machines")},
+    **{name: name for name in ("uncertainty", "rank", "montecarlo", "results", "planning")},
 }
-ORACLE = "tests/oracle"
+# Tests of what runs as a process or in a browser, or would run all others, do not see a mutant.
+BLIND = ("benchmarks", "docs", "mutation", "robustness", "studio", "sweeps")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Whether the tests noticed a mutant: "noticed", "survived", or "too long"."""
+    """What the tests did with a mutant: "noticed", "survived", "unreached" or "too long"; the test
+    that failed, if any.
+    """
 
     room: str
     mutant: str
     ended: str
     seconds: float
+    test: str = ""
 
 
 def sample(room: str, count: int, seed: int = 1) -> list[Mutant]:
     """So many mutants of a room at random."""
+    folder = source_of(ROOMS[room])
     every: list[Mutant] = []
-    for folder in ROOMS[room][0]:
-        top, _, rest = folder.partition("/")
-        source = TOP / folder if top == "simulator" else TOP / "analysis" / folder
-        for path in sorted(source.rglob("*.py")):
-            every += mutants(path, f"{folder}/{path.relative_to(source).as_posix()}")
+    for path in sorted(folder.rglob("*.py")):
+        every += mutants(path, f"{ROOMS[room]}/{path.relative_to(folder).as_posix()}")
     return drawn(every, count, seed)
 
 
+def files_of_tests() -> list[str]:
+    """The folders and files of tests that may notice a mutant."""
+    top = Path(__file__).parents[1]
+    folders = [path for path in sorted(top.iterdir()) if path.name not in BLIND]
+    return [str(path) for path in folders if path.is_dir() or path.name.startswith("test_")]
+
+
 def scored(
-    rooms: list[str], count: int, store: Path, copy: Path, seconds: float, each: float = 120.0
+    rooms: list[str], count: int, store: Path, seconds: float, each: float, paths: list[str]
 ) -> list[Outcome]:
     """Outcomes of `count` mutants of each room, those in the store first; no mutant is begun after
-    so many `seconds`, and none may take longer than `each`.
+    so many `seconds`, and the tests that run for one take at most `each` without it.
     """
-    # The last line of a run that was killed may be half a line.
-    text = store.read_text(encoding="utf-8") if store.exists() else ""
-    text = text[: text.rfind("\n") + 1]
-    store.write_text(text, encoding="utf-8")
-    kept = {one.mutant: one for one in (Outcome(**json.loads(line)) for line in text.splitlines())}
-    package = copy / "ballplate"
-    if not package.exists():
-        package_copy(copy)
-    end = time.monotonic() + seconds
-    samples = {room: sample(room, count) for room in rooms}
+    samples = {room: sample(room, count) for room in ROOMS}
     turns = [
         (room, samples[room][k]) for k in range(count) for room in rooms if k < len(samples[room])
     ]
-    found = []
-    for room, mutant in turns:
-        if mutant.name not in kept:
-            if time.monotonic() > end:
-                continue
-            outcome = _tried(room, mutant, package, min(each, seconds))
-            kept[mutant.name] = outcome
-            with store.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(asdict(outcome)) + "\n")
-        found.append(kept[mutant.name])
-    return found
+    kept = {one.mutant: one for one in stored(store)}
+    end = time.monotonic() + seconds
+
+    def try_each(items: list[pytest.Item]) -> None:
+        runs = _runs(items, list(chain(*samples.values())), store.with_suffix(".reach"))
+        for room, mutant in turns:
+            if mutant.name not in kept and time.monotonic() < end:
+                outcome = _tried(room, mutant, _reaching(mutant, items, runs, each), each)
+                kept[mutant.name] = outcome
+                _append(store, [asdict(outcome)])
+
+    collected(paths, try_each)
+    return [kept[mutant.name] for _, mutant in turns if mutant.name in kept]
+
+
+def stored(store: Path) -> list[Outcome]:
+    """The outcomes so far."""
+    return [Outcome(**line) for line in _lines(store)]
 
 
 def summary(outcomes: list[Outcome]) -> list[str]:
-    """The score of each room, and the place of each mutant that was not noticed."""
+    """The score of each room among the mutants that tests reach, and the place of each other one."""
     lines = []
     for room in dict.fromkeys(one.room for one in outcomes):
         of_room = [one for one in outcomes if one.room == room]
-        noticed = sum(one.ended == "noticed" for one in of_room)
-        late = sum(one.ended == "too long" for one in of_room)
-        lines.append(f"{room}: {noticed} of {len(of_room)} noticed, {late} took too long")
+        lines.append(f"{room}: {_score(of_room)}")
         lines += [f"  {one.ended}: {one.mutant}" for one in of_room if one.ended != "noticed"]
-    noticed = sum(one.ended == "noticed" for one in outcomes)
-    return [*lines, f"all rooms: {noticed} of {len(outcomes)} noticed"]
+    return [*lines, f"all rooms: {_score(outcomes)}"]
 
 
-def passes(room: str, copy: Path, each: float = 600.0) -> bool:
-    """Whether the tests of a room pass with the copy of the package as it is."""
-    return _run(room, copy, each) == "survived"
-
-
-def _tried(room: str, mutant: Mutant, package: Path, each: float) -> Outcome:
-    path = package / mutant.path
-    source = path.read_text(encoding="utf-8")
-    original = (
-        TOP / mutant.path
-        if mutant.path.startswith("simulator/")
-        else TOP / "analysis" / mutant.path
+def _score(outcomes: list[Outcome]) -> str:
+    count = Counter(one.ended for one in outcomes)
+    reached = len(outcomes) - count["unreached"]
+    return (
+        f"{count['noticed']} of {reached} reached ones noticed,"
+        f" {count['too long']} took too long, {count['unreached']} not reached"
     )
+
+
+def _runs(items: list[pytest.Item], every: list[Mutant], store: Path) -> dict[str, dict[str, Any]]:
+    """What each test reaches; those that the store has not are run first."""
+    of_these = {"mutants": sorted(one.name for one in every)}
+    if next(_lines(store), None) != of_these:
+        store.write_text(json.dumps(of_these) + "\n", encoding="utf-8")
+    known = {line["test"] for line in _lines(store) if "test" in line}
+    new = [item for item in items if item.nodeid not in known]
+    if new:
+        in_fork(lambda: _append(store, reached(new, every)), 7200.0)
+    return {line["test"]: line for line in _lines(store) if "test" in line}
+
+
+def _reaching(
+    mutant: Mutant, items: list[pytest.Item], runs: dict[str, dict[str, Any]], each: float
+) -> list[pytest.Item]:
+    """The tests that reach a mutant and pass without it, those first that cost least."""
+    some = [
+        item
+        for item in items
+        if item.nodeid in runs
+        and runs[item.nodeid]["passes"]
+        and mutant.name in runs[item.nodeid]["reaches"]
+    ]
+    # Tests that reach little else are about the mutant's place.
+    some.sort(key=lambda item: _cost(runs[item.nodeid]))
+    total, few = 0.0, []
+    for item in some:
+        more = total + runs[item.nodeid]["seconds"]
+        if more < each or not few:
+            total, few = more, [*few, item]
+    return few
+
+
+def _cost(run: dict[str, Any]) -> float:
+    return float((run["seconds"] + 0.05) * len(run["reaches"]))
+
+
+def _tried(room: str, mutant: Mutant, items: list[pytest.Item], each: float) -> Outcome:
+    if not items:
+        return Outcome(room, mutant.name, "unreached", 0.0)
+
+    def try_it() -> list[str | None]:
+        change(mutant)
+        return [first_failure(items)]
+
     start = time.monotonic()
-    try:
-        path.write_text(mutated(original, mutant), encoding="utf-8")
-        ended = _run(room, package.parent, each)
-    finally:
-        path.write_text(source, encoding="utf-8")
-    return Outcome(room, mutant.name, ended, round(time.monotonic() - start, 1))
+    ended = in_fork(try_it, 3 * each)
+    spent = round(time.monotonic() - start, 1)
+    if ended is None:
+        return Outcome(room, mutant.name, "too long", spent)
+    return Outcome(room, mutant.name, "noticed" if ended[0] else "survived", spent, ended[0] or "")
 
 
-def _run(room: str, copy: Path, each: float) -> str:
-    line = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider"]
-    line += ["-m", "not slow and not long and not browser", ORACLE, *ROOMS[room][1]]
-    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
-    environment["OPENBLAS_NUM_THREADS"] = "1"
-    try:
-        done = subprocess.run(
-            line, cwd=TOP, env=environment, capture_output=True, timeout=each, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return "too long"
-    # 2 is a module that cannot be loaded any more; a wrong line or no tests at all are faults of ours.
-    ended = {0: "survived", 1: "noticed", 2: "noticed", 3: "noticed"}
-    if done.returncode not in ended:
-        raise RuntimeError(f"{' '.join(line)}: {done.stdout.decode()}{done.stderr.decode()}")
-    return ended[done.returncode]
+def _lines(store: Path) -> Iterable[Any]:
+    """The lines of a store; the last one of a run that was killed may be half a line."""
+    text = store.read_text(encoding="utf-8") if store.exists() else ""
+    return map(json.loads, text[: text.rfind("\n") + 1].splitlines())
+
+
+def _append(store: Path, lines: Iterable[Any]) -> None:
+    text = store.read_bytes() if store.exists() else b""
+    with store.open("ab") as stream:
+        stream.truncate(text.rfind(b"\n") + 1)
+        for line in lines:
+            stream.write(json.dumps(line).encode() + b"\n")
+            stream.flush()

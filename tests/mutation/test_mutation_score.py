@@ -6,13 +6,18 @@ from __future__ import annotations
 
 import ast
 import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from ballplate.rank import missing_bars
 
-from tests.mutation.mutants import KINDS, mutants, mutated
-from tests.mutation.score import ROOMS, Outcome, passes, scored, summary
-from tests.reference.package_copies import package_copy
+from tests.mutation.forks import change, in_fork
+from tests.mutation.mutants import KINDS, mutants, mutated, source_of
+from tests.mutation.score import Outcome, summary
+from tests.reference.package_copies import TOP
 
 SOURCE = """
 def share(values: list[float], limit: float) -> float:
@@ -20,8 +25,7 @@ def share(values: list[float], limit: float) -> float:
         return 2.0 * max(values) - limit
     return 0.0
 """
-SECONDS = float(os.environ.get("BALLPLATE_MUTATION_SECONDS", "1200"))
-COUNT = int(os.environ.get("BALLPLATE_MUTANTS", "3"))
+COUNT = os.environ.get("BALLPLATE_MUTANTS", "3")
 
 
 def test_each_change_is_one_change(tmp_path: Path) -> None:
@@ -37,26 +41,46 @@ def test_each_change_is_one_change(tmp_path: Path) -> None:
 
 
 def test_a_summary_names_what_was_not_noticed() -> None:
-    outcomes = [Outcome("rank", "a.py:1: sum 3", "noticed", 1.0)]
+    outcomes = [Outcome("rank", "a.py:1: sum 3", "noticed", 1.0, "test_a")]
     outcomes.append(Outcome("rank", "a.py:2: sum 9", "survived", 2.0))
+    outcomes.append(Outcome("rank", "a.py:7: sum 9", "unreached", 0.0))
+    score = "1 of 2 reached ones noticed, 0 took too long, 1 not reached"
     assert summary(outcomes) == [
-        "rank: 1 of 2 noticed, 0 took too long",
+        f"rank: {score}",
         "  survived: a.py:2: sum 9",
-        "all rooms: 1 of 2 noticed",
+        "  unreached: a.py:7: sum 9",
+        f"all rooms: {score}",
     ]
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork, which is missing here")
+def test_a_change_is_made_in_a_fork_only() -> None:
+    """Also where another module imported the function by name before."""
+    name = "rank/proposed_bars.py"
+    of_last = [one for one in mutants(source_of(name), name) if one.kind == "comparison"][-1]
+
+    def changed() -> str:
+        change(of_last)
+        return missing_bars.listed(["a", "b"])
+
+    assert in_fork(changed, 60.0) == "a"
+    assert missing_bars.listed(["a", "b"]) == "a and b"
+    assert in_fork(lambda: 1 / 0, 60.0) is None
+
+
 @pytest.mark.long
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork, which is missing here")
 def test_the_score_of_random_changes(tmp_path: Path) -> None:
-    """The score by room of three mutants each, or as many as BALLPLATE_MUTANTS says, in twenty
-    minutes or BALLPLATE_MUTATION_SECONDS.
+    """The score by room of three mutants each, or as many as BALLPLATE_MUTANTS states, among the
+    tests of two rooms, or all with BALLPLATE_MUTATION_TESTS=tests.
     """
-    copy = tmp_path / "copy"
-    package_copy(copy)
-    assert passes("rank", copy), "without a change the tests have to pass"
-    outcomes = scored(list(ROOMS), COUNT, tmp_path / "mutants.jsonl", copy, SECONDS)
-    print("\n".join(summary(outcomes)))
-    assert outcomes
-    noticed = sum(one.ended == "noticed" for one in outcomes)
-    # What is left are figures that another test would notice, and changes without any effect.
-    assert 2 * noticed > len(outcomes)
+    tests = os.environ.get("BALLPLATE_MUTATION_TESTS", "tests/estimation tests/analysis").split()
+    line = [sys.executable, "-m", "tests.mutation", "--count", COUNT, "--seconds", "1800"]
+    line += ["--store", str(tmp_path / "mutants.jsonl"), "--tests", *tests]
+    done = subprocess.run(line, cwd=TOP, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    ended = re.search(r"all rooms: (\d+) of (\d+) reached ones noticed", done.stdout)
+    assert ended is not None
+    # What is left are figures that a slower test would notice, and changes without any effect.
+    assert 4 * int(ended[1]) > 3 * int(ended[2]) > 0
