@@ -192,8 +192,11 @@ class Reliability(Result):
 
     def size(self, k: int) -> float:
         """About how far, in metres, a unit of a bias moves what it is about."""
-        extent = float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0))
-        return 1.0 if self.patterns.unit(k) == "m" else max(extent, 1e-3)
+        return 1.0 if self.patterns.unit(k) == "m" else self._extent
+
+    @cached_property
+    def _extent(self) -> float:
+        return max(float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0)), 1e-3)
 
 
 def _lines(result: Reliability, with_all: bool) -> list[str]:
@@ -390,6 +393,7 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     lines = []
     hidden = np.flatnonzero(result.information <= 0.0).tolist()
     harmless = [k for k in hidden if result.is_harmless(k)]
+    dangerous = sorted(set(hidden).difference(harmless))
     if harmless:
         told = _listed(name(result.patterns, k) for k in harmless)
         which = "it changes no determined distance" if result.deficiency else "no distance changes"
@@ -397,7 +401,7 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
             f"cannot be detected, harmless: {told}: {which}, between balls or corrected points"
             f"{_of_probes(result.design)}"
         )
-    for k in [k for k in hidden if k not in set(harmless)][: 4 * MOST]:
+    for k in dangerous[: 4 * MOST]:
         unit = result.patterns.unit(k)
         parts = [
             f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} µm per {SHOWN[unit]}"

@@ -187,7 +187,7 @@ class Fit(FitResult):
             lines += ["", *self.variance_components.lines()]
             lines += [REWEIGHTED] if self.is_reweighted else []
         lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
-        lines += [*task_table(self.tasks), ""] if self.tasks else []
+        lines += [*task_table(self.tasks, self.lack_of_fit.caveat), ""] if self.tasks else []
         rows = [["parameter", "value", "standard uncertainty", "unit"]]
         for estimate in (one for one in self.estimates if one.kind not in ("origin", "ball")):
             value, unit = amount_of(estimate.value, estimate.unit)

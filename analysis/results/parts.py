@@ -78,8 +78,8 @@ def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list
     return lines
 
 
-def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
-    """Measuring tasks as lines of text."""
+def task_table(tasks: Sequence[TaskUncertainty], caveat: str = "") -> list[str]:
+    """Measuring tasks as lines of text; a `caveat` is added to what is said of the target."""
     expanded = f"expanded (k = {tasks[0].expansion:g}), µm"
     rows = [
         ["task", "length, mm", "standard uncertainty, µm", expanded, "target, µm", "within target"]
@@ -98,7 +98,7 @@ def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
     by = next(
         (uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), ""
     )
-    note = [f"(the target is compared with the {by})"] if with_target else []
+    note = [f"(the target is compared with the {by}{caveat})"] if with_target else []
     return [*aligned(rows, [False, True, True, True, True, False]), *note]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..design.observations.calibration import Calibration
+from ..inputs.decoding import refuse_long_lines
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.trust import OPENED, Trust
@@ -63,6 +64,8 @@ def load(
     """
     source = Path(path)
     refused: list[Message] = []
+    if text is not None:
+        refuse_long_lines(text, source)
     written = read_text(source) if text is None else text
     root, trees, base_problems = trees_of(written, source, refused)
     if not trees:

@@ -207,7 +207,7 @@ def _check_squares(settings: MapSettings, problems: Problems) -> None:
     for key, stated in (("sigma", settings.sigma), ("lack_of_fit", settings.lack_of_fit)):
         if stated is None or stated.sum_of_squares is None:
             continue
-        found = settings.sigma.value**2 * stated.degrees_of_freedom
+        found = settings.sigma.value * settings.sigma.value * stated.degrees_of_freedom
         if not math.isclose(stated.sum_of_squares, found, rel_tol=SAME_SQUARES):
             text = (
                 f"contradicts sigma, whose square times {stated.degrees_of_freedom} degrees of"

@@ -126,7 +126,7 @@ class FittedMap:
         if self.lack_of_fit is not None:
             return self.lack_of_fit
         freedom = self.degrees_of_freedom if self.sigma_is_estimated else 0
-        return LackOfFit(self.sigma**2 * freedom, freedom)
+        return LackOfFit(self.sigma * self.sigma * freedom, freedom)
 
     @property
     def conversion_residual(self) -> float | None:

@@ -40,7 +40,7 @@ def campaign_of(fitted: FittedMap, file: str) -> EarlierCampaign:
     """The campaign of a map; that of an older one whose sigma was estimated follows from that."""
     squares, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
     if squares is None and fitted.sigma_is_estimated:
-        squares = fitted.sigma**2 * freedom
+        squares = fitted.sigma * fitted.sigma * freedom
     if squares is not None and squares < LEAST_SIGMA**2 * freedom:
         squares = None
     return EarlierCampaign(file, fitted.sigma, freedom, squares, fitted.sum_of_squares is not None)

@@ -11,7 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from ..experiment.readings_section import Coordinate, ReadingsSettings
-from ..inputs.decoding import LINE_END, decoded, refuse_controls
+from ..inputs.decoding import (
+    END_OF_FILE,
+    LINE_END,
+    refuse_controls,
+    refuse_long_lines,
+    text_and_encoding,
+)
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import (
     LENGTH_UNITS,
@@ -75,8 +81,11 @@ def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[Give
     """
     if isinstance(source, GivenText):
         return source, ""
-    text, found = decoded(read_bytes(source), source, encoding)
-    return GivenText(str(source), text), found
+    text, found = text_and_encoding(read_bytes(source), source, encoding)
+    # A report in XML may be a single line.
+    if not text.lstrip().startswith("<"):
+        refuse_long_lines(text, source)
+    return GivenText(str(source), text.rstrip(END_OF_FILE)), found
 
 
 def read_any_table(

@@ -360,6 +360,9 @@ def test_a_report_in_xml_may_be_one_line(tmp_path: Path) -> None:
     path = tmp_path / "long.qif"
     path.write_text(" ".join(text.splitlines()) + MOST_IN_LINE * " ", encoding="utf-8")
     assert len(bp.read_report(path).to_frame())
+    with pytest.raises(ExperimentError) as caught:
+        bp.fit(bp.quickstart(), path)
+    assert "in a line" not in str(caught.value)
 
 
 def test_the_longest_lines() -> None:

@@ -172,6 +172,14 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         1,
         "contradicts sigma, whose square times",
     ),
+    "sigma beyond numbers": (
+        lambda text: re.sub(
+            'sigma: {"value": [^,]+', 'sigma: {"value": 1e200', without_checksum(text)
+        ),
+        "sigma:",
+        1,
+        "contradicts sigma, whose square times",
+    ),
     "version": (lambda text: text.replace("map: 1", "map: 2"), "map:", 1, "found the number 2"),
     "key": (lambda text: text.replace("frame:", "fame:"), "fame:", 1, "unknown key"),
     "twice": (
