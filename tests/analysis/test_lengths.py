@@ -260,7 +260,7 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         ),
         (["--target", "1 um", "--grid", "20"], "a grid of 8000 points is too fine"),
         (
-            ["--target", "1 um", "--grid", "11", "--pairs", "p.csv"],
+            ["--target", "1 um", "--grid", "11", "--pairs", f"{file}.csv"],
             "885115 lengths are too many for --pairs",
         ),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),

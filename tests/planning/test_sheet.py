@@ -361,10 +361,16 @@ def test_the_list_of_centres_is_not_taken_for_readings(
     ],
 )
 def test_wrong_usage(
-    options: list[str], text: str, design: Path, capsys: pytest.CaptureFixture[str]
+    options: list[str],
+    text: str,
+    design: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     try:
-        status = main(["sheet", str(design), *options])
+        status = main(["sheet", str(design.resolve()), *options])
     except SystemExit as left:
         status = int(left.code or 0)
     assert status == 2

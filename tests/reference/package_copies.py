@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,11 @@ def package_copy(folder: Path) -> Path:
     package = folder / "ballplate"
     shutil.copytree(TOP / "analysis", package)
     for part in ("simulator", "designs"):
+        # A copy of what cannot be written has to take more files.
+        package.chmod(0o755)
         shutil.copytree(TOP / part, package / part)
+    for path in (package, *package.rglob("*")):
+        path.chmod(path.stat().st_mode | stat.S_IWUSR)
     return package
 
 

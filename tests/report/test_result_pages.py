@@ -250,7 +250,8 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         assert (tmp_path / "own.html").read_text(encoding="utf-8") == own
     assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 3
     assert "exists already" in capsys.readouterr().err
-    other = ["fit", path, str(readings), "--estimator", "distances", "--report", "a.html"]
+    other = ["fit", path, str(readings), "--estimator", "distances", "--report"]
+    other += [str(tmp_path / "a.html")]
     assert main(other) == 2
     assert main(["run", "designs/npl/6.1.1.yaml", "--report", "a.html"]) == 2
     assert "--variant" in capsys.readouterr().err
