@@ -253,7 +253,7 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     other = ["fit", path, str(readings), "--estimator", "distances", "--report"]
     other += [str(tmp_path / "a.html")]
     assert main(other) == 2
-    assert main(["run", "designs/npl/6.1.1.yaml", "--report", "a.html"]) == 2
+    assert main(["run", "designs/npl/6.1.1.yaml", "--report", str(tmp_path / "a.html")]) == 2
     assert "--variant" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["run", path, "--report", "a.pdf"])
