@@ -1,6 +1,6 @@
 """Planning and evaluation of ball-plate experiments for co-ordinate measuring machines.
 
-`import ballplate as bp` gives the functions of `ballplate.api` and `ballplate.stores`, each
+`import ballplate as bp` gives the functions of `ballplate.api` and `ballplate.extensions.sweeps.stores`, each
 loaded when it is first used.
 """
 
@@ -9,6 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ballplate.extensions.sweeps.running import OtherSweepError
+    from ballplate.extensions.sweeps.store_file import StoreError
+    from ballplate.extensions.sweeps.stores import stored, sweep, sweep_report
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from .api import (
@@ -51,9 +54,6 @@ if TYPE_CHECKING:
     from .estimators.estimator_choice import ESTIMATORS
     from .results.groupings import GROUPINGS
     from .simulator.experiment.model import Experiment
-    from .stores import stored, sweep, sweep_report
-    from .sweeps.running import OtherSweepError
-    from .sweeps.store_file import StoreError
 
 __all__ = [
     "ESTIMATORS",
@@ -107,11 +107,11 @@ _PLACES = {
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
     "GROUPINGS": "ballplate.results.groupings",
-    "OtherSweepError": "ballplate.sweeps.running",
-    "StoreError": "ballplate.sweeps.store_file",
-    "stored": "ballplate.stores",
-    "sweep": "ballplate.stores",
-    "sweep_report": "ballplate.stores",
+    "OtherSweepError": "ballplate.extensions.sweeps.running",
+    "StoreError": "ballplate.extensions.sweeps.store_file",
+    "stored": "ballplate.extensions.sweeps.stores",
+    "sweep": "ballplate.extensions.sweeps.stores",
+    "sweep_report": "ballplate.extensions.sweeps.stores",
 }
 
 

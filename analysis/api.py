@@ -47,41 +47,44 @@ PathLike = str | os.PathLike[str]
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.extensions.campaign.sheet import Sheet
+    from ballplate.extensions.compensation.compensation_tables import (
+        MadeCompensation,
+        ReadCompensation,
+    )
+    from ballplate.extensions.judgement.cross_validation import CrossValidation
+    from ballplate.extensions.judgement.ladder_result import Ladder
+    from ballplate.extensions.judgement.left_out_result import Validation
+    from ballplate.extensions.laboratory.imported_result import ReadReport
+    from ballplate.extensions.maps.adjusted_machine import AdjustedMachine
+    from ballplate.extensions.maps.converted_map import ConvertedMap
+    from ballplate.extensions.maps.correction import Correction
+    from ballplate.extensions.maps.error_curves_result import ErrorCurves
+    from ballplate.extensions.maps.fitted_errors_result import FittedErrorMap
+    from ballplate.extensions.maps.length_tables import LengthMap
+    from ballplate.extensions.maps.map_difference import MapDifference
+    from ballplate.extensions.maps.map_places import Line
+    from ballplate.extensions.maps.volumetric_results import MachineErrors
+    from ballplate.extensions.pages.embedded import View
+    from ballplate.extensions.reproduction.reproduction_result import ReproducedDocument
+    from ballplate.extensions.reproduction.score_result import CertifiedScores
+    from ballplate.extensions.requirements.answers import Reach
+    from ballplate.extensions.requirements.unknowns import UnknownName
+    from ballplate.extensions.splines.curve_result import FittedCurve
+    from ballplate.extensions.sweeps.running import SweepResult
 
-    from .error_maps.compensation_tables import MadeCompensation, ReadCompensation
-    from .error_maps.curve_result import FittedCurve
-    from .error_maps.length_tables import LengthMap
-    from .error_maps.map_places import Line
-    from .error_maps.volumetric_results import MachineErrors
     from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
     from .planning.criteria import CriterionName
     from .planning.orders import OrderName
-    from .planning.requirements.answers import Reach
-    from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
-    from .planning.sheet import Sheet
-    from .presentation.pages.embedded import View
     from .presentation.result import FitResult
-    from .reproduction.reproduction_result import ReproducedDocument
-    from .reproduction.score_result import CertifiedScores
-    from .results.adjusted_machine import AdjustedMachine
     from .results.budget import UncertaintyBudget
-    from .results.converted_map import ConvertedMap
-    from .results.correction import Correction
-    from .results.differences.map_difference import MapDifference
-    from .results.error_curves_result import ErrorCurves
     from .results.fit import Fit
-    from .results.fitted_errors_result import FittedErrorMap
-    from .results.imported import ReadReport
     from .results.prediction import Prediction
-    from .results.validation.cross_validation import CrossValidation
-    from .results.validation.ladder_result import Ladder
-    from .results.validation.left_out_result import Validation
     from .simulator.machines.protocol import Array
     from .simulator.maps.fitted_map import FittedMap
     from .simulator.readings.observed_readings import ObservedReadings
-    from .sweeps.running import SweepResult
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -181,8 +184,9 @@ def check(
     >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
     ('goal not met: average U6 at most 0.1 µm; average U6 0.1426 µm',)
     """
+    from ballplate.extensions.requirements.goals import parse_goal
+
     from .planning.checked_files import Wanted, checked_design
-    from .planning.requirements.goals import parse_goal
     from .simulator.experiment.load import with_pool
 
     ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
@@ -213,8 +217,9 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     >>> line in repair("designs/npl/6.1.1.yaml", variant="B").splitlines()
     True
     """
-    from .planning.repair.mending import mended, to_write
-    from .planning.repair.repair_search import repairs
+    from ballplate.extensions.repair.mending import mended, to_write
+    from ballplate.extensions.repair.repair_search import repairs
+
     from .results import study
     from .simulator.experiment.load import with_pool
 
@@ -290,8 +295,9 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
 
     if isinstance(given, Fit | Prediction):
         return given.view()
-    from .presentation.pages.embedded import View
-    from .results.views import position_picture
+    from ballplate.extensions.pages.embedded import View
+    from ballplate.extensions.pages.views import position_picture
+
     from .simulator.experiment.layout import lay_out
 
     chosen = _experiment(given)
@@ -320,10 +326,11 @@ def page(
     >>> page(fit(quickstart(), simulate(quickstart()))).splitlines()[0]
     '<!DOCTYPE html>'
     """
+    from ballplate.extensions.sweeps.running import SweepResult
+
     from .presentation.files import write_file
     from .results.fit import Fit
     from .results.prediction import Prediction
-    from .sweeps.running import SweepResult
 
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
@@ -334,11 +341,11 @@ def page(
     if isinstance(given, Fit):
         text = given.page()
     elif isinstance(given, SweepResult):
-        from .stores import sweep_report
+        from ballplate.extensions.sweeps.stores import sweep_report
 
         text = sweep_report(given.store, given.number, "html", run_modules, report, compare)
     else:
-        from .report.design_contents import page_of_design
+        from ballplate.extensions.sweeps.report.design_contents import page_of_design
 
         predicted = given if isinstance(given, Prediction) and given.quantities else None
         chosen = given.experiment if isinstance(given, Prediction) else _experiment(given)
@@ -410,13 +417,14 @@ def read_report(
     >>> read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
     ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
     """
-    from .results.imported import ReadReport
+    from ballplate.extensions.laboratory.formats.registered import FORMATS
+    from ballplate.extensions.laboratory.imported import ImportSettings
+    from ballplate.extensions.laboratory.imported_result import ReadReport
+    from ballplate.extensions.laboratory.planned_and_imported import import_readings
+
     from .simulator.experiment.layout import lay_out
     from .simulator.experiment.name_rules import check_rule
     from .simulator.inputs.quantities import LENGTH_UNITS
-    from .simulator.readings.formats.registered import FORMATS
-    from .simulator.readings.imported import ImportSettings
-    from .simulator.readings.planned_and_imported import import_readings
 
     paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
     for path in paths:
@@ -597,7 +605,7 @@ def ladder(
     >>> ladder(quickstart(), readings, coefficients=6).recommended
     'kinematic, 5 and 5 coefficients'
     """
-    from .results.validation.ladder import ladder as compared
+    from ballplate.extensions.judgement.ladder import ladder as compared
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_whole(3, 12, coefficients=coefficients)
@@ -618,7 +626,7 @@ def validate(
     >>> validate(quickstart(), simulate(quickstart()))
     <Validation of quickstart: 9 left out in turn, 0 predicted wrongly>
     """
-    from .results.validation.left_out import validate as predicted
+    from ballplate.extensions.judgement.left_out import validate as predicted
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_report(report)
@@ -642,7 +650,7 @@ def cross_validate(
     >>> cross_validate(quickstart(), *twice, common=False).complaint
     ''
     """
-    from .results.validation.cross_validation import cross_validate as compared
+    from ballplate.extensions.judgement.cross_validation import cross_validate as compared
 
     ensure_one_of(SIGMAS, sigma=sigma)
     chosen, first = _observed(experiment, readings, certificate)
@@ -659,8 +667,8 @@ def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
     >>> convert(fitted, "{kind: empirical, coefficients: 5}")
     <ConvertedMap of map: empirical, 195 parameters, the same corrections>
     """
-    from .results.any_map import map_of_source
-    from .results.converted_map import convert as converted
+    from ballplate.extensions.maps.any_map import map_of_source
+    from ballplate.extensions.maps.converted_map import convert as converted
 
     ensure_type(str, 'an error model such as "empirical"', to=to)
     found, label = map_of_source(_machine("fitted", fitted))
@@ -714,11 +722,10 @@ def diff(
     <MapDifference of second less first: no change is shown (p = 0.53)>
     """
     import numpy as np
+    from ballplate.extensions.maps.comparison import ComparisonSettings
+    from ballplate.extensions.maps.sources import map_difference
     from ballplate.simulator.inputs.days import stated_day
     from ballplate.simulator.inputs.quantities import Target, parse_length_function
-
-    from .results.differences.comparison import ComparisonSettings
-    from .results.differences.sources import map_difference
 
     ensure_whole(2, 5, grid=grid)
     ensure_positive("a number above 0, such as 2", 100.0, coverage_factor=coverage_factor)
@@ -851,10 +858,11 @@ def plan(
     >>> plan(quickstart().with_(pool=pool), positions=7)
     <Campaign of quickstart: 7 of 8 candidates, U6 0.137 µm>
     """
+    from ballplate.extensions.campaign.earlier import begun
+
     from .planning.campaign import Request, campaign
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
-    from .planning.earlier import begun
     from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
@@ -889,7 +897,8 @@ def sheet(experiment: Experiment | PathLike) -> Sheet:
     >>> sheet(quickstart()).template().splitlines()[:2]
     ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
     """
-    from .planning.sheet import sheet_of
+    from ballplate.extensions.campaign.sheet import sheet_of
+
     from .simulator.experiment.load import with_pool
 
     found = _experiment(experiment)
@@ -944,9 +953,9 @@ def reach(
     >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
     True
     """
-    from .planning.requirements.goals import parse_goal
-    from .planning.requirements.root_search import reach as search
-    from .planning.requirements.unknowns import NAMES
+    from ballplate.extensions.requirements.goals import parse_goal
+    from ballplate.extensions.requirements.root_search import reach as search
+    from ballplate.extensions.requirements.unknowns import NAMES
 
     ensure_type(str, 'a text such as "U6 average 0.3 um"', goal=goal)
     ensure_type(str, 'a text with a unit, such as "0.5 um"', target=target)
@@ -986,7 +995,7 @@ def lengths(
     >>> lengths(quickstart(), "1 um + L/1000000", grid=3).is_met
     True
     """
-    from .error_maps.length_map import length_map, length_settings
+    from ballplate.extensions.maps.length_map import length_map, length_settings
 
     ensure_type(str, 'a text with a unit, such as "0.5 um + L/1000000"', target=target)
     ensure_type(str, "the name of a probe", probe=probe)
@@ -1033,11 +1042,10 @@ def map(
     array([[2.2e-07, 1.9e-07, 1.7e-07]])
     """
     import numpy as np
-
-    from .error_maps.map_places import PlacesAsked, parse_places, parse_plane
-    from .error_maps.realisations import MOST_DRAWS, Draws
-    from .error_maps.volumetric_errors import MOST_POINTS
-    from .results.any_map import map_errors
+    from ballplate.extensions.maps.any_map import map_errors
+    from ballplate.extensions.maps.map_places import PlacesAsked, parse_places, parse_plane
+    from ballplate.extensions.maps.realisations import MOST_DRAWS, Draws
+    from ballplate.extensions.maps.volumetric_errors import MOST_POINTS
 
     source = _machine("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
@@ -1087,8 +1095,8 @@ def curves(
     >>> curves(fit(quickstart(), simulate(quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
-    from .results.any_map import map_of_source
-    from .results.error_curves_result import error_curves
+    from ballplate.extensions.maps.any_map import map_of_source
+    from ballplate.extensions.maps.error_curves_result import error_curves
 
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)
@@ -1152,8 +1160,8 @@ def adjust(
     >>> adjust(machine, scale="x=20 um/m")
     <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
     """
-    from .results.adjusted_machine import adjusted_machine
-    from .results.machine_changes import guideway_turn, scale_change
+    from ballplate.extensions.maps.adjusted_machine import adjusted_machine
+    from ballplate.extensions.maps.machine_changes import guideway_turn, scale_change
 
     first = _fitted("fitted", fitted)
     second = None if after is None else _fitted("after", after)
@@ -1185,7 +1193,11 @@ def compensation(
     >>> compensation("designs/park/machines/npl-like.yaml", "isg", "50 mm")
     <MadeCompensation of npl-like: isg, 19, 24, 9 positions>
     """
-    from .error_maps.compensation_tables import made_compensation, of_map, tabled_machine
+    from ballplate.extensions.compensation.compensation_tables import (
+        made_compensation,
+        of_map,
+        tabled_machine,
+    )
 
     ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
@@ -1221,7 +1233,7 @@ def read_compensation(
     ...     read_compensation(file, "isg")
     <ReadCompensation of table: isg, 21, 21, 21 positions>
     """
-    from .error_maps.compensation_tables import read_compensation_files
+    from ballplate.extensions.compensation.compensation_tables import read_compensation_files
 
     ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
@@ -1235,7 +1247,7 @@ def read_compensation(
 
 def _metres(name: str, given: str | Sequence[float] | None) -> tuple[float, ...] | None:
     """Lengths in metres, of a text with units or of numbers."""
-    from .error_maps.compensation_tables import parse_lengths
+    from ballplate.extensions.compensation.compensation_tables import parse_lengths
 
     if given is None:
         return None
@@ -1278,8 +1290,8 @@ def correct(
     '0.080 µm'
     """
     import pandas
+    from ballplate.extensions.maps.correction import correction
 
-    from .results.correction import correction
     from .results.wanted_lengths import between_named
     from .simulator.readings import point_files
 
@@ -1325,8 +1337,8 @@ def spline(
     >>> spline(table, "arc_length", "finish_error", "12-32", start_slope="0")
     <FittedCurve of table-1: 21 points, 7 free coefficients>
     """
-    from .error_maps.curve_options import Asked, OptionError, ensure_asked
-    from .error_maps.curve_result import error_curve
+    from ballplate.extensions.splines.curve_options import Asked, OptionError, ensure_asked
+    from ballplate.extensions.splines.curve_result import error_curve
 
     ensure_path("file", file)
     ensure_type(str, "the name of a column", x=x, y=y)
@@ -1361,9 +1373,10 @@ def reproduce(
     >>> reproduce("npl", "6.1.2").is_right
     True
     """
+    from ballplate.extensions.reproduction.reproduction_result import reproduce_npl
+    from ballplate.extensions.reproduction.score_result import score_certified
+
     from .montecarlo.trials import MOST_TRIALS
-    from .reproduction.reproduction_result import reproduce_npl
-    from .reproduction.score_result import score_certified
 
     if document not in ("npl", "certified"):
         raise ValueError(f'document: "{document}" is unknown; give npl or certified')

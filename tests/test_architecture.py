@@ -41,10 +41,10 @@ ROOMS = (
     "analysis/results",
     "analysis/estimators",
     "analysis/planning",
-    "analysis/sweeps",
-    "analysis/report",
-    "analysis/reproduction",
-    "analysis/studio",
+    "analysis/extensions/sweeps",
+    "analysis/extensions/sweeps/report",
+    "analysis/extensions/reproduction",
+    "analysis/extensions/studio",
     "analysis/cli",
 )
 MOST_ROOMS = 24
@@ -153,7 +153,7 @@ def test_beside_the_rooms_there_is_only_the_face() -> None:
         "analysis/__main__.py",
         "analysis/api.py",
         "analysis/models.py",
-        "analysis/stores.py",
+        "analysis/extensions/sweeps/stores.py",
         "simulator/__init__.py",
     }
 

@@ -10,20 +10,20 @@ import pytest
 
 # What the basic commands do without.
 ROOMS = (
-    "ballplate.results.variance_components",
-    "ballplate.results.validation",
-    "ballplate.results.differences",
-    "ballplate.results.certificates",
-    "ballplate.simulator.readings.formats",
-    "ballplate.simulator.experiment.compensation",
-    "ballplate.planning.repair",
-    "ballplate.planning.requirements",
-    "ballplate.presentation.pages",
+    "ballplate.extensions.judgement",
+    "ballplate.extensions.judgement",
+    "ballplate.extensions.maps",
+    "ballplate.extensions.certificates",
+    "ballplate.extensions.laboratory.formats",
+    "ballplate.extensions.compensation",
+    "ballplate.extensions.repair",
+    "ballplate.extensions.requirements",
+    "ballplate.extensions.pages",
     "ballplate.error_maps",
-    "ballplate.sweeps",
-    "ballplate.report",
-    "ballplate.reproduction",
-    "ballplate.studio",
+    "ballplate.extensions.sweeps",
+    "ballplate.extensions.sweeps.report",
+    "ballplate.extensions.reproduction",
+    "ballplate.extensions.studio",
 )
 WITHOUT = """
 import sys

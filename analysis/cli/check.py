@@ -15,8 +15,9 @@ from .outputs import UsageError
 from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
+    from ballplate.extensions.requirements.goals import Goal
+
     from ..planning.checked_files import CheckedFile
-    from ..planning.requirements.goals import Goal
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
@@ -122,7 +123,7 @@ def run(options: Namespace) -> int:
         for checked in check_files(paths, options.variant, wanted, shown.show):
             shown.step_aside()
             if is_repairing:
-                from .mending import with_repairs
+                from ballplate.extensions.repair.mending_command import with_repairs
 
                 checked, status = with_repairs(checked, wanted, options)
                 statuses.append(status)
@@ -158,7 +159,7 @@ def _goals(options: Namespace) -> tuple[Goal, ...]:
         raise UsageError("--share goes with --goal lengths; add it")
     if not options.goal:
         return ()
-    from ..planning.requirements.goals import GoalError, parse_goal
+    from ballplate.extensions.requirements.goals import GoalError, parse_goal
 
     with_share = {"lengths": options.share}
     try:

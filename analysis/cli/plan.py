@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.extensions.campaign.sheet_command import sheet_name
+
 from .common import (
     add_file,
     add_json,
@@ -20,7 +22,6 @@ from .common import (
     whole,
 )
 from .outputs import Writer, add_force, add_output, write
-from .sheet import sheet_name
 from .telling import note
 
 if TYPE_CHECKING:
@@ -177,12 +178,12 @@ def _drift(text: str) -> str:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
+    from ballplate.extensions.campaign.earlier import begun
     from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
-    from ..planning.earlier import begun
     from .excerpts import print_errors
     from .progress import progress
 

@@ -33,7 +33,7 @@ def _experiment() -> dict[str, Any]:
 
 
 def _sweep() -> dict[str, Any]:
-    from ..sweeps.sweep_schema import schema
+    from ballplate.extensions.sweeps.sweep_schema import schema
 
     return schema()
 

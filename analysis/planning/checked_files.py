@@ -22,9 +22,9 @@ from ..results.prediction import Advice, Prediction
 from ..results.study import check
 
 if TYPE_CHECKING:
-    from .repair.repair_search import Repairs
-    from .repair.scale import ScaleCertificate
-    from .requirements.goals import Goal
+    from ballplate.extensions.repair.repair_search import Repairs
+    from ballplate.extensions.repair.scale import ScaleCertificate
+    from ballplate.extensions.requirements.goals import Goal
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 
@@ -150,8 +150,8 @@ def checked_design(
     prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
-        from .repair.repair_search import repairs
-        from .repair.scale import scale_certificate
+        from ballplate.extensions.repair.repair_search import repairs
+        from ballplate.extensions.repair.scale import scale_certificate
 
         found = repairs(with_pool, report=report)
         certificate = scale_certificate(with_pool, prediction.scale)
@@ -177,7 +177,7 @@ def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
     lines = [*design.goals]
     data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
     if with_repairs:
-        from .repair.repair_tables import (
+        from ballplate.extensions.repair.repair_tables import (
             certificate_data,
             certificate_lines,
             repair_data,
@@ -197,6 +197,6 @@ def _judged(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if not goals:
         return (), ()
-    from .requirements.judged_goals import judged_goals
+    from ballplate.extensions.requirements.judged_goals import judged_goals
 
     return judged_goals(experiment, goals)

@@ -7,12 +7,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.extensions.campaign.campaign_picture import draw_campaign
+from ballplate.extensions.campaign.sheet import Sheet
+from ballplate.extensions.campaign.sheet_forms import sheet_data, sheet_lines
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
-from .campaign_picture import draw_campaign
 from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
@@ -21,8 +23,6 @@ from .drift_in_orders import DriftEffect, in_order_settings, in_time, is_of_plat
 from .experiment_file import experiment_text
 from .orders import ORDERS
 from .schedule import RunSheet, run_sheet
-from .sheet import Sheet
-from .sheet_forms import sheet_data, sheet_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from ..results.study import check
 from .information import Information
 
 if TYPE_CHECKING:
-    from .repair.repair_search import Repair
+    from ballplate.extensions.repair.repair_search import Repair
 
 # Names of errors, and cures, that are told.
 MOST_NAMES, MOST_CURES = 8, 2
@@ -55,7 +55,7 @@ class PoolGap:
     @property
     def words(self) -> str:
         """What stays open, by the names of the errors."""
-        from .repair.repair_tables import changed_names
+        from ballplate.extensions.repair.repair_tables import changed_names
 
         null = self.verdict.null
         names = dict.fromkeys(name for direction in null for name in changed_names(direction))
@@ -68,7 +68,7 @@ class PoolGap:
     @property
     def remedy(self) -> str:
         """What would determine it."""
-        from .repair.repair_tables import changes_in_words
+        from ballplate.extensions.repair.repair_tables import changes_in_words
 
         if self.verdict.as_expected:
             return "the file expects that"
@@ -85,7 +85,7 @@ class PoolGap:
         return f"what would determine {all_of_it}, offered or done beside these: {told}"
 
     def to_dict(self) -> dict[str, Any]:
-        from .repair.repair_tables import changes_in_words
+        from ballplate.extensions.repair.repair_tables import changes_in_words
 
         return {
             "deficiency": self.verdict.deficiency,
@@ -128,7 +128,7 @@ def pool_gap(
         return None
     size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
     is_sought = size <= MOST_WORK and not judged.as_expected
-    from .repair.repair_search import repairs
+    from ballplate.extensions.repair.repair_search import repairs
 
     try:
         found = repairs(design, report=report) if is_sought else None

@@ -63,15 +63,15 @@ from .residuals import Residual, reading_residuals, residual_groups
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.extensions.certificates.plate_certificate import PlateCertificate
+    from ballplate.extensions.judgement.bootstrap import Bootstrap
+    from ballplate.extensions.judgement.components import VarianceComponents
+    from ballplate.extensions.pages.embedded import View
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
-    from ..presentation.pages.embedded import View
     from .campaign_sigmas import CampaignSigmas
-    from .certificates.plate_certificate import PlateCertificate
-    from .validation.bootstrap import Bootstrap
-    from .variance_components.components import VarianceComponents
 
 
 def lack_of_fit(squares: float, freedom: int, diagnosis: Diagnosis, untested: str) -> LackOfFit:
@@ -321,8 +321,8 @@ class Fit(FitResult):
             raise ValueError(
                 "the fit does not know its experiment, which a page names; fit it anew"
             )
-        from ..presentation.pages.fit_page import fit_page
-        from .fit_contents import fit_contents
+        from ballplate.extensions.pages.fit_contents import fit_contents
+        from ballplate.extensions.pages.fit_page import fit_page
 
         return fit_page(
             fit_contents(
@@ -340,8 +340,12 @@ class Fit(FitResult):
         """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
         or weak directions, which move; of a fit that has failed the positions alone.
         """
-        from ..presentation.pages.embedded import View
-        from .views import judged_pictures, position_picture, residual_pictures
+        from ballplate.extensions.pages.embedded import View
+        from ballplate.extensions.pages.views import (
+            judged_pictures,
+            position_picture,
+            residual_pictures,
+        )
 
         if self.estimated is None or not self.converged:
             return View(self.label, self.title, (position_picture(self.design),))
@@ -400,7 +404,7 @@ class Fit(FitResult):
         >>> [group.verdict for group in fit.components("calibration").groups]
         ['agrees with stated', 'agrees with stated']
         """
-        from .variance_components.components import variance_components
+        from ballplate.extensions.judgement.components import variance_components
 
         ensure_one_of(GROUPINGS, by=by)
         at = self.functions.at
@@ -415,7 +419,7 @@ class Fit(FitResult):
         :raises ValueError: an estimate that has not converged, or errors so large that there are
             no readings of them.
         """
-        from .validation.bootstrap import bootstrap
+        from ballplate.extensions.judgement.bootstrap import bootstrap
 
         found = bootstrap(
             self.label,
@@ -486,7 +490,7 @@ class Fit(FitResult):
         >>> fit.certificate(datum=("r1c1", "r5c1", "r1c5")).datum
         'origin: ball r1c1, y axis through ball r5c1, xy plane through ball r1c5'
         """
-        from .certificates.plate_certificate import plate_certificate
+        from ballplate.extensions.certificates.plate_certificate import plate_certificate
 
         names = (datum,) if isinstance(datum, str) else datum
         ensure_type(Iterable, 'names of balls, or "all"', datum=names)

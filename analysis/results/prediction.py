@@ -35,11 +35,11 @@ from .parts import (
 )
 
 if TYPE_CHECKING:
+    from ballplate.extensions.pages.embedded import View
     from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
     from ..montecarlo.experiments import Trials
-    from ..presentation.pages.embedded import View
 
 
 @dataclass(frozen=True)
@@ -144,10 +144,9 @@ class Prediction(Result):
         """The design in space: positions, ellipsoids of points and balls, and undetermined or weak
         directions, which move.
         """
+        from ballplate.extensions.pages.embedded import View
+        from ballplate.extensions.pages.views import judged_pictures
         from ballplate.simulator.estimation.linearisation import linearise
-
-        from ..presentation.pages.embedded import View
-        from .views import judged_pictures
 
         target = None if self.experiment is None else self.experiment.target_uncertainty
         pictures = judged_pictures(linearise(self.design), self.verdict, target)

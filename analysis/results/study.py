@@ -28,11 +28,11 @@ from .influences import influence_uncertainties
 from .prediction import Prediction
 
 if TYPE_CHECKING:
+    from ballplate.extensions.judgement.components import VarianceComponents
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
     from .campaign_sigmas import CampaignSigmas
     from .fit import Fit
-    from .variance_components.components import VarianceComponents
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ def _sigma(
 def _variance_components(
     experiment: Experiment, at: Linearisation, x: Array, by: Grouping
 ) -> VarianceComponents:
-    from .variance_components.components import variance_components
+    from ballplate.extensions.judgement.components import variance_components
 
     try:
         return variance_components(experiment.label, experiment.title, at, x, by)

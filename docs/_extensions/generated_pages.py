@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.cli import parser as command_line
-from ballplate.reproduction.compare import reproduce
-from ballplate.reproduction.published import npl
-from ballplate.reproduction.reproduction_tables import reproduction_markdown
-from ballplate.reproduction.shipped import Shipped
+from ballplate.extensions.reproduction.compare import reproduce
+from ballplate.extensions.reproduction.published import npl
+from ballplate.extensions.reproduction.reproduction_tables import reproduction_markdown
+from ballplate.extensions.reproduction.shipped import Shipped
+from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
 from ballplate.simulator.experiment.schema import schema
@@ -31,7 +32,6 @@ from ballplate.simulator.inputs.quantities import (
     Ratio,
     TemperatureDifference,
 )
-from ballplate.sweeps.sweep_schema import schema as sweep_schema
 from pydantic import TypeAdapter
 from sphinx.application import Sphinx
 

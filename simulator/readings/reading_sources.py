@@ -10,6 +10,12 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+from ballplate.extensions.laboratory.any_table import TableRows, read_any_table, text_of
+from ballplate.extensions.laboratory.clock_times import wrong_times
+from ballplate.extensions.laboratory.heading_words import heading, is_clock
+from ballplate.extensions.laboratory.headings import Vocabulary
+from ballplate.extensions.laboratory.name_matching import with_known_names
+from ballplate.extensions.laboratory.uncertainty_headings import headed_uncertainty
 
 from ..design.arrays import Design
 from ..experiment.readings_section import ReadingsSettings
@@ -20,13 +26,7 @@ from ..inputs.settings import listing
 from ..inputs.tables import FileRow, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText
 from ..machines.protocol import Array
-from .any_table import TableRows, read_any_table, text_of
-from .clock_times import wrong_times
 from .coordinate_kinds import controller_offsets
-from .heading_words import heading, is_clock
-from .headings import Vocabulary
-from .name_matching import with_known_names
-from .uncertainty_headings import headed_uncertainty
 
 Source = Path | GivenText
 Units = Mapping[str, Mapping[str, Fraction]]
@@ -77,7 +77,7 @@ def source_rows(
     }
 
     def of_report(source: Source, text: GivenText) -> TableRows | None:
-        from .report_sources import report_rows
+        from ballplate.extensions.laboratory.report_sources import report_rows
 
         return report_rows(source, text, design, settings, units)
 
@@ -92,7 +92,7 @@ def source_rows(
     _refuse_wrong_times(sources, tables)
     said: tuple[str, ...] = ()
     if any(table.coordinates is not None for table in tables):
-        from .report_sources import with_coordinates
+        from ballplate.extensions.laboratory.report_sources import with_coordinates
 
         settings, said = with_coordinates(settings, sources, tables)
     diameters = [d for table in tables for d in table.diameters]
@@ -192,7 +192,7 @@ def read_source(
     except ExperimentError:
         if (report := of_report(source, text)) is not None:
             return report
-        from .other_files import what_it_is
+        from ballplate.extensions.laboratory.other_files import what_it_is
 
         # Who names columns knows what the file is.
         if settings.columns is None and (other := what_it_is(text)):

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import ballplate as bp
 import numpy as np
-from ballplate.results.validation.rungs import (
+from ballplate.extensions.judgement.rungs import (
     LadderModel,
     chain_of,
     empirical_rung,

@@ -13,9 +13,17 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.adjusted_machine import AdjustedMachine, adjusted_machine, adjusted_map
+from ballplate.extensions.maps.adjusted_machine import (
+    AdjustedMachine,
+    adjusted_machine,
+    adjusted_map,
+)
+from ballplate.extensions.maps.machine_changes import (
+    MachineChange,
+    guideway_turn,
+    scale_change,
+)
 from ballplate.results.estimates import estimated_functions
-from ballplate.results.machine_changes import MachineChange, guideway_turn, scale_change
 from ballplate.results.map_of_fit import map_of
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out

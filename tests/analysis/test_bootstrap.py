@@ -8,9 +8,9 @@ from functools import cache
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.judgement import bootstrap as of_bootstrap
+from ballplate.extensions.judgement.bootstrap import Replicate, bootstrap
 from ballplate.results.fit import Fit
-from ballplate.results.validation import bootstrap as of_bootstrap
-from ballplate.results.validation.bootstrap import Replicate, bootstrap
 from ballplate.simulator.experiment.model import Experiment
 
 

@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.error_maps.error_functions import error_functions
-from ballplate.error_maps.fitted_errors import fitted_lengths
-from ballplate.error_maps.map_places import PlacesAsked, map_places
+from ballplate.extensions.maps.error_functions import error_functions
+from ballplate.extensions.maps.fitted_errors import fitted_lengths
+from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.results.fit import Fit
 from ballplate.results.wanted_lengths import tasks_of_experiment
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit

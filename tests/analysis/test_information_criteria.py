@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.results.validation.rung_choice import Comparison, FittedSum
+from ballplate.extensions.judgement.rung_choice import Comparison, FittedSum
 from scipy.stats import norm
 
 

@@ -11,16 +11,21 @@ import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
-from ballplate.results.validation.lack_of_fit import pure_error
-from ballplate.results.validation.ladder import climb, fit_rung, ladder
-from ballplate.results.validation.nested import NestedSums, nested_sums
-from ballplate.results.validation.rung_choice import (
+from ballplate.extensions.judgement.lack_of_fit import pure_error
+from ballplate.extensions.judgement.ladder import climb, fit_rung, ladder
+from ballplate.extensions.judgement.nested import NestedSums, nested_sums
+from ballplate.extensions.judgement.rung_choice import (
     Comparison,
     FittedSum,
     PolynomialGrid,
     first_adequate,
 )
-from ballplate.results.validation.rungs import LadderModel, chain_of, kinematic_rung, with_model
+from ballplate.extensions.judgement.rungs import (
+    LadderModel,
+    chain_of,
+    kinematic_rung,
+    with_model,
+)
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

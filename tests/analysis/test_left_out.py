@@ -11,8 +11,8 @@ import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
-from ballplate.results.validation.cross_validation import cross_validate
-from ballplate.results.validation.left_out import (
+from ballplate.extensions.judgement.cross_validation import cross_validate
+from ballplate.extensions.judgement.left_out import (
     LeftGroup,
     groups_to_leave,
     rest_of,
@@ -150,7 +150,7 @@ def test_the_change_of_a_length_scatters_as_it_says() -> None:
 
 
 def validate_one(observed: ObservedReadings, group: LeftGroup) -> float:
-    from ballplate.results.validation.left_out import _length_difference
+    from ballplate.extensions.judgement.left_out import _length_difference
 
     solution = estimate(observed.design, observed.x)
     at = linearised_fit(observed.design, solution)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.error_maps.length_map import (
+from ballplate.extensions.maps.length_map import (
     LengthGroups,
     LengthMapSettings,
     class_edges,

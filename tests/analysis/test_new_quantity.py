@@ -43,7 +43,7 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.cli import main
-from ballplate.planning.requirements.goals import SYMBOLS
+from ballplate.extensions.requirements.goals import SYMBOLS
 from ballplate.planning.criteria import NAMES
 
 def said(*arguments):

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.planning.requirements.answers import Answer
-from ballplate.planning.requirements.goals import Goal, GoalError, parse_goal
-from ballplate.planning.requirements.root_search import reach
-from ballplate.planning.requirements.steps import at_step, round_down, round_up, step_of
-from ballplate.planning.requirements.unknowns import NotVariableError
+from ballplate.extensions.requirements.answers import Answer
+from ballplate.extensions.requirements.goals import Goal, GoalError, parse_goal
+from ballplate.extensions.requirements.root_search import reach
+from ballplate.extensions.requirements.steps import at_step, round_down, round_up, step_of
+from ballplate.extensions.requirements.unknowns import NotVariableError
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load

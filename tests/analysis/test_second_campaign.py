@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.results.second_campaign import (
+from ballplate.extensions.maps.second_campaign import (
     CampaignComparison,
     CampaignFigures,
     compared_campaigns,

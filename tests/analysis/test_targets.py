@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.error_maps.length_map import LengthMapSettings, length_map
+from ballplate.extensions.maps.length_map import LengthMapSettings, length_map
 from ballplate.presentation.formatting import percent
 from ballplate.rank.verdict import Verdict, weak_limit
 from ballplate.results.study import check, predict

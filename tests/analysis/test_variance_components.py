@@ -15,10 +15,7 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.cli import main
-from ballplate.gross_errors.leftover import Leftover, leftover
-from ballplate.results.groupings import GROUPINGS, Grouping
-from ballplate.results.observation_groups import ObservationGroup, groups_of, reweighted
-from ballplate.results.variance_components.components import (
+from ballplate.extensions.judgement.components import (
     AS_STATED,
     LARGER,
     SMALLER,
@@ -26,11 +23,14 @@ from ballplate.results.variance_components.components import (
     judged,
     told_apart,
 )
-from ballplate.results.variance_components.restricted_likelihood import (
+from ballplate.extensions.judgement.restricted_likelihood import (
     at_ratios,
     estimated_ratios,
     group_sums,
 )
+from ballplate.gross_errors.leftover import Leftover, leftover
+from ballplate.results.groupings import GROUPINGS, Grouping
+from ballplate.results.observation_groups import ObservationGroup, groups_of, reweighted
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.joint_values import JointValues
@@ -402,6 +402,6 @@ def test_what_does_not_go_together_is_refused(
 def test_too_many_groups_are_refused(
     small: bp.Experiment, noisy: pandas.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ballplate.results.variance_components.components.MOST_ENTRIES", 1000)
+    monkeypatch.setattr("ballplate.extensions.judgement.components.MOST_ENTRIES", 1000)
     with pytest.raises(ExperimentError, match="4 groups of observations of 90 parameters"):
         bp.fit(small, noisy, components="axis")

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.sweeps.task import CellResult
+from ballplate.extensions.sweeps.task import CellResult
 
 from tests.report.stores import axis, done, made_up
 

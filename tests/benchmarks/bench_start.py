@@ -20,8 +20,8 @@ import time
 from pathlib import Path
 
 import pytest
-from ballplate.sweeps.load import load_sweep
-from ballplate.sweeps.task import CellTask, compute
+from ballplate.extensions.sweeps.load import load_sweep
+from ballplate.extensions.sweeps.task import CellTask, compute
 
 from .bench_sweep import written
 

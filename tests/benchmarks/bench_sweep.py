@@ -19,11 +19,11 @@ import time
 from pathlib import Path
 
 import pytest
-from ballplate.sweeps.bundle import bundle_of, definition
-from ballplate.sweeps.frame import frame
-from ballplate.sweeps.load import load_sweep
-from ballplate.sweeps.store import add_rows, add_sweep, open_store
-from ballplate.sweeps.task import CellTask, compute
+from ballplate.extensions.sweeps.bundle import bundle_of, definition
+from ballplate.extensions.sweeps.frame import frame
+from ballplate.extensions.sweeps.load import load_sweep
+from ballplate.extensions.sweeps.store import add_rows, add_sweep, open_store
+from ballplate.extensions.sweeps.task import CellTask, compute
 
 ROOT = Path(__file__).parents[2]
 SWEEP = """\

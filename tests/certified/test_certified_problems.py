@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from ballplate.cli import main
-from ballplate.reproduction.certified_answers import answers
-from ballplate.reproduction.certified_problems import certified_problems
-from ballplate.reproduction.score import Score, scores
+from ballplate.extensions.reproduction.certified_answers import answers
+from ballplate.extensions.reproduction.certified_problems import certified_problems
+from ballplate.extensions.reproduction.score import Score, scores
 
 from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from ballplate import cli
+from ballplate.extensions.sweeps import task as sweep_task
 from ballplate.planning import campaign
-from ballplate.sweeps import task as sweep_task
 
 EVENTS = ("open", "os.link", "os.rename", "os.remove")
 # Further events, which are raised here: statements to stores, and that a studio has acted.
@@ -97,7 +97,7 @@ def edit(actions: list[dict[str, str]]) -> None:
     """Let the studio do what its page would ask for instead of serving, in a thread as its server
     does, and compute no figures.
     """
-    from ballplate.studio import judging, serving
+    from ballplate.extensions.studio import judging, serving
 
     def serve(session: Any, *_: object) -> None:
         def act() -> None:

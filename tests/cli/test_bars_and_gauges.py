@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
-from ballplate.sweeps.fingerprint import fingerprint
 from scipy.optimize import least_squares
 
 FOLDER = Path("designs/hurt_foss")

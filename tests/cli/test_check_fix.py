@@ -218,7 +218,7 @@ def test_an_interruption_tells_of_what_is_written(
 def test_a_file_that_changes_meanwhile_is_left(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from ballplate.cli import mending
+    from ballplate.extensions.repair import mending_command as mending
 
     path = folder / "shifted.yaml"
     mended = mending.mended

@@ -16,8 +16,8 @@ import yaml
 from ballplate.cli import main
 from ballplate.cli.github import annotation_lines, in_message, in_property
 from ballplate.cli.junit import junit_report
+from ballplate.extensions.repair.repair_search import Repairs, repairs
 from ballplate.planning.checked_files import CheckedFile, check_files
-from ballplate.planning.repair.repair_search import Repairs, repairs
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import Message
 
@@ -234,7 +234,7 @@ def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return known[experiment.label]
 
     known: dict[str, Repairs | None] = {}
-    monkeypatch.setattr("ballplate.planning.repair.repair_search.repairs", repairs_of)
+    monkeypatch.setattr("ballplate.extensions.repair.repair_search.repairs", repairs_of)
 
 
 def test_suggestions_in_every_format(

@@ -18,9 +18,9 @@ from typing import Any
 import pytest
 from ballplate.cli import main
 from ballplate.cli.interruption import interruptions
+from ballplate.extensions.sweeps import execute
 from ballplate.simulator.computing import processes
 from ballplate.simulator.computing.processes import in_processes
-from ballplate.sweeps import execute
 
 from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.error_maps.map_places import PlacesAsked, map_places
-from ballplate.error_maps.volumetric_errors import Volumetric
+from ballplate.extensions.maps.map_places import PlacesAsked, map_places
+from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
 
 MACHINES = Path("designs/park/machines")
@@ -236,7 +236,7 @@ def test_a_picture_for_other_programs(scales: Path, tmp_path: Path) -> None:
 
 
 def test_magnification_is_round() -> None:
-    from ballplate.error_maps.volumetric_plots import magnification_of
+    from ballplate.extensions.maps.volumetric_plots import magnification_of
 
     built = Volumetric(load_machine(ARM))
     found = built.errors(map_places(built.volume, PlacesAsked((3, 3, 3))).points)

@@ -636,7 +636,7 @@ def test_every_reason_is_told_at_once(
 def test_a_page_without_its_extra_is_told_before_the_store_is_read(
     files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from ballplate.sweeps import store
+    from ballplate.extensions.sweeps import store
 
     monkeypatch.setattr(store, "open_store", lambda *_: pytest.fail("has begun"))
     for name in ("jinja2", "matplotlib"):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.reproduction.published import npl
+from ballplate.extensions.reproduction.published import npl
 
 NPL = ["reproduce", "npl"]
 

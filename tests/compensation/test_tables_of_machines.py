@@ -15,9 +15,12 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.error_maps.compensation_tables import made_compensation, tabled_machine
-from ballplate.simulator.experiment.compensation.axis_tables import in_arrangement, on_tool_side
-from ballplate.simulator.experiment.compensation.making import TabledMachine, nodes_along
+from ballplate.extensions.compensation.axis_tables import in_arrangement, on_tool_side
+from ballplate.extensions.compensation.compensation_tables import (
+    made_compensation,
+    tabled_machine,
+)
+from ballplate.extensions.compensation.making import TabledMachine, nodes_along
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.description import true_volumetric

@@ -11,7 +11,10 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.error_maps.compensation_tables import made_compensation, tabled_machine
+from ballplate.extensions.compensation.compensation_tables import (
+    made_compensation,
+    tabled_machine,
+)
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.description import true_volumetric
 from numpy.testing import assert_allclose

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from ballplate.results.differences.compared_maps import ComparedMap, map_of_fit
+from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit
 from ballplate.results.fit import Fit
 from ballplate.results.study import fit as fit_observed
 from ballplate.simulator.experiment.layout import lay_out

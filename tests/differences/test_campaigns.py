@@ -8,10 +8,10 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.differences.compared_maps import map_of_fit
-from ballplate.results.differences.comparison import ComparisonSettings, MapComparison, compared
-from ballplate.results.differences.normalised_errors import FigureGroup
-from ballplate.results.differences.shared_certificates import (
+from ballplate.extensions.maps.compared_maps import map_of_fit
+from ballplate.extensions.maps.comparison import ComparisonSettings, MapComparison, compared
+from ballplate.extensions.maps.normalised_errors import FigureGroup
+from ballplate.extensions.maps.shared_certificates import (
     NothingSharedError,
     with_shared_certificates,
 )

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.differences.compared_maps import ComparedMap, map_of_fit, motions
-from ballplate.results.differences.comparison import ComparisonSettings, compared
+from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit, motions
+from ballplate.extensions.maps.comparison import ComparisonSettings, compared
 from ballplate.results.fit import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.geometry.motions import cross_matrices

@@ -8,7 +8,7 @@ from typing import Any
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.results.differences.map_difference import MapDifference
+from ballplate.extensions.maps.map_difference import MapDifference
 from ballplate.simulator.experiment.model import Experiment
 from scipy.stats import chi2
 

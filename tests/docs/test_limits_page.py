@@ -6,18 +6,21 @@ import re
 from pathlib import Path
 
 import pytest
-from ballplate.cli import lengths as lengths_command
-from ballplate.error_maps import curve_options
-from ballplate.error_maps import error_curve as curve
-from ballplate.error_maps import length_map as lengths
-from ballplate.error_maps import volumetric_errors as volumetric
 from ballplate.estimators import distances as estimators
+from ballplate.extensions.compensation import table_formats
+from ballplate.extensions.judgement import components
+from ballplate.extensions.maps import correction
+from ballplate.extensions.maps import length_map as lengths
+from ballplate.extensions.maps import lengths_command as lengths_command
+from ballplate.extensions.maps import volumetric_errors as volumetric
+from ballplate.extensions.requirements import root_search as search
+from ballplate.extensions.splines import curve_options
+from ballplate.extensions.splines import error_curve as curve
+from ballplate.extensions.sweeps import axes, bundle, load
+from ballplate.extensions.sweeps import sweep_settings as settings
 from ballplate.gross_errors import leftover
 from ballplate.montecarlo import trials
 from ballplate.planning import criteria, information
-from ballplate.planning.requirements import root_search as search
-from ballplate.results import correction
-from ballplate.results.variance_components import components
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values
 from ballplate.simulator.experiment import (
@@ -32,13 +35,10 @@ from ballplate.simulator.experiment import (
 from ballplate.simulator.experiment import (
     curve_files as curves,
 )
-from ballplate.simulator.experiment.compensation import table_formats
 from ballplate.simulator.geometry import artefacts, directions
 from ballplate.simulator.inputs import decoding, messages, tables, yamltree
 from ballplate.simulator.inputs import settings as input_settings
 from ballplate.simulator.splines import read
-from ballplate.sweeps import axes, bundle, load
-from ballplate.sweeps import sweep_settings as settings
 
 PAGE = Path("docs/reference/limits.md")
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import ballplate as bp
 import pytest
+from ballplate.extensions.sweeps.fingerprint import fingerprint
+from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.sweeps.fingerprint import fingerprint
-from ballplate.sweeps.load import experiment_of, load_sweep
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 NEW, OLD = "target_uncertainty", "target_accuracy"

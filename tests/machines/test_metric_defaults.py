@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.load import load
-from ballplate.sweeps.fingerprint import fingerprint
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
@@ -26,7 +27,6 @@ from ballplate.simulator.machines.terms import (
     sums,
     univariate,
 )
-from ballplate.sweeps.fingerprint import fingerprint
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
 

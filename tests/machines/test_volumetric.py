@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.error_maps.map_places import PlacesAsked, map_places
-from ballplate.error_maps.volumetric_errors import Volumetric
+from ballplate.extensions.maps.map_places import PlacesAsked, map_places
+from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.curves import Points

@@ -214,7 +214,7 @@ def test_tasks_of_an_experiment(fitted: FittedMap, tmp_path: Path) -> None:
     experiment = bp.quickstart().with_(
         {"evaluation": {"tasks": [task, {**task, "name": "tight", "target_uncertainty": "1 nm"}]}}
     )
-    from ballplate.results.correction import correction
+    from ballplate.extensions.maps.correction import correction
     from ballplate.results.wanted_lengths import tasks_of_experiment
     from ballplate.simulator.readings.point_files import GivenPoints
 

@@ -12,6 +12,7 @@ import ballplate as bp
 import numpy as np
 import pandas
 import pytest
+from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.results import campaign_sigmas
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
@@ -24,7 +25,6 @@ from ballplate.simulator.maps.map_prior import (
     MapShare,
     determined_combinations,
 )
-from ballplate.sweeps.fingerprint import fingerprint
 from scipy import stats
 
 from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files

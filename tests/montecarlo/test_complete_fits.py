@@ -10,6 +10,7 @@ from functools import cache
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.sweeps.task import trial_figures
 from ballplate.montecarlo import replicates
 from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
@@ -24,7 +25,6 @@ from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.sweeps.task import trial_figures
 
 from .test_replicates import assert_agree, small, truth, with_length_standard, with_unknown_probes
 

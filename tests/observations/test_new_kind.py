@@ -137,7 +137,7 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.cli import main
-from ballplate.planning.repair.certificates import better_certificates
+from ballplate.extensions.repair.certificates import better_certificates
 from ballplate.simulator.inputs.messages import ExperimentError
 
 def said(*arguments):

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.extensions.campaign.sheet import sheet_of
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import run_sheet
-from ballplate.planning.sheet import sheet_of
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

@@ -10,8 +10,8 @@ from random import Random
 from typing import Any
 
 import pytest
-from ballplate.planning.repair.mending import mended, to_write
-from ballplate.planning.repair.repair_search import Repair, repairs
+from ballplate.extensions.repair.mending import mended, to_write
+from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.results.study import check
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment

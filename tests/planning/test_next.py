@@ -12,10 +12,14 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.cli import main
-from ballplate.cli.watching import settled
-from ballplate.planning.next_position import next_step, possible_positions, with_positions
-from ballplate.planning.next_result import NextStep
-from ballplate.planning.requirements.goals import GoalError, parse_goal
+from ballplate.extensions.campaign.next_position import (
+    next_step,
+    possible_positions,
+    with_positions,
+)
+from ballplate.extensions.campaign.next_result import NextStep
+from ballplate.extensions.campaign.watching_command import settled
+from ballplate.extensions.requirements.goals import GoalError, parse_goal
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.yamltree import GivenText

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from ballplate.extensions.repair.changes import Change, ChangeKind, apply_all
+from ballplate.extensions.repair.judging import examine, judge
+from ballplate.extensions.repair.mending import mended, to_write
+from ballplate.extensions.repair.offers import offers
+from ballplate.extensions.repair.repair_search import Repair, Repairs, repairs
+from ballplate.extensions.repair.repair_tables import repair_lines
+from ballplate.extensions.repair.screening import rank_of, seen_by
 from ballplate.planning.checked_files import Wanted, check_files
-from ballplate.planning.repair.changes import Change, ChangeKind, apply_all
-from ballplate.planning.repair.judging import examine, judge
-from ballplate.planning.repair.mending import mended, to_write
-from ballplate.planning.repair.offers import offers
-from ballplate.planning.repair.repair_search import Repair, Repairs, repairs
-from ballplate.planning.repair.repair_tables import repair_lines
-from ballplate.planning.repair.screening import rank_of, seen_by
 from ballplate.results.study import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.reading_lists import planned_readings
-from ballplate.planning.sheet import Sheet, sheet_of
+from ballplate.extensions.campaign.reading_lists import planned_readings
+from ballplate.extensions.campaign.sheet import Sheet, sheet_of
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 

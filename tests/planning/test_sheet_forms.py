@@ -10,17 +10,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from ballplate.planning.drawings import MARGIN, SIZE, place_drawing
-from ballplate.planning.schedule import RunSheet, run_sheet
-from ballplate.planning.sheet_forms import (
+from ballplate.extensions.campaign.drawings import MARGIN, SIZE, place_drawing
+from ballplate.extensions.campaign.sheet_forms import (
     COLUMNS,
     sheet_csv,
     sheet_data,
     sheet_lines,
     sheet_markdown,
 )
-from ballplate.planning.sheet_page import sheet_page
-from ballplate.planning.sheet_words import summary
+from ballplate.extensions.campaign.sheet_page import sheet_page
+from ballplate.extensions.campaign.sheet_words import summary
+from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.positions import ball_coordinates

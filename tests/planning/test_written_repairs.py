@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.planning.repair.mending import mended
-from ballplate.planning.repair.repair_search import Repair, repairs
-from ballplate.planning.repair.repair_tables import repair_lines
+from ballplate.extensions.repair.mending import mended
+from ballplate.extensions.repair.repair_search import Repair, repairs
+from ballplate.extensions.repair.repair_tables import repair_lines
 from ballplate.presentation.formatting import number
 from ballplate.results.study import check, predict
 from ballplate.simulator.experiment.load import load

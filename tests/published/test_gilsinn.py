@@ -9,7 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.error_maps.error_curve import CurveSettings, ErrorCurve, Hold, fit_curve
+from ballplate.extensions.splines.error_curve import (
+    CurveSettings,
+    ErrorCurve,
+    Hold,
+    fit_curve,
+)
 from ballplate.simulator.splines.pieces import pieces
 from ballplate.simulator.splines.read import choose_points, read_points
 

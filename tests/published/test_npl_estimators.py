@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.estimators.distances import QUANTILES
-from ballplate.reproduction.compare import compare_difference
-from ballplate.reproduction.published import npl
-from ballplate.reproduction.shipped import Shipped
+from ballplate.extensions.reproduction.compare import compare_difference
+from ballplate.extensions.reproduction.published import npl
+from ballplate.extensions.reproduction.shipped import Shipped
 
 
 @pytest.mark.parametrize("trials", [30, pytest.param(100, marks=pytest.mark.long)])

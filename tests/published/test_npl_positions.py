@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.reproduction.published import npl
+from ballplate.extensions.reproduction.published import npl
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

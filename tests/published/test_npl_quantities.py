@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.reproduction.published_quantities import tabulated_quantities
+from ballplate.extensions.reproduction.published_quantities import tabulated_quantities
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ballplate.reproduction.compare import compare_rank
-from ballplate.reproduction.published import npl
-from ballplate.reproduction.shipped import Shipped
+from ballplate.extensions.reproduction.compare import compare_rank
+from ballplate.extensions.reproduction.published import npl
+from ballplate.extensions.reproduction.shipped import Shipped
 from ballplate.results.study import check
 from ballplate.simulator.experiment.load import load
 

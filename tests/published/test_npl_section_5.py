@@ -13,16 +13,16 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from ballplate.rank.verdict import Verdict
-from ballplate.reproduction import compare
-from ballplate.reproduction.compare import compare_progress
-from ballplate.reproduction.published import npl
-from ballplate.reproduction.shipped import (
+from ballplate.extensions.reproduction import compare
+from ballplate.extensions.reproduction.compare import compare_progress
+from ballplate.extensions.reproduction.published import npl
+from ballplate.extensions.reproduction.shipped import (
     Shipped,
     fitted_exactly,
     shipped_experiment,
     sums_of_squares,
 )
+from ballplate.rank.verdict import Verdict
 from ballplate.results.fit import Fit
 from ballplate.results.study import check
 from ballplate.simulator.experiment.load import load

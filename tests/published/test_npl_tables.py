@@ -8,9 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.reproduction.compare import compare_column, compare_erratum, compare_remark
-from ballplate.reproduction.published import SYMBOLS, case_of, npl
-from ballplate.reproduction.shipped import Shipped, planned
+from ballplate.extensions.reproduction.compare import (
+    compare_column,
+    compare_erratum,
+    compare_remark,
+)
+from ballplate.extensions.reproduction.published import SYMBOLS, case_of, npl
+from ballplate.extensions.reproduction.shipped import Shipped, planned
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
 from ballplate.simulator.estimation.linearisation import linearise

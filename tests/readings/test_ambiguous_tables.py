@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.laboratory.any_table import TableRows
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.any_table import TableRows
 from ballplate.simulator.readings.reading_sources import read_source
 from hypothesis import example, given, settings
 from hypothesis import strategies as st

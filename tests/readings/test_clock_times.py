@@ -8,11 +8,11 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
+from ballplate.extensions.laboratory.clock_times import ClockError, clock_time
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.quantities import DURATION_UNITS
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.clock_times import ClockError, clock_time
 from ballplate.simulator.readings.reading_sources import source_rows
 
 DRIFT = {"kind": "drift", "axes": {"standard_uncertainty": "2 um/h"}}

@@ -7,10 +7,10 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.laboratory.feature_names import fold, named, position_of_file
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.name_rules import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.feature_names import fold, named, position_of_file
 
 QUICKSTART = "designs/quickstart.yaml"
 DESIGN = lay_out(bp.quickstart())

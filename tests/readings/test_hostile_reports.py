@@ -13,9 +13,9 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.laboratory.formats.registered import FORMATS
+from ballplate.extensions.laboratory.formats.report import Report
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.formats.registered import FORMATS
-from ballplate.simulator.readings.formats.report import Report
 
 from tests.readings import makers
 from tests.readings.makers import Ball

@@ -9,9 +9,9 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.laboratory.formats.registered import FORMATS, read_report
+from ballplate.extensions.laboratory.formats.report import Feature
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.formats.registered import FORMATS, read_report
-from ballplate.simulator.readings.formats.report import Feature
 
 from tests.readings import makers
 from tests.readings.makers import Ball

@@ -9,10 +9,10 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.judgement.ladder import ladder
 from ballplate.gross_errors import refits
 from ballplate.gross_errors.refits import diagnosis_with_refits
 from ballplate.gross_errors.wording import diagnosis_words
-from ballplate.results.validation.ladder import ladder
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS

@@ -8,8 +8,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from ballplate.sweeps.store import Store, add_rows, add_sweep, open_store
-from ballplate.sweeps.task import CellResult
+from ballplate.extensions.sweeps.store import Store, add_rows, add_sweep, open_store
+from ballplate.extensions.sweeps.task import CellResult
 
 VERSIONS = (("ballplate", "0.1.0"), ("python", "3.11"))
 VOID = {"meta", "link", "br", "hr", "img", "input", "col"}

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.report.answer import answer
-from ballplate.report.heatmaps import BLANK, DEFICIENT, heat_maps
-from ballplate.report.results import ReportedSweep, read_results
-from ballplate.report.series import plots
-from ballplate.report.store_comparison import IncomparableError, compared
-from ballplate.sweeps.store import open_store
+from ballplate.extensions.sweeps.report.answer import answer
+from ballplate.extensions.sweeps.report.heatmaps import BLANK, DEFICIENT, heat_maps
+from ballplate.extensions.sweeps.report.results import ReportedSweep, read_results
+from ballplate.extensions.sweeps.report.series import plots
+from ballplate.extensions.sweeps.report.store_comparison import IncomparableError, compared
+from ballplate.extensions.sweeps.store import open_store
 
 from tests.report.stores import axis, done, failed, made_up
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.error_maps import volumetric_plots
-from ballplate.error_maps.map_places import PlacesAsked, map_places
-from ballplate.error_maps.volumetric_errors import Volumetric
+from ballplate.extensions.maps import volumetric_plots
+from ballplate.extensions.maps.map_places import PlacesAsked, map_places
+from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.presentation.svg import save
 from ballplate.simulator.experiment.machine_file import load_machine
 from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.planning.campaign_picture import draw_campaign, words
+from ballplate.extensions.campaign.campaign_picture import draw_campaign, words
 from ballplate.planning.choice import CurvePoint, Gain
 from ballplate.planning.constraints import Budget, Spent
 from ballplate.planning.selection import Campaign

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from ballplate.presentation.pages.document import shipped
+from ballplate.extensions.pages.document import shipped
 
 STYLE = shipped("marks.css") + shipped("page.css")
 SCHEMES = [

@@ -12,9 +12,9 @@ from typing import Any
 
 import ballplate as bp
 import pytest
-from ballplate.report.design_contents import page_of_design
+from ballplate.extensions.sweeps.report.design_contents import page_of_design
+from ballplate.extensions.sweeps.task import CellResult
 from ballplate.simulator.inputs.yamltree import to_python
-from ballplate.sweeps.task import CellResult
 
 from tests.report.browser import assert_quiet, browser, program
 from tests.report.stores import axis, done, failed, made_up

@@ -15,17 +15,17 @@ import ballplate as bp
 import pytest
 from ballplate.cli import main
 from ballplate.designs import shipped
-from ballplate.report.cells import NoExperimentError, experiments
-from ballplate.report.page import page
-from ballplate.report.results import read_results
-from ballplate.report.verdicts import ranks
+from ballplate.extensions.studio.document import opened
+from ballplate.extensions.studio.sweeping import swept
+from ballplate.extensions.sweeps.frame import frame
+from ballplate.extensions.sweeps.report.cells import NoExperimentError, experiments
+from ballplate.extensions.sweeps.report.page import page
+from ballplate.extensions.sweeps.report.results import read_results
+from ballplate.extensions.sweeps.report.verdicts import ranks
+from ballplate.extensions.sweeps.store import open_store
 from ballplate.results.study import predict
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.experiment.load import load
-from ballplate.studio.document import opened
-from ballplate.studio.sweeping import swept
-from ballplate.sweeps.frame import frame
-from ballplate.sweeps.store import open_store
 from ballplate.uncertainty.error_map import error_map
 
 from tests.report.stores import Page, axis, done, failed, made_up
@@ -314,7 +314,9 @@ def test_python_writes_the_page_of_a_sweep(
     plate_sizes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("ballplate.report.page.page", lambda *given: asked.append(given) or "page")
+    monkeypatch.setattr(
+        "ballplate.extensions.sweeps.report.page.page", lambda *given: asked.append(given) or "page"
+    )
     result = bp.stored(plate_sizes)
     told = {"run_modules": True, "compare": plate_sizes}
     assert bp.page(result, tmp_path / "a.html", **told) == "page"

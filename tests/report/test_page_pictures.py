@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.presentation.pages.charts import Chart, Trace, chart_svg
-from ballplate.presentation.pages.spatial import Layer, SpatialPicture, figure_of
+from ballplate.extensions.pages.charts import Chart, Trace, chart_svg
+from ballplate.extensions.pages.spatial import Layer, SpatialPicture, figure_of
 from ballplate.presentation.scene import projection
 
 

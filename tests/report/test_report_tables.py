@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.report.heatmaps import DEFICIENT, SHADES, heat_maps
+from ballplate.extensions.sweeps.report.results import best_and_worst, read_results
+from ballplate.extensions.sweeps.report.series import plots
+from ballplate.extensions.sweeps.report.tables import MOST_BEST, MOST_ROWS, report_tables
+from ballplate.extensions.sweeps.store import Store
 from ballplate.presentation.formats import FORMATS
-from ballplate.report.heatmaps import DEFICIENT, SHADES, heat_maps
-from ballplate.report.results import best_and_worst, read_results
-from ballplate.report.series import plots
-from ballplate.report.tables import MOST_BEST, MOST_ROWS, report_tables
-from ballplate.sweeps.store import Store
 
 from tests.report.stores import axis, done, failed, made_up
 

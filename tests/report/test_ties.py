@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.report.answer import answer
-from ballplate.report.heatmaps import heat_maps
-from ballplate.report.results import best_and_worst, ranked, read_results
-from ballplate.report.store_comparison import compared
+from ballplate.extensions.sweeps.report.answer import answer
+from ballplate.extensions.sweeps.report.heatmaps import heat_maps
+from ballplate.extensions.sweeps.report.results import best_and_worst, ranked, read_results
+from ballplate.extensions.sweeps.report.store_comparison import compared
 
 from tests.report.stores import axis, done, made_up
 

@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.presentation.pages import embedded
+from ballplate.extensions.pages import embedded
 
 from tests.report.browser import Browser, browser, program
 from tests.report.pages_read import ResultPage

@@ -7,8 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.schema import schema
-from ballplate.sweeps.sweep_schema import schema as sweep_schema
 
 from tests.robustness.mutations import vocabulary
 from tests.robustness.worker import complaint

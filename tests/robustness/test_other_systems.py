@@ -13,9 +13,9 @@ from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.bundle import Bundle, names_of, unpack
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.sweeps.bundle import Bundle, names_of, unpack
 
 from tests import conftest
 

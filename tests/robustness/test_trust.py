@@ -16,9 +16,9 @@ import ballplate as bp
 import pytest
 from ballplate.cli import main
 from ballplate.designs import shipped
+from ballplate.extensions.studio.jobs import JOBS
+from ballplate.extensions.studio.session import Session
 from ballplate.simulator.inputs.yamltree import parse_tree, to_list, to_python
-from ballplate.studio.jobs import JOBS
-from ballplate.studio.session import Session
 
 from tests.report.stores import axis, done, made_up
 

@@ -6,4 +6,4 @@ import pytest
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are waited for, however busy the machine is."""
-    monkeypatch.setattr("ballplate.studio.session.PATIENCE", 120.0)
+    monkeypatch.setattr("ballplate.extensions.studio.session.PATIENCE", 120.0)

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 from ballplate.designs import shipped
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.studio.actions import ACTIONS, ActionError, done
-from ballplate.studio.document import (
+from ballplate.extensions.studio.actions import ACTIONS, ActionError, done
+from ballplate.extensions.studio.document import (
     ChangedOnDiskError,
     changed,
     experiment_of,
@@ -16,6 +15,7 @@ from ballplate.studio.document import (
     saved,
     undone,
 )
+from ballplate.simulator.inputs.messages import ExperimentError
 
 
 @pytest.fixture
@@ -127,7 +127,7 @@ def test_standing_across_another_axis_keeps_the_middle(design):
 
 
 def test_a_position_that_was_removed_is_put_back_as_it_was(design):
-    from ballplate.studio.actions import settings_of
+    from ballplate.extensions.studio.actions import settings_of
 
     before = opened(design)
     settings = settings_of(before, "y low")

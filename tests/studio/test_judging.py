@@ -18,8 +18,8 @@ from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
-from ballplate.studio.recovery import kept_in
-from ballplate.studio.session import RefusedError, Session
+from ballplate.extensions.studio.recovery import kept_in
+from ballplate.extensions.studio.session import RefusedError, Session
 
 from tests.studio.test_recovery import MODEL, in_python
 
@@ -49,7 +49,7 @@ def kept_text(design: Path) -> str:
 def test_a_slow_design_is_kept_and_answered_as_pending(session, design, monkeypatch):
     first = session.state()
     assert POINTS in first["text"] and not first["pending"]
-    monkeypatch.setattr("ballplate.studio.session.PATIENCE", 0.0)
+    monkeypatch.setattr("ballplate.extensions.studio.session.PATIENCE", 0.0)
     slow = first["text"].replace(POINTS, SLOW)
     session.act({"do": "text", "text": slow})
     assert kept_text(design) == slow
@@ -67,7 +67,7 @@ def test_a_slow_design_is_kept_and_answered_as_pending(session, design, monkeypa
     session.act({"do": "set", "path": ["title"], "value": "mine"})
     assert not process.is_alive() and kept_text(design) == session.state()["text"]
     session.act({"do": "undo"})
-    monkeypatch.setattr("ballplate.studio.session.PATIENCE", 120.0)
+    monkeypatch.setattr("ballplate.extensions.studio.session.PATIENCE", 120.0)
     session.act({"do": "undo"})
     last = session.state()
     assert not last["pending"] and last["text"] == first["text"]
@@ -76,14 +76,14 @@ def test_a_slow_design_is_kept_and_answered_as_pending(session, design, monkeypa
 
 def test_figures_are_never_those_of_another_text(session, monkeypatch):
     """Changes come at every stage of the judging of those before them."""
-    monkeypatch.setattr("ballplate.studio.session.PATIENCE", 0.0)
+    monkeypatch.setattr("ballplate.extensions.studio.session.PATIENCE", 0.0)
     for k in range(12):
         session.act({"do": "set", "path": ["title"], "value": f"t{k}"})
         time.sleep(0.02 * k)
         state = session.state()
         assert state["data"]["title"] == f"t{k}"
         assert state["pending"] or state["design"]["title"] == f"t{k}"
-    monkeypatch.setattr("ballplate.studio.session.PATIENCE", 120.0)
+    monkeypatch.setattr("ballplate.extensions.studio.session.PATIENCE", 120.0)
     assert session.state()["design"]["title"] == "t11"
 
 

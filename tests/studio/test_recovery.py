@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from ballplate.cli.studio import unsaved
 from ballplate.designs import shipped
+from ballplate.extensions.studio.document import opened
+from ballplate.extensions.studio.jobs import JOBS
+from ballplate.extensions.studio.recovery import kept_in, recovered
+from ballplate.extensions.studio.session import RefusedError, Session
+from ballplate.extensions.studio.studio_command import unsaved
+from ballplate.extensions.studio.sweeping import swept
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.studio.document import opened
-from ballplate.studio.jobs import JOBS
-from ballplate.studio.recovery import kept_in, recovered
-from ballplate.studio.session import RefusedError, Session
-from ballplate.studio.sweeping import swept
 
 from tests.cli.cuts import ACTED, remains
 
@@ -213,7 +213,7 @@ def test_what_was_kept_before_the_folder_was_full_is_no_promise(design, monkeypa
     def fail(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("ballplate.studio.recovery.replace_file", fail)
+    monkeypatch.setattr("ballplate.extensions.studio.recovery.replace_file", fail)
     session.act({"do": "turn", "position": "x low"})
     assert kept_in(design).exists() and not session.state()["recoverable"]
     assert "could not be kept" in unsaved(session)
@@ -230,7 +230,7 @@ def test_a_file_that_cannot_be_opened_costs_nothing_of_what_is_not_saved(design,
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr("ballplate.studio.session.opened", fail)
+    monkeypatch.setattr("ballplate.extensions.studio.session.opened", fail)
     with pytest.raises(MemoryError):
         session.act({"do": "open", "name": "other.yaml", "discard": True})
     assert session.state()["text"] == text
@@ -250,7 +250,7 @@ def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, 
     def fail(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("ballplate.studio.recovery.replace_file", fail)
+    monkeypatch.setattr("ballplate.extensions.studio.recovery.replace_file", fail)
     session = Session(design)
     session.act({"do": "turn", "position": "z low"})
     state = session.state()

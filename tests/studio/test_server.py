@@ -11,10 +11,10 @@ from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
+from ballplate.extensions.studio.server import application
+from ballplate.extensions.studio.session import RefusedError, Session
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
-from ballplate.studio.server import application
-from ballplate.studio.session import RefusedError, Session
 from starlette.testclient import TestClient
 
 PORT, TOKEN = 8123, "a-token-of-the-tests"
@@ -177,7 +177,7 @@ def test_saving_over_what_another_program_wrote_is_refused(client, design):
 
 
 def test_a_request_is_limited_though_its_length_is_not_stated(client, monkeypatch, session):
-    monkeypatch.setattr("ballplate.studio.server.MOST_BYTES", 2000)
+    monkeypatch.setattr("ballplate.extensions.studio.server.MOST_BYTES", 2000)
     headers = {"Content-Type": "application/json"}
     taken = []
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.designs import shipped
+from ballplate.extensions.studio.actions import ActionError
+from ballplate.extensions.studio.document import DesignDocument, changed, opened
+from ballplate.extensions.studio.jobs import JOBS, _work
+from ballplate.extensions.studio.sweeping import MOST_CELLS, ensure_possible, swept
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.studio.actions import ActionError
-from ballplate.studio.document import DesignDocument, changed, opened
-from ballplate.studio.jobs import JOBS, _work
-from ballplate.studio.sweeping import MOST_CELLS, ensure_possible, swept
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def document(tmp_path: Path) -> DesignDocument:
 
 def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatch):
     steps = []
-    monkeypatch.setattr("ballplate.report.page.page", lambda *_: "the page")
+    monkeypatch.setattr("ballplate.extensions.sweeps.report.page.page", lambda *_: "the page")
     axes = [
         {"paths": ["machine.repeatability"], "values": ["0.1 um", "0.4 um"]},
         {
@@ -66,7 +66,7 @@ def pageless(monkeypatch):
     def fail(*_, **__):
         raise ImportError("matplotlib")
 
-    monkeypatch.setattr("ballplate.report.page.page", fail)
+    monkeypatch.setattr("ballplate.extensions.sweeps.report.page.page", fail)
 
 
 def test_values_may_name_files_beside_the_design(document, pageless):

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pandas
-from ballplate.sweeps.frame import frame
-from ballplate.sweeps.store import open_store
+from ballplate.extensions.sweeps.frame import frame
+from ballplate.extensions.sweeps.store import open_store
 
 ROOT = Path(__file__).parents[2]
 

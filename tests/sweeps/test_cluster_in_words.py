@@ -10,9 +10,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from ballplate.sweeps import cluster
-from ballplate.sweeps.cluster import ClusterError, OtherVersionError, _on_worker, _refuse
-from ballplate.sweeps.task import CellTask
+from ballplate.extensions.sweeps import cluster
+from ballplate.extensions.sweeps.cluster import (
+    ClusterError,
+    OtherVersionError,
+    _on_worker,
+    _refuse,
+)
+from ballplate.extensions.sweeps.task import CellTask
 
 from .support import ROOT, command, small_sweep, stored
 
@@ -36,8 +41,8 @@ importlib.metadata.version = lambda name: "0.0.7" if name == "ballplate" else re
 """
 # One with the same version but other code.
 OTHER_CODE = """
-import ballplate.sweeps.cluster
-ballplate.sweeps.cluster.code_digest = lambda: "other"
+import ballplate.extensions.sweeps.cluster
+ballplate.extensions.sweeps.cluster.code_digest = lambda: "other"
 """
 SERVE = """
 import asyncio, sys

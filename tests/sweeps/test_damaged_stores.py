@@ -16,10 +16,17 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.cli import main
-from ballplate.sweeps import store_file
-from ballplate.sweeps.model import Sweep
-from ballplate.sweeps.store import Store, StoreError, add_rows, add_sweep, open_store, results
-from ballplate.sweeps.task import CellResult, CellTask, compute
+from ballplate.extensions.sweeps import store_file
+from ballplate.extensions.sweeps.model import Sweep
+from ballplate.extensions.sweeps.store import (
+    Store,
+    StoreError,
+    add_rows,
+    add_sweep,
+    open_store,
+    results,
+)
+from ballplate.extensions.sweeps.task import CellResult, CellTask, compute
 
 from tests.reference.tables import read_table
 
@@ -326,7 +333,7 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
                 os.mkfifo(store)
         return compute(loaded, task)
 
-    monkeypatch.setattr("ballplate.sweeps.local.compute", vanishing)
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", vanishing)
     assert main(commands(store, "sweep")[0]) == 3
     out, err = capsys.readouterr()
     assert "done" not in out
@@ -346,12 +353,13 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
 def test_a_store_that_vanishes_at_the_end_is_not_called_done(
     store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from ballplate.sweeps import execute
+    from ballplate.extensions.sweeps import execute
 
     with monkeypatch.context() as patched:
         real = execute.run_sweep
         patched.setattr(
-            "ballplate.sweeps.running.run_sweep", lambda *a, **o: _gone(real(*a, **o), store)
+            "ballplate.extensions.sweeps.running.run_sweep",
+            lambda *a, **o: _gone(real(*a, **o), store),
         )
         assert main(commands(store, "sweep")[0]) == 3
     out, err = capsys.readouterr()

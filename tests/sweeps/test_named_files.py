@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps import bundle as bundles
+from ballplate.extensions.sweeps.bundle import bundle_of
+from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import read_tree
-from ballplate.sweeps import bundle as bundles
-from ballplate.sweeps.bundle import bundle_of
-from ballplate.sweeps.load import load_sweep
 
 EXPERIMENT = """\
 title: "../secret/id_rsa"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.load import load
-from ballplate.sweeps.fingerprint import fingerprint
 
 MODULE = """
 import numpy as np

@@ -10,11 +10,11 @@ from pathlib import Path
 import ballplate as bp
 import pandas
 import pytest
+from ballplate.extensions.sweeps.fingerprint import fingerprint
+from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment import structure
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.sweeps.fingerprint import fingerprint
-from ballplate.sweeps.load import experiment_of, load_sweep
 
 from .support import ROOT, small_sweep
 

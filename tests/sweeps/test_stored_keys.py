@@ -10,8 +10,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from ballplate.extensions.sweeps.fingerprint import METHOD, fingerprint
 from ballplate.simulator.experiment.load import load
-from ballplate.sweeps.fingerprint import METHOD, fingerprint
 
 KEPT = [
     ("quickstart.yaml", "quickstart", "9cce15c3e7bebae2bfb31f6733a7fd4ae6c88151"),

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from ballplate.cli import main
-from ballplate.sweeps import cluster as cluster_of_workers
+from ballplate.extensions.sweeps import cluster as cluster_of_workers
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep, stored
 

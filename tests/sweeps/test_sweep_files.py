@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.sweeps.load import experiment_of, load_sweep
+from ballplate.extensions.sweeps.model import Sweep
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.sweeps.load import experiment_of, load_sweep
-from ballplate.sweeps.model import Sweep
 
 HEAD = "title: a test\nbase: quickstart.yaml\n"
 SIZE = '["artefacts.plate.size[0]", "artefacts.plate.size[1]"]'

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.bundle import bundle_of, unpack
+from ballplate.extensions.sweeps.fingerprint import fingerprint
+from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment.load import load
-from ballplate.sweeps.bundle import bundle_of, unpack
-from ballplate.sweeps.fingerprint import fingerprint
-from ballplate.sweeps.load import experiment_of, load_sweep
 
 SWEEP = """\
 title: with a machine file

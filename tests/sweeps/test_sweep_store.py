@@ -14,15 +14,15 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.fingerprint import METHOD, fingerprint
+from ballplate.extensions.sweeps.load import experiment_of, load_sweep
+from ballplate.extensions.sweeps.model import Sweep
+from ballplate.extensions.sweeps.store import definitions, files, keys, open_store, results
+from ballplate.extensions.sweeps.task import BLOCK, CellResult, CellTask, compute
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.sweeps.fingerprint import METHOD, fingerprint
-from ballplate.sweeps.load import experiment_of, load_sweep
-from ballplate.sweeps.model import Sweep
-from ballplate.sweeps.store import definitions, files, keys, open_store, results
-from ballplate.sweeps.task import BLOCK, CellResult, CellTask, compute
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep
 
@@ -68,7 +68,7 @@ def test_a_second_run_computes_nothing(
 ) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path) == 1
-    monkeypatch.setattr("ballplate.sweeps.local.compute", None)
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", None)
     capsys.readouterr()
     assert sweep(path) == 1
     assert (
@@ -141,7 +141,7 @@ def test_an_interrupted_run_leaves_no_rows_of_two_methods(
         return compute(loaded, task)
 
     with monkeypatch.context() as patched:
-        patched.setattr("ballplate.sweeps.local.compute", second_fails)
+        patched.setattr("ballplate.extensions.sweeps.local.compute", second_fails)
         assert sweep(path) == 130
     assert_same(rows(store), right[:1].reset_index(drop=True))
     sweep(path)
@@ -205,7 +205,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
             )
         return compute(loaded, task)
 
-    monkeypatch.setattr("ballplate.sweeps.local.compute", changing)
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", changing)
     assert sweep(path) == 3
     assert "were changed while it ran" in capsys.readouterr().err
     # What was computed before the change is there, and nothing else.
@@ -230,7 +230,7 @@ def test_what_two_sweeps_share_is_computed_once(
         done.append(task)
         return compute(loaded, task)
 
-    monkeypatch.setattr("ballplate.sweeps.local.compute", counted)
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", counted)
     sweep(path, "--beside")
     # What is no valid experiment is judged anew.
     assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
@@ -265,7 +265,7 @@ def test_replicates_in_blocks_are_the_same_replicates(
 ) -> None:
     path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
     assert BLOCK % 512 == 0
-    monkeypatch.setattr("ballplate.sweeps.task.BLOCK", 512)
+    monkeypatch.setattr("ballplate.extensions.sweeps.task.BLOCK", 512)
     assert sweep(path) == 1
     split = rows(tmp_path / "small.sqlite")
     monkeypatch.undo()
@@ -496,7 +496,7 @@ def test_a_cell_that_finds_no_memory_says_so(
             np.empty(each)
         raise MemoryError
 
-    monkeypatch.setattr(f"ballplate.sweeps.task.{place}", finds_none)
+    monkeypatch.setattr(f"ballplate.extensions.sweeps.task.{place}", finds_none)
     row = compute(loaded, CellTask(0))
     assert row.status == "failed"
     assert (
@@ -520,6 +520,6 @@ def test_the_errors_of_a_cell_are_one_line(tmp_path: Path, monkeypatch: pytest.M
         def fails(*_: object, error: Exception = error) -> None:
             raise error
 
-        monkeypatch.setattr("ballplate.sweeps.task.predict", fails)
+        monkeypatch.setattr("ballplate.extensions.sweeps.task.predict", fails)
         row = compute(loaded, CellTask(0))
         assert row.status == "failed" and row.reason.startswith(expected)

@@ -1,1 +1,0 @@
-"""Errors and uncertainties along curves, axes and through the volume."""

@@ -1,0 +1,1 @@
+"""Campaigns: the run sheet, the next position, and readings of interrupted days."""

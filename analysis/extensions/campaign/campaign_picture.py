@@ -1,0 +1,408 @@
+"""Drawing of a planned campaign: criterion against budget, gains of the candidates, the chosen
+positions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ballplate.planning.choice import Gain, Selection
+from ballplate.planning.constraints import HOUR, Budget, Spent
+from ballplate.planning.criteria import DESCRIPTIONS
+from ballplate.presentation.formatting import number
+from ballplate.presentation.pictures import draw_scene
+from ballplate.presentation.scene import scene
+from ballplate.presentation.svg import (
+    DASHES,
+    INK,
+    MARKERS,
+    MUTED,
+    PAPER,
+    SERIES,
+    drawing,
+    legend_above,
+    placed_axes,
+    save,
+)
+from ballplate.simulator.experiment.model import Candidate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+# Points: of the drawing, its parts and what stands around them.
+WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
+CURVE, SCENE, ROW, LEGEND, UNDER = 180.0, 330.0, 17.0, 42.0, 4.0
+# Room for a line of a value alone, and for its name.
+STRIP, LABELS = 22.0, 134.0
+# Room for a position's number on the left of the gains, and for their values on the right.
+NUMBERS, VALUES = 26.0, 74.0
+
+CHOSEN, BOUND, TARGET = "chosen", "bound of any choice", "target"
+
+# Candidates that are drawn, of the chosen ones and of those left out, and the letters of a name.
+MOST_CHOSEN, MOST_LEFT_OUT, MOST_LETTERS = 24, 5, 66
+
+# Values further apart than this are drawn on a logarithmic axis; a target further off than this is
+# told in words.
+WIDE, FAR = 5.0, 4.0
+
+
+def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figure:
+    """A picture of the criterion against the budget, of the gain of each candidate, and of the
+    positions.
+
+    It is written to the path, if there is one.
+
+    :raises ImportError: matplotlib is missing.
+    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises OSError: the file cannot be written.
+    """
+    rows, marks = _rows(selection), _marks(selection)
+    bars = ROW * max(len(rows), 1)
+    top = CURVE + LEGEND if selection.curve else STRIP * len(marks)
+    total = SCENE + UNDER + bars + ABOVE + BELOW + top + ABOVE
+    with drawing(total, WIDTH) as figure:
+        _title(
+            figure,
+            total - 14.0,
+            f"{DESCRIPTIONS[selection.criterion]}{'' if selection.unit == '1' else ', µm'}",
+        )
+        if selection.curve:
+            _curve(
+                placed_axes(figure, LEFT, total - ABOVE - top, WIDTH - LEFT - RIGHT, CURVE),
+                selection,
+                marks,
+            )
+        else:
+            _strip(
+                placed_axes(figure, LABELS, total - ABOVE - top, WIDTH - LABELS - VALUES, top),
+                marks,
+            )
+        bottom = SCENE + UNDER
+        axes = placed_axes(figure, NUMBERS, bottom, WIDTH - NUMBERS - VALUES, bars)
+        _title(
+            figure,
+            bottom + bars + 14.0,
+            f"how much larger {selection.criterion} is without each of the chosen ones",
+        )
+        _bars(axes, rows)
+        axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
+        axes.set_axis_off()
+        axes.set_aspect("equal")
+        draw_scene(axes, scene(selection.prediction.design), by_number=True)
+        return save(figure, path, words(selection))
+
+
+def words(selection: Selection) -> str:
+    """The picture for those who do not see it."""
+    told = [
+        f"{selection.criterion}, no more than {selection.budget}:"
+        f" chosen {_told(selection, selection.value)}"
+    ]
+    if not math.isnan(selection.bound):
+        told.append(f"bound of any choice {_told(selection, selection.bound)}")
+    if selection.drawn is not None:
+        told.append(f"{selection.drawn_words} {_told(selection, selection.drawn)}")
+    if selection.target is not None:
+        told.append(f"target {_told(selection, selection.target)}")
+    offered = len(selection.pool.candidates)
+    return f"{', '.join(told)}; {len(selection.chosen)} chosen of {offered} candidates"
+
+
+def _told(selection: Selection, value: float) -> str:
+    if math.isinf(value):
+        return "deficient"
+    return number(value, 3) if selection.unit == "1" else f"{number(1e6 * value, 3)} µm"
+
+
+def _title(figure: Figure, height: float, text: str) -> None:
+    total = 72.0 * figure.get_size_inches()[1]
+    figure.text(10.0 / WIDTH, height / total, text, fontsize=10.5, va="center")
+
+
+@dataclass(frozen=True)
+class _Extent:
+    """What of budgets stands along the axis."""
+
+    name: str
+    of_budget: str
+    factor: float
+
+    def of(self, what: Budget | Spent) -> float:
+        value = getattr(what, self.of_budget)
+        assert value is not None
+        return float(value) / self.factor
+
+
+def _extent(budget: Budget) -> _Extent:
+    if budget.seconds is not None:
+        return _Extent("hours", "seconds", HOUR)
+    return _Extent(*(("readings",) * 2 if budget.readings is not None else ("positions",) * 2), 1.0)
+
+
+@dataclass(frozen=True)
+class _Mark:
+    """A value of the criterion as it is drawn, in micrometres or as a ratio."""
+
+    name: str
+    value: float
+    colour: str
+    marker: str
+
+    @property
+    def told(self) -> str:
+        return number(self.value, 3) if math.isfinite(self.value) else "deficient"
+
+
+def _factor(selection: Selection) -> float:
+    return 1.0 if selection.unit == "1" else 1e6
+
+
+def _marks(selection: Selection) -> list[_Mark]:
+    """What a choice is compared with, the choice first."""
+    marks = [_Mark(CHOSEN, selection.value, SERIES[0], MARKERS[0])]
+    if not math.isnan(selection.bound):
+        marks.append(_Mark(BOUND, selection.bound, MUTED, "|"))
+    if selection.drawn is not None:
+        marks.append(_Mark(selection.drawn_words, selection.drawn, SERIES[1], MARKERS[3]))
+    if selection.target is not None:
+        marks.append(_Mark(TARGET, selection.target, INK, "|"))
+    return [replace(mark, value=_factor(selection) * mark.value) for mark in marks]
+
+
+def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
+    """The marks one below the other, with what no choice can reach."""
+    target = next((mark.value for mark in marks if mark.name == TARGET), None)
+    low, high = _limits([mark.value for mark in marks if mark.name != TARGET], target)
+    axes.set_xscale("log" if high > WIDE * low > 0.0 else "linear")
+    axes.set_xlim(low, high)
+    axes.set_ylim(len(marks) - 0.5, -0.5)
+    axes.set_yticks(range(len(marks)), [mark.name for mark in marks])
+    axes.tick_params(left=False)
+    axes.spines["left"].set_visible(False)
+    axes.grid(True, axis="x")
+    for k, mark in enumerate(marks):
+        is_known, is_inside = math.isfinite(mark.value), low <= mark.value <= high
+        if mark.name == BOUND and is_known:
+            axes.axvspan(low, mark.value, color=MUTED, alpha=0.2, linewidth=0)
+        # What does not fit is beyond the end that its triangle points to.
+        marker = mark.marker if is_inside else "<" if mark.value < low else ">"
+        axes.plot(
+            min(max(mark.value, low), high),
+            k,
+            color=mark.colour,
+            linestyle="none",
+            marker=marker,
+            markersize=9.0,
+            markeredgewidth=2.0 if is_inside and marker == "|" else 1.0,
+            clip_on=False,
+        )
+        _told_beside(axes, mark.told, k, high)
+    _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
+
+
+# In one piece: layers of one drawing, from the back to the front.
+def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
+    """Criterion against budget: choices, their bounds, the positions as drawn, and the target."""
+    from matplotlib.ticker import MaxNLocator
+
+    extent, factor = _extent(selection.budget), _factor(selection)
+    points = sorted(selection.curve, key=lambda point: extent.of(point.budget))
+    x = np.array([extent.of(point.budget) for point in points])
+    values = factor * np.array([point.value for point in points])
+    bounds = factor * np.array([point.bound for point in points])
+    by_name = {mark.name: mark for mark in marks}
+    here = extent.of(selection.budget)
+    drawn_at = here if selection.drawn_spent is None else extent.of(selection.drawn_spent)
+
+    target = by_name.pop(TARGET, None)
+    known = [*values, *bounds, *(mark.value for mark in by_name.values())]
+    low, high = _limits(known, None if target is None else target.value)
+    axes.set_yscale("log" if high > WIDE * low > 0.0 else "linear")
+    axes.set_ylim(low, high)
+    ends = np.array([*x, here, drawn_at])
+    margin = 0.06 * float(np.ptp(ends)) or 0.5
+    axes.set_xlim(max(ends.min() - margin, 0.0), ends.max() + margin)
+    if not np.isnan(bounds).all():
+        # What bounds a budget bounds smaller ones as well: between two of them the bound of the
+        # larger holds.
+        at, step = np.repeat(x, 2)[:-1], np.repeat(bounds, 2)[1:]
+        axes.fill_between(at, low, step, color=MUTED, alpha=0.2, linewidth=0)
+        axes.plot(at, step, color=MUTED, linestyle=DASHES[1], linewidth=1.0, label=BOUND)
+        axes.plot(x, bounds, color=MUTED, linestyle="none", marker="_", markersize=9.0)
+    axes.plot(
+        x,
+        values,
+        color=SERIES[0],
+        marker=MARKERS[0],
+        markerfacecolor=PAPER,
+        label="best choice found",
+    )
+    if BOUND in by_name and selection.is_determined:
+        ends_of_gap = [by_name[BOUND].value, by_name[CHOSEN].value]
+        axes.plot([here, here], ends_of_gap, color=SERIES[0], linewidth=0.8, linestyle=DASHES[2])
+    for name, at_budget in ((CHOSEN, here), (selection.drawn_words, drawn_at)):
+        if name in by_name:
+            mark = by_name[name]
+            is_known = math.isfinite(mark.value)
+            axes.plot(
+                at_budget,
+                mark.value if is_known else high,
+                color=mark.colour,
+                linestyle="none",
+                clip_on=False,
+                marker=mark.marker if is_known else "^",
+                markersize=9.0,
+                zorder=4,
+                label=f"{name}: {mark.told}",
+            )
+    if target is not None:
+        if low <= target.value <= high:
+            axes.axhline(target.value, color=INK, linewidth=1.2)
+        beyond = (
+            ""
+            if low <= target.value <= high
+            else f" ({'above' if target.value > high else 'below'})"
+        )
+        axes.plot([], [], color=INK, linewidth=1.2, label=f"{TARGET}: {target.told}{beyond}")
+    axes.set_xlabel(f"{extent.name} allowed")
+    axes.xaxis.set_major_locator(
+        MaxNLocator(nbins=8, integer=extent.name != "hours", steps=[1, 2, 5, 10])
+    )
+    _plain_numbers(axes.yaxis, axes.get_yscale() == "log")
+    axes.grid(True)
+    legend_above(axes, 3, -0.09, 1.04)
+
+
+def _limits(values: Sequence[float], target: float | None) -> tuple[float, float]:
+    """Ends of the axis: around what is finite, and the target unless it is far off."""
+    known = np.array([value for value in values if math.isfinite(value)] or [target or 1.0])
+    if target is not None and known.min() / FAR <= target <= known.max() * FAR:
+        known = np.append(known, target)
+    low, high = float(known.min()), float(known.max())
+    if high > WIDE * low > 0.0:
+        return low / 1.25, high * 1.4
+    margin = 0.15 * (high - low) or 0.2 * high
+    return max(low - margin, 0.0), high + margin
+
+
+def _plain_numbers(axis: Axis, is_logarithmic: bool) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    if is_logarithmic:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}"))
+        axis.set_minor_formatter(NullFormatter())
+    else:
+        axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A candidate with what it gains: `size` None where there is no figure."""
+
+    mark: str
+    name: str
+    told: str
+    size: float | None
+    colour: str
+
+
+def _rows(selection: Selection) -> list[_Row]:
+    """The chosen ones with their numbers in the drawing, those first that gain most, then the best
+    of the others.
+    """
+    numbers = {name: k + 1 for k, name in enumerate(selection.prediction.design.positions.names)}
+    rows = [_row(selection, gain, numbers) for gain in selection.gains[:MOST_CHOSEN]]
+    if len(selection.gains) > MOST_CHOSEN:
+        rows.append(
+            _Row(
+                "", f"… and {len(selection.gains) - MOST_CHOSEN} chosen ones more", "", None, MUTED
+            )
+        )
+    rows += [
+        _Row(
+            _shown(_place(selection, one, numbers)),
+            selection.title_of(one),
+            "read already",
+            None,
+            _colour(_place(selection, one, numbers)),
+        )
+        for one in selection.done[: max(MOST_CHOSEN - len(selection.gains), 0)]
+    ]
+    left_out = [gain for gain in selection.left_out if not math.isnan(gain.relative)]
+    if left_out:
+        rows.append(
+            _Row("", "left out; how much larger it is without each of these", "", None, MUTED)
+        )
+    return rows + [_row(selection, gain, {}) for gain in left_out[:MOST_LEFT_OUT]]
+
+
+def _row(selection: Selection, gain: Gain, numbers: Mapping[str, int]) -> _Row:
+    place = _place(selection, gain.candidate, numbers)
+    size = None if math.isnan(gain.relative) else gain.relative
+    told = "–" if size is None else "needed" if math.isinf(size) else f"{number(100 * size, 2)} %"
+    return _Row(_shown(place), selection.title_of(gain.candidate), told, size, _colour(place))
+
+
+def _place(selection: Selection, one: Candidate, numbers: Mapping[str, int]) -> int | None:
+    """The number of a candidate in the drawing, by its short name if it has one."""
+    return numbers.get(selection.names.get(one.name, one.name))
+
+
+def _shown(place: int | None) -> str:
+    return "" if place is None else str(place)
+
+
+def _colour(place: int | None) -> str:
+    """The colour that a position has in the drawing of the volume."""
+    return MUTED if place is None else SERIES[(place - 1) % len(SERIES)]
+
+
+def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
+    """Bars behind the names; what is needed has one of full length and another pattern."""
+    known = np.array([row.size for row in rows if row.size is not None and math.isfinite(row.size)])
+    full = float(known.max(initial=0.0)) or 1.0
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
+    axes.set_axis_off()
+    for k, row in enumerate(rows):
+        if row.size is not None:
+            is_needed = math.isinf(row.size)
+            axes.barh(
+                k,
+                1.0 if is_needed else max(row.size, 0.0) / full,
+                height=0.78,
+                color=row.colour,
+                alpha=0.3,
+                hatch="//" if is_needed else None,
+                linewidth=0,
+            )
+        is_candidate = bool(row.told)
+        name = row.name if len(row.name) <= MOST_LETTERS else row.name[: MOST_LETTERS - 1] + "…"
+        axes.text(0.008, k, name, va="center", fontsize=9.0, color=INK if is_candidate else MUTED)
+        _told_beside(axes, row.told, k, 1.0)
+        _told_beside(axes, row.mark, k, 0.0, -6.0)
+
+
+def _told_beside(
+    axes: Axes, text: str, row: int, x: float, points: float = VALUES - RIGHT + 2.0
+) -> None:
+    """A text that ends so many points to the right of a place."""
+    axes.annotate(
+        text,
+        (x, row),
+        (points, 0.0),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        fontsize=9.0,
+        annotation_clip=False,
+    )

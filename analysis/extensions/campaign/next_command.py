@@ -1,0 +1,143 @@
+"""`ballplate next`: after each position, whether the target is met, and what to read next."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.common import add_file, add_goal, add_json, number, show, single
+from ballplate.cli.outputs import UsageError
+from ballplate.cli.reading_options import add_readings_argument, refuse_wrong_order
+from ballplate.cli.table_options import add_tables
+
+if TYPE_CHECKING:
+    from ballplate.extensions.requirements.goals import Goal
+    from ballplate.simulator.experiment.model import Experiment
+
+    from .next_result import NextStep
+
+HELP = "tell after each position whether the target is met, and what to read next"
+DESCRIPTION = (
+    "Judge the readings taken so far: the scatter that the residuals show, suspected gross errors,"
+    " the uncertainty U6 reached, and either that the target is met or the position that is best"
+    " read next, of the file or its pool, with what it will achieve. A position that was read again"
+    " counts as it was read last. The exit status is 0 if the target is met, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_file(parser)
+    add_readings_argument(
+        parser,
+        "readings so far: one table or several in the order in which they were taken; default:"
+        " those that the experiment file names",
+    )
+    parser.add_argument(
+        "--watch",
+        metavar="FOLDER",
+        type=Path,
+        help=(
+            "wait for tables of readings in a folder, and print the answer whenever one has been"
+            " written; ends when the target is met, or with Ctrl-C"
+        ),
+    )
+    parser.add_argument(
+        "--interval",
+        metavar="SECONDS",
+        type=_seconds,
+        help="with --watch: time between two looks at the folder; default 2",
+    )
+    add_goal(parser, '"U6 average 0.3 um"')
+    add_tables(parser)
+    add_json(parser)
+
+
+def _seconds(text: str) -> float:
+    value = number(text, "s")
+    if not 0.0 < value < 1e5:
+        raise ArgumentTypeError(f'expected seconds above zero, such as 2, not "{text}"')
+    return value
+
+
+def run(options: Namespace) -> int:
+    """Print the answer, or one each time in a folder; 0 once the target is met, otherwise 1."""
+    from dataclasses import replace
+
+    from ballplate.cli.table_options import named_sources, with_options
+    from ballplate.extensions.requirements.goals import GoalError, parse_goal
+    from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
+
+    if options.interval is not None and options.watch is None:
+        raise UsageError("--interval goes with --watch; leave it out")
+    if options.watch is not None and not options.watch.is_dir():
+        raise UsageError(f"--watch {options.watch}: no such folder")
+    refuse_wrong_order(options)
+    try:
+        goal = parse_goal(options.goal, options.share)
+        experiment = with_options(options, single(options, planning=True))
+        if options.target is not None:
+            stated = parse_length_function(options.target)
+            target = Target(stated, experiment.coverage_factor)
+            experiment = replace(experiment, target_uncertainty=target)
+        if options.watch is not None:
+            return _watch(options, experiment, goal)
+        sources = options.readings or named_sources(experiment)
+        found = _judged(options, experiment, goal, sources)
+    except (GoalError, QuantityError) as error:
+        raise UsageError(error) from None
+    show(options, found)
+    return 0 if found.is_met else 1
+
+
+def _judged(
+    options: Namespace, experiment: Experiment, goal: Goal, sources: Sequence[Path]
+) -> NextStep:
+    from ballplate.cli.progress import progress
+    from ballplate.cli.telling import complain
+
+    from .next_position import next_step
+
+    with progress(options) as shown:
+        found = next_step(experiment, sources, goal, shown.show)
+    for note in found.notes:
+        complain(note)
+    return found
+
+
+def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
+    """Judge whenever files in the folder have changed, until the target is met or somebody ends
+    it.
+    """
+    import time
+
+    from ballplate.cli.common import print_lines
+    from ballplate.cli.excerpts import print_errors
+    from ballplate.cli.telling import note
+    from ballplate.simulator.inputs.messages import ExperimentError
+
+    from .watching_command import settled
+
+    def wait() -> None:
+        time.sleep(options.interval or 2.0)
+
+    note(options, f"waiting for readings in {options.watch}; Ctrl-C ends this")
+    try:
+        for files in settled(options.watch, wait):
+            try:
+                found = _judged(options, experiment, goal, [*options.readings, *files])
+            except ExperimentError as error:
+                # It may be mended, or not yet be whole.
+                print_errors(error.messages, options)
+                continue
+            if options.json:
+                print(json.dumps(found.to_dict(), allow_nan=False, ensure_ascii=False), flush=True)
+            else:
+                print_lines(found.lines())
+            if found.is_met:
+                return 0
+    except KeyboardInterrupt:
+        note(options, "stopped before the target was met")
+    return 1

@@ -1,0 +1,210 @@
+"""How far a campaign has come, and what to read next, in a few lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ballplate.extensions.requirements.goals import Goal, Judgement
+from ballplate.presentation.formatting import finite, number
+from ballplate.presentation.result import Result
+from ballplate.results.adjustments import freedom_words
+from ballplate.results.fit import Fit
+from ballplate.results.study import PlannedUncertainty
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.inputs.settings import listing, number_of
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.uncertainty.scale import can_stretch
+
+
+@dataclass(frozen=True)
+class Offered:
+    """A position that can be read next, with its number of `readings`, and what is known then."""
+
+    name: str
+    readings: int
+    then: Judgement
+    planned: PlannedUncertainty
+
+    @property
+    def average(self) -> float:
+        """Average U6 in metres; NaN where no length is determined."""
+        return (
+            self.planned.quantities["U6"].average if "U6" in self.planned.quantities else math.nan
+        )
+
+    @property
+    def order(self) -> tuple[int, int, float]:
+        """The better, the smaller: what stays undetermined, then the goal, or U6 on average."""
+        aim = self.average if math.isfinite(self.average) else self.then.distance
+        aim = aim if math.isfinite(aim) else 1e300
+        return self.then.undetermined, self.planned.deficiency, float(comparable(aim))
+
+
+@dataclass(frozen=True, repr=False)
+class NextStep(Result):
+    """What the positions `read`, in their order, achieve, and what others would.
+
+    `missing` counts planned readings that positions lack. `fit` is None where nothing can be
+    estimated yet, for the reason `why`. Uncertainties are those stated times `sigma`, which keeps
+    to `bound`; `now` judges the goal, and `is_sure` whether it is met at the bound too. `suspected`
+    is what residuals show, in words. `offered` are positions that can be read next, the best first;
+    none where the target is met.
+    """
+
+    label: str
+    title: str
+    goal: Goal
+    read: tuple[str, ...]
+    missing: Mapping[str, int]
+    observed: ObservedReadings
+    fit: Fit | None
+    why: str = ""
+    sigma: float = 1.0
+    bound: float = math.inf
+    now: Judgement | None = None
+    is_sure: bool = False
+    suspected: tuple[str, ...] = ()
+    offered: tuple[Offered, ...] = field(default=())
+
+    @property
+    def is_met(self) -> bool:
+        """Whether nothing more need be read: the goal is met by what has been read, its scatter is
+        known well enough for that, and the residuals show nothing that is wrong.
+        """
+        return self.now is not None and self.now.is_met and self.is_sure and not self.suspected
+
+    @property
+    def next(self) -> Offered | None:
+        """The best position to be read next; None where the target is met, or none is left."""
+        return self.offered[0] if self.offered else None
+
+    def headline(self) -> str:
+        return self._verdict()
+
+    def lines(self) -> list[str]:
+        """The answer first, then what it rests on."""
+        count, planned = len(self.read), self.next
+        told = [
+            f"{number_of(count, 'position')} read, last {self.read[-1]}; {self._answer()}",
+            *self._missing(),
+            *self.observed.redone,
+            *self._known(),
+        ]
+        if planned is not None:
+            told.append(f"with {planned.name}: {planned.then.words}")
+        return told
+
+    def _missing(self) -> list[str]:
+        """How many planned readings each position lacks."""
+        if not self.missing:
+            return []
+        named = listing(f"{name} {count}" for name, count in self.missing.items())
+        return [f"readings missing in positions read ({sum(self.missing.values())}): {named}"]
+
+    def _known(self) -> list[str]:
+        if self.fit is None or self.now is None:
+            return [f"nothing can be estimated yet ({self.why})"]
+        freedom = self.fit.sum_freedom
+        if freedom <= 0:
+            known = "sigma unknown, as nothing is read redundantly"
+        else:
+            found = math.sqrt(self.fit.sum_of_squares / freedom)
+            known = f"sigma {number(found, 3)} of {freedom_words(freedom)}"
+        shown = [f"suspected: {words}" for words in self.suspected] or ["nothing suspected"]
+        lengths = self.fit.quantities.get("U6")
+        reached = [self.now.words, *([] if lengths is None else self._maximum())]
+        return [known, *shown, "; ".join(reached)]
+
+    def _maximum(self) -> list[str]:
+        """The largest U6, where the goal does not tell it."""
+        assert self.fit is not None
+        lengths = self.fit.quantities["U6"]
+        if lengths.undetermined == lengths.count:
+            return [f"U6 undetermined of all {lengths.count} lengths"] if lengths.count else []
+        largest = lengths.maximum * self.sigma / self.fit.sigma
+        open_ = lengths.undetermined
+        some = f", {open_} of {lengths.count} undetermined" if open_ else ""
+        return [f"largest U6 {number(1e6 * largest)} µm{some}"]
+
+    def _verdict(self) -> str:
+        then = "" if self.next is None else f", then {self.next.then.words}"
+        return self._answer() + then
+
+    def _answer(self) -> str:
+        if self.is_met:
+            assert self.fit is not None
+            by_itself = not can_stretch(self.fit.design, self.fit.solution.state)
+            own = (
+                " by the machine's own scales, which nothing here vouches for" if by_itself else ""
+            )
+            return f"target met{own}: stop"
+        reason = self._reason()
+        if self.next is None:
+            return f"{reason}; no position is left to read"
+        one = self.next
+        more = "rest of " if one.name in self.read else ""
+        return f"{reason}; next: {more}{one.name} ({one.readings} readings)"
+
+    def _reason(self) -> str:
+        if self.now is None or not self.now.is_met:
+            return "target not met"
+        if self.suspected:
+            return "target met but for what is suspected: look at that first"
+        if math.isinf(self.bound):
+            return "target met only if the scatter is as stated, which nothing shows yet"
+        return (
+            "target met only if the scatter is as stated: with so few degrees of freedom it may be"
+            f" {number(self.bound, 2)} times as large"
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        cautions = () if self.fit is None else (self.fit.untested,)
+        doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
+        return (*self.observed.told, *doubts)
+
+    def to_dict(self) -> dict[str, Any]:
+        fit = self.fit
+        lengths = None if fit is None else fit.quantities.get("U6")
+        times = 1.0 if fit is None else self.sigma / fit.sigma
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "goal": str(self.goal),
+            "read": list(self.read),
+            "missing": dict(self.missing),
+            "redone": list(self.observed.redone),
+            "target_met": self.is_met,
+            "verdict": self._verdict(),
+            "why_no_estimate": self.why or None,
+            "sigma": None if fit is None else self.sigma,
+            "sigma_bound": finite(self.bound),
+            "degrees_of_freedom": None if fit is None else fit.sum_freedom,
+            "suspected": list(self.suspected),
+            "U6_average": None if lengths is None else finite(times * lengths.average),
+            "U6_maximum": None if lengths is None else finite(times * lengths.maximum),
+            "goal_met": self.now is not None and self.now.is_met,
+            "goal_met_at_bound": self.is_sure,
+            "next": None if self.next is None else self.next.name,
+            "offered": [
+                {name: finite(one) if isinstance(one, float) else one for name, one in row.items()}
+                for row in self.rows()
+            ],
+            "remarks": list(self.notes),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each position that can be read next, the best first; U6 in metres."""
+        return [
+            {
+                "position": one.name,
+                "readings": one.readings,
+                "U6 average": one.average,
+                "undetermined": one.then.undetermined,
+                "target met": one.then.is_met,
+            }
+            for one in self.offered
+        ]

@@ -1,0 +1,175 @@
+"""Readings of a run sheet one by one, in the order in which they are taken: a table to fill in, and
+points for the program of a machine.
+
+The program's points are written in DMIS, as ISO 22093 names it, or as a plain table.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.extensions.laboratory.heading_words import is_clock
+from ballplate.planning.schedule import RunSheet, Step
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.inputs.messages import in_one_line, refused
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.reading_files import AXES
+
+# What names of features keep; anything else becomes a hyphen.
+UNUSUAL = re.compile(r"[^A-Za-z0-9.]+")
+
+# Points on a ball besides the one opposite the stylus, and how far towards its pole they are.
+AROUND, RAISED = 4, np.radians(25.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedReading:
+    """One reading: where the ball's centre is expected (d,) in machine co-ordinates, in metres.
+
+    `feature` is a name for the program of a machine, position_ball_probe, the same for all repeats.
+    """
+
+    position: str
+    ball: str
+    probe: str
+    feature: str
+    centre: Array
+
+
+def sequence(step: Step) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
+    """Each probe of a step in order, with its balls: their names, indices and repeats."""
+    item = step.candidate.item
+    assert isinstance(item, Position)
+    for probe in step.probes:
+        balls = [
+            (name, int(k), group.repeats)
+            for group in item.readings
+            if probe in group.probes
+            for name, k in zip(group.balls, group.ball_indices, strict=True)
+        ]
+        if balls:
+            yield probe, balls
+
+
+def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedReading]:
+    """Every reading that is still to be taken, in order.
+
+    :raises ExperimentError: two of them would have the same name as features.
+    """
+    found: list[PlannedReading] = []
+    meant: dict[str, tuple[str, str, str]] = {}
+    for step in sheet.steps:
+        item = step.candidate.item
+        assert isinstance(item, Position)
+        centres = ball_coordinates(item.pose, experiment.layouts[item.artefact])
+        for probe, balls in () if step.done else sequence(step):
+            for ball, k, repeats in balls:
+                key = step.name, ball, probe
+                name = feature_name(*key)
+                other = meant.setdefault(name.casefold(), key)
+                if other != key:
+                    both = " and ".join(f'"{", ".join(one)}"' for one in (other, key))
+                    text = f"{both} would both be the feature {name}; rename one of them"
+                    raise refused(experiment.source, text, "positions")
+                found += [PlannedReading(*key, name, centres[k, : experiment.dimension])] * repeats
+    return found
+
+
+def feature_name(position: str, ball: str, probe: str) -> str:
+    """The name of a reading's feature.
+
+    >>> feature_name("P1", "r1c2", "down"), feature_name("flat low", "3", "A0_B90")
+    ('P1_r1c2_down', 'flat-low_3_A0-B90')
+    """
+    return "_".join(UNUSUAL.sub("-", part) for part in (position, ball, probe))
+
+
+def template_csv(readings: Sequence[PlannedReading], experiment: Experiment) -> str:
+    """The table of readings with empty cells for the co-ordinates, and for what influence
+    quantities ask of each, as `fit` reads it when they are filled in.
+    """
+    out = io.StringIO()
+    writer = CsvWriter(out)
+    blank = [f"{axis}_mm" for axis in AXES[: experiment.dimension]]
+    for kind in lay_out(experiment).influences if experiment.influences else ():
+        # Times are those of a clock.
+        named = (
+            name if is_clock("", units) else f"{name}_{next(iter(units))}"
+            for name, units in kind.columns.items()
+        )
+        blank += [name for name in named if name not in blank]
+    writer.writerow(["position", "ball", "probe", *blank])
+    for one in readings:
+        writer.writerow([one.position, one.ball, one.probe, *[""] * len(blank)])
+    return out.getvalue()
+
+
+def points_csv(readings: Sequence[PlannedReading], dimension: int) -> str:
+    """The centres as a plain table; its columns are no readings, so that `fit` refuses it."""
+    out = io.StringIO()
+    writer = CsvWriter(out)
+    nominal = [f"nominal_{axis}_mm" for axis in AXES[:dimension]]
+    writer.writerow(["feature", "position", "ball", "probe", *nominal])
+    for one in readings:
+        numbers = [f"{1e3 * value:.4f}" for value in one.centre]
+        writer.writerow([one.feature, one.position, one.ball, one.probe, *numbers])
+    return out.getvalue()
+
+
+def points_dmis(
+    readings: Sequence[PlannedReading], title: str, diameter: float, styli: dict[str, Array]
+) -> str:
+    """Spheres of a `diameter` (m) in DMIS, with points to probe on the side that each stylus comes
+    from.
+
+    `styli` are the probes' offsets (3,) by name. There are no moves between balls: what is in the
+    way there only the machine's programmer knows.
+    """
+    said = re.sub(r"[^ -~]|'", "-", in_one_line(title))
+    lines = [
+        f"DMISMN/'{said}',05.2",
+        "UNITS/MM,ANGDEC",
+        "D(MCS)=DATSET/MCS",
+        "MODE/PROG,MAN",
+        "$$ Centres and points in machine co-ordinates, where the plan has the artefacts.",
+        "$$ No moves between balls and no alignment: add both before this runs anywhere.",
+    ]
+    selected, defined = "", set[str]()
+    for one in readings:
+        if one.probe != selected:
+            selected = one.probe
+            lines.append(f"SNSLCT/SA({UNUSUAL.sub('-', selected)})")
+        if one.feature not in defined:
+            defined.add(one.feature)
+            sphere = f"{_numbers(1e3 * one.centre)},{1e3 * diameter:.4f}"
+            lines.append(f"F({one.feature})=FEAT/SPHERE,OUTER,CART,{sphere}")
+        normals = _normals(styli[one.probe])
+        lines.append(f"MEAS/SPHERE,F({one.feature}),{len(normals)}")
+        for normal in normals:
+            place = _numbers(1e3 * (one.centre + 0.5 * diameter * normal))
+            lines.append(f"PTMEAS/CART,{place},{_numbers(normal, 6)}")
+        lines.append("ENDMES")
+    return "\n".join([*lines, "ENDFIL", ""])
+
+
+def _numbers(values: Array, digits: int = 4) -> str:
+    # Adding zero takes the sign from what is rounded to nothing.
+    return ",".join(f"{value + 0.0:.{digits}f}" for value in np.round(values, digits))
+
+
+def _normals(offset: Array) -> Array:
+    """Outward normals (5, 3) of a ball's points: towards the head, and around that direction."""
+    length = float(np.linalg.norm(offset))
+    pole = -offset / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    aside = np.cross(pole, np.eye(3)[int(np.abs(pole).argmin())])
+    aside /= np.linalg.norm(aside)
+    angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    around = np.cos(angles)[:, None] * aside + np.sin(angles)[:, None] * np.cross(pole, aside)
+    return np.concatenate([pole[None], np.cos(RAISED) * around + np.sin(RAISED) * pole])

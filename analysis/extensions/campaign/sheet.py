@@ -1,0 +1,145 @@
+"""The run sheet of an experiment, planned or not, with what goes to the laboratory beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.planning.schedule import RunSheet, Step, ball_words, change_over, place_words
+from ballplate.presentation.result import Result
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment, Position
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.quantities import length_text
+from ballplate.simulator.inputs.yamltree import to_python
+
+from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
+from .sheet_forms import sheet_csv, sheet_data, sheet_lines, sheet_markdown, sheet_text
+from .sheet_head import offsets
+from .sheet_page import sheet_page
+from .sheet_words import summary
+
+FORMS = (".html", ".md", ".csv", ".txt")
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Sheet(Result):
+    """A run sheet to print, the table of its readings to fill in, and the points of a program."""
+
+    experiment: Experiment
+    sheet: RunSheet
+
+    @property
+    def label(self) -> str:
+        return self.experiment.label
+
+    @property
+    def title(self) -> str:
+        return self.experiment.title
+
+    def headline(self) -> str:
+        return summary(self.sheet)
+
+    def lines(self) -> list[str]:
+        return [f"{self.label}: {self.title}", "", *sheet_lines(self.sheet)]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"experiment": self.label, **sheet_data(self.sheet)}
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each position, times in seconds."""
+        return list(sheet_data(self.sheet)["steps"])
+
+    def text(self, form: str = ".txt") -> str:
+        """The run sheet as .html to print, .md, .csv or .txt.
+
+        :raises ValueError: another form.
+        """
+        sheet, experiment = self.sheet, self.experiment
+        if form == ".html":
+            return sheet_page(sheet, experiment, experiment.title)
+        if form == ".md":
+            return sheet_markdown(sheet, experiment, experiment.title)
+        if form == ".csv":
+            return sheet_csv(sheet)
+        if form == ".txt":
+            return sheet_text(sheet, experiment, experiment.title)
+        raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
+
+    def template(self) -> str:
+        """The CSV file of the readings in order with empty cells, for `fit` when it is filled
+        in.
+        """
+        return template_csv(planned_readings(self.sheet, self.experiment), self.experiment)
+
+    def points(self, diameter: float | None = None) -> str:
+        """The centres of the balls in order as a CSV file, with a `diameter` of the balls (m) as
+        DMIS.
+
+        :raises ExperimentError: two readings would have the same name, or DMIS is asked for in two
+            dimensions.
+        """
+        readings = planned_readings(self.sheet, self.experiment)
+        if diameter is None:
+            return points_csv(readings, self.experiment.dimension)
+        if self.experiment.dimension == 2:
+            text = "spheres in DMIS are for three dimensions; write a .csv file of points"
+            raise refused(self.experiment.source, text, "machine.volume")
+        styli = dict(offsets(self.experiment))
+        return points_dmis(readings, self.experiment.title, diameter, styli)
+
+
+def sheet_of(experiment: Experiment) -> Sheet:
+    """The run sheet of an experiment as it is, in the order of its positions."""
+    said = to_python(experiment.tree)
+    stated = said.get("positions", ()) if isinstance(said, Mapping) else ()
+    by_name = {str(one["name"]): one for one in stated}
+    steps: list[Step] = []
+    before: tuple[Candidate, tuple[str, ...]] | None = None
+    pool, start = experiment.pool, 0.0
+    timed = {} if pool is None else {one.name: one.seconds for one in pool.candidates if one.drawn}
+    changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
+    for position in experiment.positions:
+        settings = by_name.get(position.name) or _settings(position, experiment)
+        plane = settings.get("plane") if experiment.dimension == 3 else None
+        seconds = timed.get(position.name, 0.0)
+        candidate = Candidate(position.name, position, seconds, plane or "", "", True, settings)
+        here = candidate, position.probes
+        change, words = change_over(before, here, changes) if before else (0.0, "")
+        steps.append(
+            Step(
+                candidate,
+                place_words(candidate),
+                position.probes,
+                ball_words(candidate),
+                words,
+                change,
+                seconds,
+                start,
+                False,
+            )
+        )
+        before, start = here, start + change + seconds
+    return Sheet(experiment, RunSheet(tuple(steps), (), bool(timed), changes))
+
+
+def _settings(position: Position, experiment: Experiment) -> dict[str, Any]:
+    """What a file would say of a position that no file has."""
+    rotation = position.pose.rotation
+    turns = [float(np.arctan2(rotation[1, 0], rotation[0, 0]))]
+    if len(rotation) == 3:
+        about_x = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+        turns = [about_x, -float(np.arcsin(np.clip(rotation[2, 0], -1.0, 1.0))), *turns]
+    angles = [f"{np.degrees(angle) + 0.0:.6g} deg" for angle in turns]
+    every = len(experiment.layouts[position.artefact].names)
+    return {
+        "pose": {
+            "origin": [length_text(length) for length in position.pose.origin.tolist()],
+            "rotation": angles if len(angles) == 3 else angles[0],
+        },
+        "readings": [
+            {"balls": "all" if len(group.balls) == every else list(group.balls)}
+            for group in position.readings
+        ],
+    }

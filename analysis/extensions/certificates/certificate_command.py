@@ -1,0 +1,132 @@
+"""`ballplate certificate`: what a fit says of a plate's balls, for others to use."""
+
+from __future__ import annotations
+
+from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import Any
+
+from ballplate.cli.common import add_json, coverage_factor, show, write_noted
+from ballplate.cli.outputs import Output, OutputAction, UsageError, add_force
+from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
+
+ENDINGS = (".html", ".csv", ".xml", ".json")
+
+HELP = "state a plate's ball co-ordinates with their covariance: page, CSV, DCC, GTC archive"
+DESCRIPTION = (
+    "Fit readings and state the co-ordinates of a plate's balls in the plate's own axes with their"
+    " full covariance, and distances with U: as a page (.html), as tables that calibration items"
+    " read (.csv, with the covariance in a second file), as a digital calibration certificate"
+    " (.xml) or as an archive of the GUM Tree Calculator (.json). Lengths that nothing calibrated"
+    " determines are refused. The exit status is 0 if the estimate converged, the rank is as"
+    " expected and no lack of fit is beyond the limit, otherwise 1."
+)
+
+
+class _Written(OutputAction):
+    """A file to be written and, with a table of co-ordinates, that of their covariance."""
+
+    def __call__(
+        self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: Any = None
+    ) -> None:
+        super().__call__(parser, namespace, values, option_string)
+        others = [one for one in namespace.outputs if one.dest != "covariance"]
+        if values.suffix.lower() == ".csv":
+            beside = values.with_name(f"{values.stem}-covariance{values.suffix}")
+            others.append(Output("covariance", "the covariance's", beside, None, False))
+        namespace.outputs = tuple(others)
+
+
+class _Stated(Action):
+    """Texts by keys, each given with an option of its own."""
+
+    def __call__(
+        self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: Any = None
+    ) -> None:
+        key, text = values
+        setattr(namespace, self.dest, {**getattr(namespace, self.dest), key: text})
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_readings(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        action=_Written,
+        metavar="FILE",
+        type=_output,
+        help="write the certificate: .html, .csv, .xml (DCC) or .json (GTC); default: print it",
+    )
+    parser.add_argument(
+        "--plate", metavar="NAME", help="the plate; optional where there is exactly one"
+    )
+    parser.add_argument(
+        "--datum",
+        metavar="BALL,…",
+        type=_balls,
+        default=(),
+        help=(
+            "balls that define the axes: the one at the origin, one on an axis and, in space, one"
+            " in the xy plane; or all, for axes in which the plate is as close as possible to its"
+            " drawing; default: corners, as printed"
+        ),
+    )
+    parser.add_argument(
+        "--coverage-factor",
+        metavar="K",
+        type=coverage_factor,
+        help="coverage factor of U; default: that of the file, or 2",
+    )
+    parser.add_argument(
+        "--about",
+        action=_Stated,
+        metavar="KEY=TEXT",
+        type=_stated,
+        default={},
+        help=(
+            "what else is to be stated, once for each key: identifier, date, country, laboratory,"
+            " e-mail, city, person, customer, manufacturer, serial number; a DCC needs date"
+            " (2026-11-02, or 2026-11-02/2026-11-03) and country (DE)"
+        ),
+    )
+    add_force(parser)
+    add_json(parser)
+
+
+def _output(text: str) -> Path:
+    if not text.lower().endswith(ENDINGS):
+        raise ArgumentTypeError(f'a certificate\'s name ends in {", ".join(ENDINGS)}, not "{text}"')
+    return Path(text)
+
+
+def _balls(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(","))
+
+
+def _stated(text: str) -> tuple[str, str]:
+    key, sign, value = (part.strip() for part in text.partition("="))
+    if not sign or not value:
+        raise ArgumentTypeError(f'expected a key and a text, such as country=DE, not "{text}"')
+    return key, value
+
+
+def run(options: Namespace) -> int:
+    """Print or write the certificate; 1 if there is something to complain of."""
+    from ballplate.results.study import fit
+
+    experiment, observed = observed_readings(options)
+    result = fit(experiment, observed, options.sigma)
+    warn_of(result)
+    if not result.converged:
+        return 1
+    try:
+        found = result.certificate(
+            options.plate, options.datum, options.coverage_factor, options.about
+        )
+        texts = {} if options.output is None else found.texts(options.output)
+    except ValueError as error:
+        raise UsageError(error) from None
+    write_noted(options, texts)
+    if options.json or not texts:
+        show(options, found)
+    return 1 if result.complaint else 0

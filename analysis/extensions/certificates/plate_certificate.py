@@ -1,0 +1,345 @@
+"""Certificate of a plate: co-ordinates of its balls in its own axes with their full covariance."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from ballplate.presentation.files import write_file
+from ballplate.results.map_of_fit import MappedFit, data_of
+from ballplate.simulator.computing.rounding import blank
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.influences.temperature import TemperaturesSettings
+from ballplate.simulator.estimation.covariance import MICROMETRE
+from ballplate.simulator.estimation.functions import BallPlaces, displacements
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.axes import plate_axes
+from ballplate.simulator.geometry.ball_layouts import BallLayout
+from ballplate.simulator.geometry.datum import Datum, chosen_datum, in_datum, relative_to
+from ballplate.simulator.inputs.covariances import MOST_NAMES
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.yamltree import to_python
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.readings.certificate_files import certified_values
+from ballplate.uncertainty.pairs import pairs_of
+from ballplate.uncertainty.scale import OWN_SCALES, scale_of
+from ballplate.uncertainty.tasks import expansion
+
+from .certificate_csv import coordinates_csv, covariance_csv
+from .certificate_page import certificate_page
+from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
+from .digital_form import digital_certificate
+from .uncertain_archive import gtc_archive
+
+# Of so many balls all distances are stated, of more those between a few that are far apart.
+MOST_BALLS_FOR_ALL_DISTANCES = 16
+SOME_BALLS = 6
+# What is smaller, in metres, is rounding.
+ROUNDING = 1e-14
+
+
+def _tables(certificate: CertifiedBalls, path: Path) -> dict[Path, str]:
+    beside = covariance_path(path)
+    return {path: coordinates_csv(certificate, beside.name), beside: covariance_csv(certificate)}
+
+
+# Texts of a certificate by the names of files, by the ending of the name that is given.
+FORMS: dict[str, Callable[[CertifiedBalls, Path], dict[Path, str]]] = {
+    ".html": lambda certificate, path: {path: certificate_page(certificate)},
+    ".csv": _tables,
+    ".xml": lambda certificate, path: {path: digital_certificate(certificate)},
+    ".json": lambda certificate, path: {path: gtc_archive(certificate)},
+}
+
+
+def covariance_path(path: Path) -> Path:
+    """Where the covariance of a table of co-ordinates stands.
+
+    >>> covariance_path(Path("plate.csv")).name
+    'plate-covariance.csv'
+    """
+    return path.with_name(f"{path.stem}-covariance{path.suffix}")
+
+
+class PlateCertificate(CertifiedBalls):
+    """A certificate that can be written."""
+
+    def texts(self, path: str | Path) -> dict[Path, str]:
+        """The certificate as the ending of a name says: a page (.html), tables (.csv, with the
+        covariance in a second one beside it), a digital calibration certificate (.xml) or a GTC
+        archive (.json); by the names of files.
+
+        :raises ValueError: another ending, or a digital certificate without what it has to state.
+        """
+        path = Path(path)
+        write = FORMS.get(path.suffix.lower())
+        if write is None:
+            raise ValueError(
+                f'a certificate\'s name ends in {", ".join(FORMS)}, unlike "{path.name}"'
+            )
+        return write(self, path)
+
+    def save(self, path: str | Path) -> None:
+        """Write it, see `texts`.
+
+        :raises OSError: a file cannot be written.
+        :raises ValueError: the name has another ending, or a digital certificate lacks something.
+        """
+        for name, text in self.texts(path).items():
+            write_file(name, text.encode())
+
+
+class CertifiedFit(MappedFit, Protocol):
+    """What a certificate is made of: a fit of an experiment, see `Fit`."""
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def without_scatter(self) -> bool: ...
+    @property
+    def warnings(self) -> tuple[str, ...]: ...
+    @property
+    def complaint(self) -> str: ...
+
+
+@single_threaded
+def plate_certificate(
+    fit: CertifiedFit,
+    plate: str | None = None,
+    datum: Sequence[str] = (),
+    coverage_factor: float | None = None,
+    about: Mapping[str, str] | None = None,
+) -> PlateCertificate:
+    """The certificate of a plate from a fit that has converged.
+
+    `datum` names the balls that define the axes, or "all", see `chosen_datum`; `about` has texts
+    by the keys of `ABOUT`.
+
+    :raises ExperimentError: the experiment has no such plate; nothing calibrated determines its
+        lengths, or nothing its co-ordinates.
+    :raises ValueError: the fit has not converged, balls that define no axes, or an unknown key.
+    """
+    experiment, at = fit.experiment, fit.functions.at
+    assert experiment is not None
+    if fit.without_scatter:
+        raise ValueError(
+            "the readings agree exactly with the model, so that nothing tells their uncertainty;"
+            ' fit with sigma "given"'
+        )
+    for key in about or {}:
+        if key not in ABOUT:
+            raise ValueError(f'nothing is stated about "{key}"; {hint(key, ABOUT)}')
+    name = _plate_name(experiment, plate)
+    layout = experiment.layouts[name]
+    d = experiment.dimension
+    if len(layout.names) * d > MOST_NAMES:
+        most = MOST_NAMES // d
+        text = f"{len(layout.names)} balls are too many for a covariance of all; at most {most}"
+        raise refused(experiment.source, text, f"artefacts.{name}")
+    stated = plate_axes(layout, experiment.artefacts[name].axes) if d == 2 else None
+    chosen = chosen_datum(layout, d, datum, stated)
+    index = at.design.balls.of(at.design.artefacts.names.index(name))
+    coordinates, root, is_open = _in_axes(at, layout, index, chosen)
+    known = np.flatnonzero(~is_open.any(axis=1))
+    if not len(known) or is_open[_datum_balls(chosen)].any():
+        distances = _distances(at, index, layout.names, fit.sigma)
+        text = _undetermined(is_open, layout, distances)
+        raise refused(experiment.source, text, "calibration")
+    coordinates, root = coordinates[known], fit.sigma * root[known]
+    coordinates[np.abs(coordinates) < ROUNDING] = 0.0
+    root[np.linalg.norm(root, axis=2) < ROUNDING] = 0.0
+    temperature, told = _temperature(experiment, name)
+    carriers = _carriers(experiment, at, name)
+    flat = root.reshape(len(known) * d, -1)
+    centred = coordinates - coordinates.mean(axis=0)
+    by_scale = np.einsum("nd,ndr->r", centred, root) / (centred**2).sum()
+    freedom = float(fit.degrees_of_freedom) if fit.sigma_is_estimated else np.inf
+    names = tuple(layout.names[k] for k in known)
+    return PlateCertificate(
+        fit.label,
+        fit.title,
+        name,
+        chosen.words(layout.names),
+        names,
+        layout.coordinates[known, :d],
+        coordinates,
+        flat @ flat.T,
+        _distances(at, index[known], names, fit.sigma),
+        tuple(layout.names[k] for k in np.flatnonzero(is_open.any(axis=1))),
+        carriers,
+        float(np.linalg.norm(by_scale)),
+        temperature,
+        told,
+        coverage_factor or expansion(experiment.coverage_factor),
+        freedom,
+        _remarks(fit, experiment, name, carriers),
+        ABOUT | dict(about or {}),
+        _fingerprint(fit, experiment, name, chosen.words(layout.names)),
+    )
+
+
+def _fingerprint(fit: CertifiedFit, experiment: Experiment, plate: str, datum: str) -> str:
+    """SHA-256 of what a certificate comes from."""
+    said = [
+        data_of(fit.observed).sha256,
+        to_python(experiment.tree),
+        plate,
+        datum,
+        fit.sigma == 1.0,
+    ]
+    return hashlib.sha256(json.dumps(said, default=str, sort_keys=True).encode()).hexdigest()
+
+
+def _plate_name(experiment: Experiment, plate: str | None) -> str:
+    plates = [
+        name
+        for name, one in experiment.artefacts.items()
+        if one.role == "plate" and len(experiment.layouts[name].names) > 1
+    ]
+    if plate is None and len(plates) == 1:
+        return plates[0]
+    if not plates:
+        raise refused(
+            experiment.source, "there is no plate of two balls or more, and so nothing to certify"
+        )
+    if plate is None:
+        raise ValueError(f"the experiment has several plates; choose one of {listing(plates)}")
+    if plate not in plates:
+        raise ValueError(f'no plate "{plate}"; {hint(plate, plates)}')
+    return plate
+
+
+def _in_axes(
+    at: Linearisation, layout: BallLayout, index: Integers, datum: Datum
+) -> tuple[Array, Array, Array]:
+    """Co-ordinates (n, d) in a datum, a square root (n, d, r) of their covariance, and which of
+    them (n, d) are undetermined.
+    """
+    moved = displacements(at, BallPlaces(index))
+    n, d = moved.places.shape
+    drawn = layout.coordinates[:, :d]
+    own = np.zeros((n, d, n, d))
+    own[np.arange(n), :, np.arange(n)] = moved.own
+    root = np.concatenate([moved.common, own.reshape(n, d, n * d)], axis=2)
+    coordinates, rotation = in_datum(moved.places, datum, drawn)
+    root = relative_to(datum, coordinates, np.einsum("ij,njr->nir", rotation, root))
+    as_drawn, turn = in_datum(moved.drawn, datum, drawn)
+    null = relative_to(datum, as_drawn, np.einsum("ij,njr->nir", turn, moved.null))
+    size = np.full((n, d), MICROMETRE)
+    return coordinates, root, np.isnan(blank(np.zeros((n, d)), null, size))
+
+
+def _datum_balls(datum: Datum) -> list[int]:
+    if datum.axes is None:
+        return []
+    found = [datum.axes.origin, datum.axes.ball]
+    return found if datum.plane is None else [*found, datum.plane]
+
+
+def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDistance, ...]) -> str:
+    """Why there is no certificate, in words."""
+    if all(np.isnan(one.standard_uncertainty) for one in distances):
+        return (
+            "the readings and what is known determine no lengths of the plate, so that there is"
+            " nothing to certify; calibrate a length (ballplate check says what is missing)"
+        )
+    names = listing(layout.names[k] for k in np.flatnonzero(is_open.any(axis=1)))
+    return (
+        f"co-ordinates of {names} are undetermined in these axes; choose balls for the datum that"
+        " are determined, or have what is missing read"
+    )
+
+
+def _carriers(experiment: Experiment, at: Linearisation, plate: str) -> tuple[str, ...]:
+    """What the plate's lengths rest on, in words.
+
+    :raises ExperimentError: nothing but the machine's own scales.
+    """
+    found = scale_of(experiment, at)
+    words = [one.words for one in found.carriers] if found is not None else []
+    of_machine = words == [OWN_SCALES]
+    if of_machine and not certified_values(experiment):
+        text = (
+            "nothing is calibrated: the plate's lengths would be those of the machine's own scales,"
+            " which nothing vouches for; add a calibration, or priors of the scales"
+        )
+        raise refused(experiment.source, text, "calibration")
+    # Where the machine's scale is undetermined, it is the plate itself that is calibrated.
+    return tuple(words) or (f"certificates of {plate}",)
+
+
+def _temperature(experiment: Experiment, plate: str) -> tuple[float | None, str]:
+    """The temperature that lengths are stated for, None where it is unknown; and in words."""
+    for one in experiment.influences:
+        if isinstance(one, TemperaturesSettings) and one.artefact in (None, plate):
+            if one.artefact_expansion is not None:
+                told = f"lengths are those at {one.reference:g} °C; the plate's expansion is"
+                return one.reference, f"{told} followed from its temperatures"
+            told = f"the scales' expansion is followed from {one.reference:g} °C, the plate's is"
+            return None, f"reference temperature unknown: {told} not"
+    return None, (
+        "reference temperature unknown: the experiment states no temperatures; lengths are right"
+        " where plate, scales and calibrated lengths were at the temperature that these are"
+        " stated for"
+    )
+
+
+def _distances(
+    at: Linearisation, index: Integers, names: tuple[str, ...], sigma: float
+) -> tuple[PlateDistance, ...]:
+    moved = displacements(at, BallPlaces(index))
+    some = list(range(len(names)))
+    if len(some) > MOST_BALLS_FOR_ALL_DISTANCES:
+        some = _far_apart(moved.drawn)
+    pairs = np.array(list(combinations(some, 2)), np.int64).reshape(-1, 2)
+    found = pairs_of(moved, pairs)
+    u = np.where(found.is_open, np.nan, sigma * found.uncertainties)
+    return tuple(
+        PlateDistance((names[i], names[j]), length, own)
+        for (i, j), length, own in zip(
+            pairs.tolist(), found.lengths.tolist(), u.tolist(), strict=True
+        )
+    )
+
+
+def _far_apart(places: Array) -> list[int]:
+    """Some balls, each the one farthest from those before, in the plate's order."""
+    centred = places - places.mean(axis=0)
+    chosen = [_first_farthest((centred**2).sum(axis=1))]
+    nearest = np.full(len(places), np.inf)
+    while len(chosen) < SOME_BALLS:
+        nearest = np.minimum(nearest, ((places - places[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(_first_farthest(nearest))
+    return sorted(set(chosen))
+
+
+def _first_farthest(squares: Array) -> int:
+    # Of equal ones the first, whatever rounding makes of them.
+    return int(np.flatnonzero(squares >= squares.max() * (1.0 - 1e-9))[0])
+
+
+def _remarks(
+    fit: CertifiedFit, experiment: Experiment, plate: str, carriers: tuple[str, ...]
+) -> tuple[str, ...]:
+    """What a reader has to know of the fit and of the plate."""
+    found = [*fit.warnings, *filter(None, [fit.complaint])]
+    if carriers == (OWN_SCALES,):
+        found.append(
+            "the error model takes the mean of the machine's scales for right: what they are wrong"
+            " by has no part in the uncertainties; a model with a scale of its own for each axis"
+            " would have the lengths from what is calibrated"
+        )
+    flatness = experiment.artefacts[plate].flatness
+    if flatness is not None:
+        found.append(
+            "nothing is read across the plate's plane: z is as drawn, with a standard uncertainty"
+            f" of {1e6 * flatness:.4g} µm of each ball before the axes were put through them"
+        )
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,307 @@
+"""Data sets of a fit's own parameters, each fitted again: what linear theory says, tried out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.formatting import (
+    aligned,
+    amount_of,
+    as_data,
+    number,
+    to_uncertainty,
+)
+from ballplate.presentation.result import Result
+from ballplate.results.estimates import EstimatedFunctions, Function, estimated_functions
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design, State, reading_noise
+from ballplate.simulator.estimation.gauss_newton import Status, estimate, linearised_fit
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.generate import NoReadingError, true_readings
+
+# Data sets of a task: the progress is told after each.
+AT_ONCE = 16
+
+# Share of data sets within the intervals.
+COVERED = 0.95
+
+# Standard errors from which on a standard deviation differs from its linear one.
+DIFFERS = 4.0
+
+# Relative deviation that has to show for data sets to be enough.
+TOO_FEW = 0.5
+
+# Share of the largest uncertainty in its unit below which one is rounding.
+EXACT = 1e-6
+
+# Numbers of data sets that are named where they did not converge.
+MOST_NAMED = 20
+
+
+@dataclass(frozen=True)
+class Replicate:
+    """The estimates (m,) from one data set, NaN where undetermined or where it did not converge,
+    and its sigma.
+    """
+
+    status: Status
+    values: Array
+    sigma: float
+
+
+@dataclass(frozen=True, repr=False)
+class Bootstrap(Result):
+    """A fit's estimates over data sets of its own parameters.
+
+    `values` and `uncertainties` (m,) are those of the fit, the latter as linear theory says;
+    `deviations` (t, m) are what the data sets that converged give beyond the parameters they are
+    of, and `sigmas` (t,) their own over the fit's. `failed` has the numbers of the others with how
+    they ended.
+    """
+
+    label: str
+    title: str
+    trials: int
+    seed: int
+    failed: tuple[tuple[int, str], ...]
+    functions: tuple[Function, ...]
+    values: Array
+    uncertainties: Array
+    deviations: Array
+    sigmas: Array
+    sigma_is_estimated: bool
+
+    @property
+    def standard_deviations(self) -> Array:
+        """Of each estimate (m,) over the data sets; NaN with less than two."""
+        if len(self.deviations) < 2:
+            return np.full(len(self.values), np.nan)
+        return np.asarray(self.deviations.std(axis=0, ddof=1))
+
+    @property
+    def biases(self) -> Array:
+        """How much too large the estimates (m,) are on average."""
+        if not len(self.deviations):
+            return np.full(len(self.values), np.nan)
+        return np.asarray(self.deviations.mean(axis=0))
+
+    @property
+    def intervals(self) -> Array:
+        """Of 95 % for each parameter (m, 2): of estimates over their own sigma where the fit's is
+        estimated.
+        """
+        if len(self.deviations) < 2:
+            return np.full((len(self.values), 2), np.nan)
+        scaled = self.deviations / (self.sigmas[:, None] if self.sigma_is_estimated else 1.0)
+        tail = 0.5 * (1.0 - COVERED)
+        low, high = np.quantile(scaled, (tail, 1.0 - tail), axis=0)
+        return np.stack([self.values - high, self.values - low], axis=1)
+
+    @property
+    def ratio_error(self) -> float:
+        """Standard error of a ratio of standard deviations."""
+        return 1.0 / float(np.sqrt(2.0 * max(len(self.deviations) - 1, 1)))
+
+    def _ratios(self) -> Array:
+        """Standard deviations (m,) in the linear ones; NaN where these are rounding."""
+        units = np.array([one.unit for one in self.functions])
+        u = np.nan_to_num(self.uncertainties)
+        largest = np.array([u[units == unit].max() for unit in units])
+        return np.asarray(self.standard_deviations / np.where(u > EXACT * largest, u, np.nan))
+
+    @property
+    def differing(self) -> tuple[str, ...]:
+        """Names of estimates whose standard deviation is not what linear theory says."""
+        off = np.abs(self._ratios() - 1.0) > DIFFERS * self.ratio_error
+        return tuple(self.functions[k].name for k in np.flatnonzero(off))
+
+    def headline(self) -> str:
+        failed = f", {len(self.failed)} not converged" if self.failed else ""
+        known = self._ratios()[np.isfinite(self._ratios())]
+        if not len(known):
+            return f"{self.trials} data sets{failed}"
+        return (
+            f"{self.trials} data sets{failed}, standard deviations {known.min():.3g} to"
+            f" {known.max():.3g} times the linear ones"
+        )
+
+    def lines(self) -> list[str]:
+        lines = [
+            (
+                f"data sets of the fitted parameters: {self.trials}, seed {self.seed}; each fitted"
+                " as the readings were"
+            )
+        ]
+        if self.failed:
+            named = ", ".join(f"{k} ({words})" for k, words in self.failed[:MOST_NAMED])
+            named += ", …" if len(self.failed) > MOST_NAMED else ""
+            lines.append(
+                f"{len(self.failed)} did not converge and are left out of all figures: {named}"
+            )
+        if len(self.deviations) < 2:
+            return [*lines, "too few converged to tell anything"]
+        rows = [["parameter", "value", "u", "standard deviation", "bias", "95 %", "", "unit"]]
+        columns = (self.values, self.uncertainties, self.standard_deviations, self.biases)
+        for k, one in enumerate(self.functions):
+            if one.kind in ("origin", "ball") or not np.isfinite(self.uncertainties[k]):
+                continue
+            value, u, deviation, bias = (
+                amount_of(float(column[k]), one.unit)[0] for column in columns
+            )
+            low, high = (amount_of(float(end), one.unit)[0] for end in self.intervals[k])
+            rows.append(
+                [
+                    one.name,
+                    to_uncertainty(value, u),
+                    number(u, 3),
+                    number(deviation, 3),
+                    to_uncertainty(bias, u),
+                    to_uncertainty(low, u),
+                    to_uncertainty(high, u),
+                    amount_of(1.0, one.unit)[1],
+                ]
+            )
+        lines += aligned(rows, [False, *[True] * 6, False])
+        open_ = int(np.isnan(self.uncertainties).sum())
+        if open_:
+            lines.append(f"{open_} estimates are undetermined, and are left out")
+        if DIFFERS * self.ratio_error > TOO_FEW:
+            return [*lines, "so few data sets tell nothing of standard deviations; try a hundred"]
+        differing = self.differing
+        told = f"within {100 * DIFFERS * self.ratio_error:.2g} % of the linear ones"
+        if not differing:
+            return [*lines, f"all standard deviations are {told}"]
+        names = ", ".join(differing[:5]) + (", …" if len(differing) > 5 else "")
+        count = len(differing)
+        return [*lines, f"{count} standard deviations are not {told}: {names}"]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "trials": self.trials,
+            "seed": self.seed,
+            "not_converged": {str(k): words for k, words in self.failed},
+            "differing": list(self.differing),
+            "estimates": as_data(self.rows()),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each estimate; what is undetermined is NaN."""
+        columns = zip(
+            self.functions,
+            self.values.tolist(),
+            self.uncertainties.tolist(),
+            self.standard_deviations.tolist(),
+            self.biases.tolist(),
+            self.intervals.tolist(),
+            strict=True,
+        )
+        return [
+            {
+                "parameter": one.name,
+                "kind": one.kind,
+                "value": value,
+                "standard uncertainty": u,
+                "standard deviation": deviation,
+                "bias": bias,
+                "95 % from": low,
+                "95 % to": high,
+                "unit": one.unit,
+            }
+            for one, value, u, deviation, bias, (low, high) in columns
+        ]
+
+
+@single_threaded
+def replicated(
+    design: Design, truth: State, sigma: float, monomials: bool, seed: int, trial: int
+) -> Replicate:
+    """Estimates from one data set of `truth`, whose stated uncertainties `sigma` multiplies; the
+    same for a seed and a number, whatever else is computed.
+    """
+    generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
+    readings = design.readings
+    x = true_readings(design, truth, readings)
+    noise = design.noise.draw(generator, x.shape, readings.position, 0)
+    x = x + sigma * noise * reading_noise(design, readings)
+    drawn = [
+        one.given(
+            value=one.true_values(design, truth, design.model) + sigma * one.errors(generator, 1)[0]
+        )
+        for one in design.observations
+    ]
+    given = design.observed(*drawn)
+    solution = estimate(given, x)
+    if solution.status != "converged":
+        return Replicate(solution.status, np.zeros(0), float("nan"))
+    at = linearised_fit(given, solution)
+    freedom = at.degrees_of_freedom
+    left = solution.factor.sum_of_squares / max(freedom, 1)
+    return Replicate("converged", estimated_functions(at, monomials).values, float(np.sqrt(left)))
+
+
+def _task(
+    design: Design, truth: State, sigma: float, monomials: bool, seed: int, first: int, last: int
+) -> list[Replicate]:
+    return [
+        replicated(design, truth, sigma, monomials, seed, trial) for trial in range(first, last)
+    ]
+
+
+def bootstrap(
+    label: str,
+    title: str,
+    functions: EstimatedFunctions,
+    sigma: float,
+    sigma_is_estimated: bool,
+    trials: int,
+    seed: int,
+    workers: int = 1,
+    report: Report = unreported,
+) -> Bootstrap:
+    """Fit data sets of a fit's own parameters, of which it estimated `functions`.
+
+    Lengths of standards without certificates are as drawn. Neither `workers` nor more trials change
+    what a data set gives.
+
+    :raises ValueError: the errors are so large that there are no readings of them.
+    """
+    at = functions.at
+    design = at.design
+    own = [one.name for one in functions.functions if one.kind == "machine"]
+    monomials = own != [parameter.name for parameter in design.model.parameters]
+    truth = replace(at.state, lengths=design.unknown_lengths.drawn)
+    true = functions.values.copy()
+    of_lengths = [k for k, one in enumerate(functions.functions) if one.kind == "length"]
+    true[of_lengths] = design.unknown_lengths.drawn
+    tasks = (
+        (design, truth, sigma, monomials, seed, first, min(first + AT_ONCE, trials))
+        for first in range(0, trials, AT_ONCE)
+    )
+    found: list[Replicate] = []
+    try:
+        for some in in_processes(_task, tasks, workers):
+            found += some
+            report(ProgressStep(f"data sets of {label}", len(found), trials))
+    except NoReadingError as error:
+        raise ValueError(str(error)) from None
+    kept = [one for one in found if one.status == "converged"]
+    uncertainties = sigma * functions.uncertainties()
+    is_open = np.isnan(uncertainties)
+    values = np.array([one.values for one in kept]).reshape(len(kept), len(true))
+    return Bootstrap(
+        label,
+        title,
+        trials,
+        seed,
+        tuple((k, one.status) for k, one in enumerate(found) if one.status != "converged"),
+        functions.functions,
+        np.where(is_open, np.nan, functions.values),
+        uncertainties,
+        np.where(is_open, np.nan, values - true),
+        np.array([one.sigma for one in kept]) / sigma if sigma > 0.0 else np.ones(len(kept)),
+        sigma_is_estimated,
+    )

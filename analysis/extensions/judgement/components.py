@@ -1,0 +1,251 @@
+"""Variance components of a fit: estimates, their uncertainties and verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.gross_errors.leftover import leftover, too_many_entries
+from ballplate.presentation.formatting import aligned, finite, number, picked
+from ballplate.presentation.result import Result
+from ballplate.results.groupings import Grouping
+from ballplate.results.observation_groups import ObservationGroup, groups_of
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .restricted_likelihood import (
+    SMALLEST,
+    GroupSums,
+    Whitened,
+    at_ratios,
+    degrees_of_freedom,
+    estimated_ratios,
+    group_sums,
+)
+
+LARGER, SMALLER, AS_STATED = "larger than stated", "smaller than stated", "agrees with stated"
+
+# Chance that a table of readings that scatter as stated calls any of its groups larger or smaller.
+FALSE_ALARM = 0.05
+
+# Chance that an interval does not hold its ratio.
+OUTSIDE = 0.05
+
+# Groups with fewer degrees of freedom have no estimate: its standard deviation would be larger than
+# itself.
+LEAST_FREEDOM = 1.0
+
+# Degrees of freedom of an estimate below which it does not replace a smaller stated variance.
+FEW = 10
+
+# Entries of the matrices of all groups, of eight bytes each, of which there are several copies.
+MOST_ENTRIES = 20_000_000
+
+
+@dataclass(frozen=True)
+class VarianceComponent:
+    """The variance of a group of `observations` as a `ratio` to the stated one.
+
+    `redundancy` is the number of its observations less what the estimate absorbs of them;
+    `standard_uncertainty` is that of the ratio, and `lower` and `upper` are the ends of an interval
+    of 95 %. All are NaN where `verdict` says that it cannot be estimated, and the ratio is taken
+    for 1.
+    """
+
+    name: str
+    observations: int
+    redundancy: float
+    ratio: float
+    standard_uncertainty: float
+    lower: float
+    upper: float
+    verdict: str
+
+    @property
+    def is_estimated(self) -> bool:
+        return not np.isnan(self.ratio)
+
+    @property
+    def is_to_be_used(self) -> bool:
+        """Whether a fit that is reweighted uses the estimate: it may make uncertainties smaller
+        only where it is good to a half.
+        """
+        good = self.ratio > 0.0 and 2.0 * (self.ratio / self.standard_uncertainty) ** 2 >= FEW
+        return self.is_estimated and (good or self.verdict == LARGER)
+
+
+@dataclass(frozen=True, repr=False)
+class VarianceComponents(Result):
+    """Variance components of the groups that `by` makes of all observations of a fit.
+
+    `weighting` are the ratios that take the place of what is stated where a fit is reweighted: 1
+    where there is no estimate, or one with few degrees of freedom, unless it is larger than stated.
+    """
+
+    label: str
+    title: str
+    by: Grouping
+    groups: tuple[VarianceComponent, ...]
+    weighting: tuple[float, ...]
+
+    def headline(self) -> str:
+        count = sum(one.is_estimated for one in self.groups)
+        larger = [one.name for one in self.groups if one.verdict == LARGER]
+        words = f"{count} of {len(self.groups)} variance components estimated"
+        return f"{words}; {LARGER}: {', '.join(larger)}" if larger else words
+
+    def lines(self) -> list[str]:
+        rows = [
+            [
+                f"variance by {self.by}",
+                "observations",
+                "redundancy",
+                "ratio to stated",
+                "standard uncertainty",
+                "95 % from",
+                "to",
+                "",
+            ]
+        ]
+        for one in self.groups:
+            numbers = (one.ratio, one.standard_uncertainty, one.lower, one.upper)
+            rows.append(
+                [
+                    one.name,
+                    str(one.observations),
+                    f"{one.redundancy:.2f}",
+                    *(number(value, 3) for value in numbers),
+                    one.verdict,
+                ]
+            )
+        return aligned(rows, [False, True, True, True, True, True, True, False])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each group."""
+        return [
+            {
+                "group": one.name,
+                **picked(
+                    one,
+                    "observations",
+                    "redundancy",
+                    "ratio",
+                    "standard_uncertainty",
+                    "lower",
+                    "upper",
+                    "verdict",
+                ),
+            }
+            for one in self.groups
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        groups = self.rows()
+        for row in groups:
+            row |= {name: finite(one) for name, one in row.items() if isinstance(one, float)}
+        return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": groups}
+
+
+def too_many_groups(design: Design, groups: Sequence[ObservationGroup]) -> str:
+    """Why variance components take too much memory; otherwise empty."""
+    entries = len(groups) * design.parameter_count**2
+    if entries <= MOST_ENTRIES:
+        return too_many_entries(design)
+    return (
+        f"{len(groups)} groups of observations of {design.parameter_count} parameters are too many"
+        " for variance components; choose a grouping with fewer"
+    )
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """Estimated `ratios` (g,) of `groups`; of those that are not `free` they are 1 for want of an
+    estimate, and `reasons` says why.
+    """
+
+    groups: tuple[ObservationGroup, ...]
+    sums: GroupSums
+    ratios: Array
+    free: Integers
+    reasons: tuple[str, ...]
+
+
+def told_apart(sums: GroupSums, groups: tuple[ObservationGroup, ...]) -> Estimated:
+    """REML estimates of the variances that the design tells apart."""
+    free, reasons = _told_apart(sums, [group.name for group in groups])
+    return Estimated(groups, sums, estimated_ratios(sums, free), free, reasons)
+
+
+def _told_apart(sums: GroupSums, names: Sequence[str]) -> tuple[Integers, tuple[str, ...]]:
+    """Groups whose variances the design tells apart, where these are as stated, and why others
+    have no estimate.
+    """
+    stated = at_ratios(sums, np.ones(len(sums.counts)))
+    reasons = [""] * len(names)
+    free = list(range(len(names)))
+    for k, redundancy in enumerate(stated.redundancies.tolist()):
+        if redundancy < LEAST_FREEDOM:
+            reasons[k] = "cannot be estimated: too little redundancy"
+            free.remove(k)
+    while free:
+        information = stated.information[np.ix_(free, free)]
+        freedom = degrees_of_freedom(information)
+        # The last of those that are equally poor, so that rounding does not choose.
+        worst = int(np.flatnonzero(freedom <= freedom.min() + 1e-6)[-1])
+        if freedom[worst] >= LEAST_FREEDOM:
+            break
+        common = information[worst] / np.sqrt(np.diagonal(information))
+        common[worst] = -np.inf
+        other = names[free[int(np.argmax(np.round(common, 6)))]]
+        reasons[free[worst]] = f"cannot be told from {other}"
+        del free[worst]
+    return np.array(free, np.int64), tuple(reasons)
+
+
+@single_threaded
+def variance_components(
+    label: str, title: str, at: Linearisation, x: Array, by: Grouping
+) -> VarianceComponents:
+    """Variance components of a fit to scale readings x (readings, d), which has converged.
+
+    :raises ValueError: there are too many groups or observations for the memory.
+    """
+    groups = groups_of(at.design, by)
+    reason = too_many_groups(at.design, groups)
+    if reason:
+        raise ValueError(reason)
+    found = told_apart(group_sums(leftover(at, x, 0), groups), groups)
+    components = tuple(judged(found))
+    used = np.flatnonzero([one.is_to_be_used for one in components])
+    weighting = estimated_ratios(found.sums, used)
+    return VarianceComponents(label, title, by, components, tuple(weighting.tolist()))
+
+
+def judged(found: Estimated) -> list[VarianceComponent]:
+    """Estimates with their uncertainties and verdicts."""
+    at = at_ratios(found.sums, found.ratios)
+    freedom = degrees_of_freedom(at.information[np.ix_(found.free, found.free)])
+    whitened = Whitened(found.sums, found.ratios, found.free)
+    stated = at_ratios(found.sums, np.ones(len(found.groups)))
+    result = []
+    limit = 0.5 * FALSE_ALARM / max(len(found.free), 1)
+    for k, group in enumerate(found.groups):
+        place = np.flatnonzero(found.free == k)
+        known = group.name, len(group.rows), float(stated.redundancies[k])
+        if not len(place):
+            nothing = (np.nan,) * 4
+            result.append(VarianceComponent(*known, *nothing, found.reasons[k]))
+            continue
+        test = whitened.test_of(int(place[0]))
+        chance = test.chance(1.0)
+        verdict = LARGER if chance < limit else SMALLER if chance > 1.0 - limit else AS_STATED
+        # At the bound there is no scatter but what others explain.
+        ratio = float(found.ratios[k]) if found.ratios[k] > SMALLEST else 0.0
+        spread = ratio * float(np.sqrt(2.0 / freedom[place[0]])) if ratio else np.nan
+        ends = test.end(0.5 * OUTSIDE), test.end(1.0 - 0.5 * OUTSIDE)
+        result.append(VarianceComponent(*known, ratio, spread, *ends, verdict))
+    return result

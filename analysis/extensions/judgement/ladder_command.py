@@ -1,0 +1,53 @@
+"""`ballplate ladder`: which error model the readings call for."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+
+from ballplate.cli.common import add_json, whole
+from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
+
+HELP = "compare error models on readings: which one do they call for?"
+DESCRIPTION = (
+    "Fit error models from the poorest to the richest that the design determines, kinematic ones"
+    " with more and more coefficients and empirical ones, and recommend the poorest that no richer"
+    " one beats; tell what each changes in corrected lengths. The exit status is 0 if one is"
+    " recommended, otherwise 1."
+)
+
+# Numbers of coefficients of polynomials.
+LEAST, MOST = 3, 12
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_readings(parser)
+    parser.add_argument(
+        "--coefficients",
+        metavar="N",
+        type=_coefficients,
+        help=f"most coefficients that are tried, {LEAST} to {MOST}; default 8",
+    )
+    add_json(parser)
+
+
+def _coefficients(text: str) -> int:
+    count = whole(text, LEAST)
+    if count > MOST:
+        raise ArgumentTypeError(f"{count} coefficients are too many; at most {MOST} are possible")
+    return count
+
+
+def run(options: Namespace) -> int:
+    """Compare error models; 1 if none is recommended."""
+    from ballplate.cli.common import show
+    from ballplate.cli.progress import progress
+
+    from .ladder import ladder
+    from .rungs import MOST_COEFFICIENTS
+
+    experiment, observed = observed_readings(options)
+    with progress(options) as shown:
+        most = options.coefficients or MOST_COEFFICIENTS
+        result = ladder(experiment, observed, options.sigma, most, shown.show)
+    show(options, result)
+    return warn_of(result)

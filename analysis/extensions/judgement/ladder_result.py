@@ -1,0 +1,285 @@
+"""The result of a ladder of error models: text, data and rows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ballplate.presentation.formatting import aligned, finite, number, picked
+from ballplate.presentation.result import FitResult
+from ballplate.results.adjustments import freedom_words
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.uncertainty.summaries import Quantity
+
+from .lack_of_fit import PureError, chance_words
+from .rung_choice import FALSE_STEP, Beaten, Criteria
+from .rungs import FILE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# Criteria closer than this are the same but for rounding.
+SAME_CRITERION = 1e-2
+
+
+@dataclass(frozen=True)
+class LengthChange:
+    """Largest and root mean square difference of lengths between evaluation points, in metres."""
+
+    largest: float
+    rms: float
+
+
+@dataclass(frozen=True)
+class Rung:
+    """An error model on the ladder: its number of parameters, its S^2 and what that leaves.
+
+    `change` is how its corrected lengths differ from those of the recommended model. Parameters
+    beyond those that the other rungs leave open are `undetermined`.
+    """
+
+    model: str
+    parameters: int
+    sum_of_squares: float
+    degrees_of_freedom: int
+    criteria: Criteria
+    beaten: Beaten
+    change: LengthChange
+    is_recommended: bool
+    is_of_file: bool
+    undetermined: int = 0
+
+    @property
+    def sigma(self) -> float:
+        return math.sqrt(self.sum_of_squares / max(self.degrees_of_freedom, 1))
+
+
+@dataclass(frozen=True, repr=False)
+class Ladder(FitResult):
+    """Error models on the same readings, and the one that these call for.
+
+    `recommended` is the poorest that no richer one beats, and `error_model` what a file states for
+    it. `faults` are what even the richest leaves unexplained, or, where that `is_mistake`, mistakes
+    in the file that explain it; with any of them none is recommended, and changes of lengths are
+    from the one that would be. `sigma` multiplies stated uncertainties.
+    `lack_of_fit` is the chance of the recommended model's residuals beside the scatter of
+    `repeats`, NaN without any. `beyond` are models that the design leaves undetermined. `lengths`
+    are the standard uncertainties U6 with the recommended model.
+    """
+
+    label: str
+    title: str
+    observed: ObservedReadings
+    rungs: tuple[Rung, ...]
+    recommended: str
+    error_model: dict[str, Any]
+    faults: tuple[str, ...]
+    sigma_is_given: bool
+    sigma: float
+    repeats: PureError
+    lack_of_fit: float
+    beaten: Beaten
+    beyond: tuple[str, ...]
+    lengths: Quantity
+    coverage_factor: float
+    unsure: tuple[str, ...] = ()
+    is_mistake: bool = False
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Why the choice is less sure than its tests say."""
+        return self.unsure
+
+    @property
+    def is_none(self) -> bool:
+        """Whether none of the models can be recommended."""
+        return bool(self.faults)
+
+    def headline(self) -> str:
+        return "none of these" if self.is_none else f"recommended: {self.recommended}"
+
+    def verdict(self) -> list[str]:
+        """What to do, in words."""
+        if self.is_mistake:
+            return [f"none of these before the file is corrected: {'; '.join(self.faults)}"]
+        if self.is_none:
+            return [
+                (f"none of these: {'; '.join(self.faults)}"),
+                (
+                    "look for gross errors and drifts first (ballplate fit), then for an error that"
+                    " repeats in less than the distance of the balls, such as one of a lead screw's"
+                    " pitch: more coefficients would not follow it"
+                ),
+            ]
+        if self.beaten.count:
+            count, least = self.beaten.count, chance_words(self.beaten.least)
+            some, does = ("the one richer model", "does not explain")
+            if count > 1:
+                some, does = f"none of {count} richer models", "explains"
+            why = (
+                f"{some} that this design determines {does} significantly more; least chance"
+                f" {least}, of {self.beaten.by}"
+            )
+        else:
+            why = "it is the richest that this design determines"
+        found = [f"recommended: {self.recommended}; {why}"]
+        file = next((one for one in self.rungs if one.is_of_file), None)
+        if file is not None and not file.is_recommended:
+            found.append(self._of_file(file))
+        return found
+
+    def _of_file(self, file: Rung) -> str:
+        chosen = next(one for one in self.rungs if one.is_recommended)
+        if file.undetermined:
+            told = "is not determined by this design"
+        elif file.beaten.chance < FALSE_STEP and file.beaten.count:
+            chance = chance_words(file.beaten.chance)
+            told = f"is too poor: {file.beaten.by} explains more (chance {chance})"
+        elif file.parameters > chosen.parameters:
+            told = "has more parameters than the readings call for"
+        else:
+            apart = file.criteria.bic - chosen.criteria.bic
+            word = (
+                "as good"
+                if abs(apart) < SAME_CRITERION
+                else "the better"
+                if apart < 0
+                else "the worse"
+            )
+            told = f"is no poorer or richer form of these; by BIC it is {word}"
+        told = f"the file's error model, {file.model.removeprefix(FILE)}, {told}"
+        if self.lengths.undetermined:
+            return told
+        return f"{told}; it changes lengths by {self._length(file.change.rms)} µm rms"
+
+    def lines(self) -> list[str]:
+        how = "given" if self.sigma_is_given else "estimated"
+        test = "chi-squared" if self.sigma_is_given else "F"
+        heads = ["", "parameters", "freedom", "sigma", f"{test}: chance", "AIC", "BIC"]
+        rows = [[*heads, "largest change", "rms, µm", ""]]
+        least = [min(getattr(one.criteria, key) for one in self.rungs) for key in ("aic", "bic")]
+        for one in self.rungs:
+            marks = [
+                words
+                for words, is_so in (
+                    ("recommended", one.is_recommended and not self.is_none),
+                    ("the file's", one.is_of_file and not one.model.startswith(FILE)),
+                    (f"{one.undetermined} undetermined", one.undetermined > 0),
+                )
+                if is_so
+            ]
+            rows.append(
+                [
+                    one.model,
+                    str(one.parameters),
+                    str(one.degrees_of_freedom),
+                    f"{one.sigma:.4g}",
+                    chance_words(one.beaten.chance) if one.beaten.count else "-",
+                    f"{one.criteria.aic - least[0]:.1f}",
+                    f"{one.criteria.bic - least[1]:.1f}",
+                    self._length(one.change.largest),
+                    self._length(one.change.rms),
+                    f"<- {', '.join(marks)}" if marks else "",
+                ]
+            )
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"error models on the same readings, sigma {how}; chance: that a richer model"
+                f" explains so much more by chance, all richer ones together; AIC and BIC above the"
+                f" least; changes of lengths from {self.recommended}"
+            ),
+            "",
+            *aligned(rows, [False, *[True] * 8, False]),
+            self._of_lengths(),
+            "",
+            *self._of_repeats(),
+        ]
+        if self.beyond:
+            lines.append(f"not determined by this design, and no candidates: {self._beyond()}")
+        return [*lines, *self.verdict()]
+
+    def _beyond(self) -> str:
+        return "; ".join(self.beyond)
+
+    def _length(self, value: float) -> str:
+        return "undetermined" if self.lengths.undetermined else number(1e6 * value, 3)
+
+    def _of_lengths(self) -> str:
+        k = self.coverage_factor
+        if self.lengths.undetermined:
+            return "lengths are undetermined by this design, whatever the model"
+        largest, average = 1e6 * k * self.lengths.maximum, 1e6 * k * self.lengths.average
+        return (
+            f"beside it U (k = {k:g}) of these lengths: {number(largest, 3)} µm at most,"
+            f" {number(average, 3)} µm on average"
+        )
+
+    def _of_repeats(self) -> list[str]:
+        if not self.repeats.degrees_of_freedom:
+            return ["no reading is repeated: lack of fit cannot be tested against repeats"]
+        told = (
+            f"repeated readings scatter {self.repeats.sigma:.3g} times as stated, with"
+            f" {freedom_words(self.repeats.degrees_of_freedom)}"
+        )
+        if math.isnan(self.lack_of_fit):
+            return [f"{told}; nothing else is left to test lack of fit"]
+        return [
+            f"{told}; lack of fit of {self.recommended}: chance {chance_words(self.lack_of_fit)}"
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "recommended": None if self.is_none else self.recommended,
+            "error_model": None if self.is_none else self.error_model,
+            "unexplained": list(self.faults),
+            "sigma_is_given": self.sigma_is_given,
+            "sigma": self.sigma,
+            "repeats": {
+                "sum_of_squares": self.repeats.sum_of_squares,
+                "degrees_of_freedom": self.repeats.degrees_of_freedom,
+            },
+            "lack_of_fit": finite(self.lack_of_fit),
+            "undetermined_models": list(self.beyond),
+            "lengths": {
+                "maximum": finite(self.lengths.maximum),
+                "average": finite(self.lengths.average),
+                "undetermined": self.lengths.undetermined,
+                "unit": "m",
+            },
+            "compared_with": self.recommended,
+            "rungs": [_rung_data(one, self.lengths.undetermined > 0) for one in self.rungs],
+            **self.said(),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each error model."""
+        return [_rung_data(one, self.lengths.undetermined > 0) for one in self.rungs]
+
+    @property
+    def complaint(self) -> str:
+        if self.is_mistake:
+            return "a mistake in the file explains the readings, and no error model does"
+        return "none of the error models explains the readings" if self.is_none else ""
+
+
+def _rung_data(one: Rung, lengths_are_open: bool) -> dict[str, Any]:
+    change: Sequence[float] = (one.change.largest, one.change.rms)
+    largest, rms = (None if lengths_are_open else value for value in change)
+    return {
+        **picked(one, "model", "parameters", "degrees_of_freedom", "sum_of_squares"),
+        "aic": one.criteria.aic,
+        "bic": one.criteria.bic,
+        "chance": one.beaten.chance if one.beaten.count else None,
+        "richer_models": one.beaten.count,
+        "best_richer_model": one.beaten.by or None,
+        "largest_change": largest,
+        "rms_change": rms,
+        "unit": "m",
+        "recommended": one.is_recommended,
+        "of_the_file": one.is_of_file,
+        "undetermined": one.undetermined,
+    }

@@ -1,0 +1,205 @@
+"""Predictions of what was left out: text, data and rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ballplate.presentation.formatting import aligned, as_data, number, picked
+from ballplate.presentation.result import FitResult
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+
+from .lack_of_fit import chance_words
+
+# Chance, of all that is left out together, below which a prediction fails.
+FAILED = 0.01
+
+
+@dataclass(frozen=True)
+class PredictedReading:
+    """A prediction error of one co-ordinate in metres, with its standard uncertainty, the scatter
+    of the reading included.
+    """
+
+    position: str
+    ball: str
+    probe: str
+    axis: str
+    error: float
+    standard_uncertainty: float
+    standardised: float
+
+
+@dataclass(frozen=True)
+class LengthDifference:
+    """The largest change of a corrected length, in metres, where something is left out: with the
+    standard uncertainty of the change, and that of the length. `undetermined` lengths are known by
+    nothing else.
+    """
+
+    change: float
+    standard_uncertainty: float
+    of_length: float
+    undetermined: int
+    between: tuple[str, str]
+
+    @property
+    def standardised(self) -> float:
+        return self.change / self.standard_uncertainty if self.standard_uncertainty > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class PredictedGroup:
+    """A position, plate or direction that was left out and predicted.
+
+    `predicted` are the independent co-ordinates that the others predict, and `mean_square` the mean
+    square of their errors in the variances that the stated uncertainties give them; `sigma` is the
+    others' own. `chance` is that of errors so large.
+    """
+
+    kind: str
+    name: str
+    predicted: int
+    mean_square: float
+    sigma: float
+    chance: float
+    converged: bool
+    worst: PredictedReading | None = None
+    lengths: LengthDifference | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class Validation(FitResult):
+    """Everything that can be left out of an experiment's readings, predicted from the rest."""
+
+    label: str
+    title: str
+    observed: ObservedReadings
+    left_out: tuple[PredictedGroup, ...]
+    sigma_is_given: bool
+    coverage_factor: float
+
+    @property
+    def failed(self) -> tuple[PredictedGroup, ...]:
+        """What is predicted worse than chance explains, all tests together."""
+        tested = [one for one in self.left_out if one.predicted > 0]
+        return tuple(one for one in tested if one.chance * len(tested) < FAILED)
+
+    @property
+    def complaint(self) -> str:
+        lost = [one for one in self.left_out if not one.converged]
+        told = [f"{one.kind} {one.name} is predicted wrongly by the others" for one in self.failed]
+        told += [f"without {one.kind} {one.name} the estimate does not converge" for one in lost]
+        if not any(one.predicted for one in self.left_out):
+            told.append("nothing was tested: the rest predicts nothing that can be left out")
+        return "; ".join(told)
+
+    def headline(self) -> str:
+        tested = sum(one.predicted > 0 for one in self.left_out)
+        if not tested:
+            return "nothing that can be left out is predicted by the rest"
+        return f"{tested} left out in turn, {len(self.failed)} predicted wrongly"
+
+    def lines(self) -> list[str]:
+        test = "chi-squared" if self.sigma_is_given else "F"
+        k = self.coverage_factor
+        heads = ["left out", "", "predicted", "rms error / u", f"{test}: chance", "worst reading"]
+        rows = [[*heads, "error / u", "length, µm", f"U (k = {k:g})", ""]]
+        failed = self.failed
+        for one in self.left_out:
+            rows.append([one.kind, one.name, *_cells(one, k), "<- failed" * (one in failed)])
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                "each left out in turn and predicted from all others; its pose, and balls read"
+                " nowhere else, come from its own readings; uncertainties of prediction errors"
+                " include the scatter of the reading; length: largest change of a corrected length,"
+                " beside the U of this change"
+            ),
+            "",
+            *aligned(rows, [False, False, True, True, True, False, True, True, True, False]),
+        ]
+        tested = sum(one.predicted > 0 for one in self.left_out)
+        if not tested:
+            return [*lines, self.headline()]
+        if not failed:
+            told = (
+                f"no prediction fails: the least of {tested} chances is"
+                f" {chance_words(min(one.chance for one in self.left_out if one.predicted > 0))}"
+            )
+            return [*lines, told]
+        names = ", ".join(f"{one.kind} {one.name}" for one in failed)
+        return [
+            *lines,
+            (
+                f"predicted wrongly: {names}; the error model is too poor there, or the readings or"
+                " certificates contradict one another: see ballplate ladder and what fit suspects"
+            ),
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "sigma_is_given": self.sigma_is_given,
+            "left_out": [_data(one) for one in self.left_out],
+            "failed": [f"{one.kind} {one.name}" for one in self.failed],
+            **self.said(),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each that was left out."""
+        return [
+            {
+                "kind": one.kind,
+                "left out": one.name,
+                "predicted": one.predicted,
+                "mean square error": one.mean_square,
+                "sigma": one.sigma,
+                "chance": one.chance,
+                "largest standardised error": None if one.worst is None else one.worst.standardised,
+                "length change": None if one.lengths is None else one.lengths.change,
+                "standard uncertainty": (
+                    None if one.lengths is None else one.lengths.standard_uncertainty
+                ),
+                "unit": "m",
+            }
+            for one in self.left_out
+        ]
+
+
+def _cells(one: PredictedGroup, k: float) -> list[str]:
+    if not one.converged:
+        return ["", "", "", "not converged", "", "", ""]
+    if not one.predicted:
+        return ["nothing", "", "", "", "", "", ""]
+    worst, lengths = one.worst, one.lengths
+    error = (one.mean_square**0.5) / one.sigma if one.sigma > 0.0 else float("nan")
+    cells = [str(one.predicted), number(error, 3), chance_words(one.chance)]
+    if worst is None:
+        cells += ["", ""]
+    else:
+        where = "" if one.kind == "position" else f"{worst.position}: "
+        cells += [f"{where}{worst.ball} {worst.probe} {worst.axis}", f"{worst.standardised:.2f}"]
+    if lengths is None:
+        return [*cells, "undetermined", ""]
+    u = k * lengths.standard_uncertainty
+    return [*cells, number(1e6 * lengths.change, 3), number(1e6 * u, 3)]
+
+
+def _data(one: PredictedGroup) -> dict[str, Any]:
+    found: dict[str, Any] = as_data(
+        {
+            **picked(one, "kind", "name", "converged", "predicted"),
+            "mean_square_error": one.mean_square,
+            "sigma": one.sigma,
+            "chance": one.chance,
+            "worst_reading": None if one.worst is None else vars(one.worst),
+            "largest_length_difference": (
+                None
+                if one.lengths is None
+                else {**vars(one.lengths), "between": list(one.lengths.between), "unit": "m"}
+            ),
+        }
+    )
+    return found

@@ -1,0 +1,1 @@
+"""Readings as laboratories write them: tables in any form, reports of programs, names matched."""

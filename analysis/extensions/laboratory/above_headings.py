@@ -1,0 +1,42 @@
+"""What lines above the headings of a table say of all its rows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from ballplate.simulator.inputs.settings import shorten
+
+from .headings import HeadingError
+
+# Lines above the headings that say what all rows have.
+ABOVE = {
+    "position": r"position|pos|placement|set-?up|lage|aufstellung|stellung|messlage|aufspannung",
+    "probe": r"probe|stylus|tip|taster|taststift",
+    "unit": r"units?|einheit(?:en)?|(?:(?:all )?values|lengths?|(?:alle )?(?:werte|angaben)) in\b",
+}
+# Characters of such a line.
+LONGEST_LINE = 300
+
+
+def said_above(lines: Iterable[str]) -> dict[str, str]:
+    """What lines say of all rows: position, probe and unit.
+
+    :raises HeadingError: they say two things.
+    """
+    found: dict[str, str] = {}
+    for text in (text[:LONGEST_LINE] for text in lines):
+        for role, pattern in ABOVE.items():
+            match = re.match(
+                rf'[\s#"]*(?:{pattern})(?:["\s]*[:=;,\t|]|(?<=\bin)\s)\s*"?(.*?)["\s;,|]*$',
+                text,
+                re.IGNORECASE,
+            )
+            if match is None or not match[1]:
+                continue
+            if found.setdefault(role, match[1]) != match[1]:
+                raise HeadingError(
+                    f'two lines above the headings state a {role}, "{shorten(found[role])}" and'
+                    f' "{shorten(match[1])}"; write which under readings'
+                )
+    return found

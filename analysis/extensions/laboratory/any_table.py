@@ -1,0 +1,428 @@
+"""Readings from tables in any form that is not ambiguous, and in words how each was read."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from ballplate.simulator.experiment.readings_section import Coordinate, ReadingsSettings
+from ballplate.simulator.inputs.decoding import (
+    END_OF_FILE,
+    LINE_END,
+    refuse_controls,
+    refuse_long_lines,
+    text_and_encoding,
+)
+from ballplate.simulator.inputs.messages import (
+    MORE_ERRORS,
+    MOST_MESSAGES,
+    ExperimentError,
+    Message,
+    refused,
+)
+from ballplate.simulator.inputs.quantities import (
+    LENGTH_UNITS,
+    QuantityError,
+    metres_or_radians,
+    parse_positive_length,
+    plain_number,
+    plain_unit,
+    power_of_ten,
+)
+from ballplate.simulator.inputs.settings import listing, shorten
+from ballplate.simulator.inputs.spreadsheets import text_of_cell
+from ballplate.simulator.inputs.tables import MOST_ROWS, FileRow
+from ballplate.simulator.inputs.yamltree import GivenText, Mark, read_bytes
+from ballplate.simulator.machines.protocol import Array
+
+from .above_headings import said_above
+from .clock_times import ClockError, ReadTime, clock_time
+from .heading_words import folded, unit_of
+from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary, missing_columns
+from .table_forms import (
+    DECIMALS,
+    NOTHING,
+    SEPARATORS,
+    Form,
+    NoFormError,
+    chosen_form,
+    commas_of_both_kinds,
+    doubtful_decimals,
+    forms_of,
+)
+
+TEMPERATURES = (
+    "temperature_artefact_degC and temperature_scales_degC are used where the experiment has"
+    " influences of kind: temperature for them"
+)
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """Rows of tables of readings: the names of position, ball and probe, and lengths in metres, x,
+    y, z and u, and what further columns hold; NaN for what is not stated.
+
+    `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
+    `hints` are what to say where names are not known: that a position is the name of the file
+    though columns are not used. `coordinates` is what those of a report of a measuring program
+    are; None of a table, which does not say. `times` are those of rows that have clock times.
+    """
+
+    rows: tuple[FileRow, ...]
+    told: tuple[str, ...] = ()
+    diameters: tuple[float, ...] = ()
+    hints: tuple[Message, ...] = ()
+    coordinates: Coordinate | None = None
+    times: tuple[ReadTime, ...] = ()
+
+
+def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[GivenText, str]:
+    """The text of a table, and the encoding it is in.
+
+    :raises ExperimentError: it cannot be read, or is no text.
+    """
+    if isinstance(source, GivenText):
+        return source, ""
+    text, found = text_and_encoding(read_bytes(source), source, encoding)
+    # A report in XML may be a single line.
+    if not text.lstrip().startswith("<"):
+        refuse_long_lines(text, source)
+    return GivenText(str(source), text.rstrip(END_OF_FILE)), found
+
+
+def read_any_table(
+    source: GivenText,
+    encoding: str,
+    words: Vocabulary,
+    settings: ReadingsSettings,
+    is_possible: Callable[[Array], bool],
+) -> TableRows:
+    """Rows of a table whose form is found, or stated in the settings.
+
+    `is_possible` tells whether co-ordinates (m, d) in metres can be readings of the machine. Names
+    are as the table has them; the probe is empty where nothing states it.
+
+    :raises ExperimentError: the table is ambiguous, lacks columns or units, or has wrong cells.
+    """
+    refuse_controls(source.text, source)
+    texts = LINE_END.split(source.text)
+    lines = [
+        (number, text)
+        for number, text in enumerate(texts, start=1)
+        if not re.fullmatch(r"[\s;,|]*", text)
+    ]
+    if not lines:
+        columns = ["position", "ball", "probe", *(f"{axis}_mm" for axis in words.axes)]
+        text = f"the file is empty; its first line should be {','.join(columns)}"
+        raise refused(source, text, line=1)
+    if len(lines) > MOST_ROWS:
+        raise refused(source, f"more than {MOST_ROWS} rows; leave some out")
+    try:
+        form = chosen_form(forms_of(lines, words, settings))
+        if settings.decimal is None and commas_of_both_kinds(form):
+            raise NoFormError(
+                form.header,
+                "commas separate the columns, and perhaps decimals too: all co-ordinates are whole"
+                " numbers; write which under readings: decimal, or export with semicolons",
+            )
+    except NoFormError as error:
+        text = error.text or missing_columns(error.cells, words.axes)
+        raise refused(source, text, line=error.line) from None
+    return _Reader(source, encoding, words, settings, form).read(is_possible)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads the rows of a table whose form is known."""
+
+    source: GivenText
+    encoding: str
+    words: Vocabulary
+    settings: ReadingsSettings
+    form: Form
+
+    def error(self, text: str, line: int = 0) -> ExperimentError:
+        return refused(self.source, text, line=line or max(self.form.header, 1))
+
+    def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
+        form = self.form
+        self._refuse_wrong()
+        try:
+            above = said_above(self.form.above)
+        except HeadingError as error:
+            raise self.error(str(error)) from None
+        texts, told = self._texts(above)
+        units = self._units(above)
+        found = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
+        # In the order that they were read in, also where several stand side by side.
+        found.sort(key=lambda one: one[0].mark.line)
+        rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
+        self._refuse_doubtful(rows, is_possible)
+        hints = self._of_positions(texts.get("position", ""))
+        said = (self._told(units, told),)
+        return TableRows(tuple(rows), said, diameters, hints, times=self._times())
+
+    def _refuse_wrong(self) -> None:
+        form, headings = self.form, self.form.headings
+        messages = [Message(str(self.source), line, 1, "", text) for line, text in form.wrong]
+        if len(messages) > MOST_MESSAGES:
+            messages = [*messages[:MOST_MESSAGES], replace(messages[-1], text=MORE_ERRORS)]
+        if not messages and not form.rows and form.empty:
+            text = f"nothing is filled in: {listing(self.words.axes)} are empty in all rows; write"
+            text += " in what was read, and remove the lines of what was not"
+            raise self.error(text, form.empty[0])
+        if not messages and not form.rows:
+            raise self.error("no rows below the names of the columns; add at least one")
+        if "ball" not in headings.roles:
+            text = missing_columns(headings.cells, ["ball"])
+            messages.insert(0, Message(str(self.source), max(form.header, 1), 1, "", text))
+        if messages:
+            raise ExperimentError(messages)
+
+    def _texts(self, above: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+        """What all rows have where no column says it, and in words where that comes from.
+
+        :raises ExperimentError: nothing says which position it is.
+        """
+        texts, told = {}, []
+        every = {role for group in self.form.headings.groups for role in group.texts}
+        for role in ("position", "probe"):
+            column = self.form.headings.roles.get(role)
+            known = getattr(self.words, f"{role}s")
+            if column is not None:
+                if column.constant is not None:
+                    texts[role] = column.constant
+            elif role in above:
+                texts[role] = above[role]
+                told.append(f'{role} "{shorten(above[role])}" above the headings')
+            elif role in every:
+                continue
+            elif len(known) == 1:
+                texts[role] = known[0]
+            elif role == "position":
+                name = Path(self.source.name).stem
+                if name == self.source.name:
+                    raise self.error(missing_columns(self.form.headings.cells, [role]))
+                texts[role] = name
+                told.append(f'position "{shorten(name)}" by the name of the file')
+        return texts, told
+
+    def _of_positions(self, position: str) -> tuple[Message, ...]:
+        """What to say where positions are not known, since one is by the name of the file alone.
+
+        :raises ExperimentError: a column that is not used has nothing but names of positions.
+        """
+        headings = self.form.headings
+        if position != Path(self.source.name).stem or "position" in headings.roles:
+            return ()
+        known = {folded(name) for name in self.words.positions}
+        for i, cell in enumerate(headings.cells):
+            if i in headings.used or not cell or folded(position) in known:
+                continue
+            if {folded(cells[i]) for _, cells in self.form.rows} <= known:
+                name = shorten(cell)
+                raise self.error(
+                    f'the column "{name}" has names of positions; if it is that of positions, give'
+                    f" --columns position={name}, or readings: {{columns: {{position: {name}}}}}"
+                )
+        if not headings.unused:
+            return ()
+        names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
+        text = (
+            f'"{shorten(position)}", the name of the file, was taken for the position; not used:'
+            f" {names}; if one of these is the position, give --columns"
+            f" position={shorten(headings.unused[0])}"
+        )
+        return (Message(str(self.source), max(self.form.header, 1), 1, "", text),)
+
+    def _units(self, above: Mapping[str, str]) -> dict[int, str]:
+        """Units by place of the columns of lengths.
+
+        :raises ExperimentError: one has none, or two.
+        """
+        stated = None if self.settings.unit is None else plain_unit(self.settings.unit)
+        once = unit_of(above.get("unit", "").rstrip("."))
+        if stated and once and stated != once:
+            raise self.error(
+                f"the table says that lengths are in {once}, the experiment file {stated}; correct"
+                " readings.unit"
+            )
+        found: dict[int, str] = {}
+        without: list[int] = []
+        roles = self.form.headings.roles
+        axes = [axis for group in self.form.headings.groups for axis in group.axes]
+        others = [roles[role] for role in ("u", "diameter") if role in roles]
+        lengths = [*axes, *(column for column in others if column.constant is None)]
+        for column in lengths:
+            unit = column.unit or self.form.units.get(column.place) or stated or once
+            if unit is None and column is roles.get("diameter") and found:
+                # Of what stands beside co-ordinates in one unit, as an uncertainty may not.
+                unit = next(iter(found.values())) if len(set(found.values())) == 1 else None
+            if unit is None and column is roles.get("u") and not without:
+                cells = self.form.headings.cells
+                named = f'"{shorten(cells[column.place])}"' if cells else str(column.place + 1)
+                raise self.error(
+                    f"the column {named} of uncertainties has no unit, which may be another than"
+                    " that of co-ordinates; write it in the heading, as in u_um"
+                )
+            if unit is None:
+                without.append(column.place)
+            else:
+                found[column.place] = unit
+        if without:
+            cells = self.form.headings.cells
+            names = listing(f'"{cells[i]}"' if cells else str(i + 1) for i in without)
+            raise self.error(
+                f"no unit is stated for the columns {names}; write it under readings: {{unit: mm}}"
+                " in the experiment file, or give --unit mm"
+            )
+        return found
+
+    def _rows(
+        self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]
+    ) -> list[tuple[FileRow, float]]:
+        """Rows of the readings of a group of columns, with diameters; cells are in order."""
+        roles, file = self.form.headings.roles, str(self.source)
+        sign = DECIMALS[self.form.decimal]
+        axes = [axis.place for axis in group.axes]
+        factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
+        further = [roles.get(name) for name in self.words.further]
+        for name, known in self.words.further.items():
+            if name in roles and (unit := roles[name].unit) is not None:
+                factors[roles[name].place] = known[unit], power_of_ten(known[unit])
+        places = {role: roles[role].place for role in TEXTS if role in roles}
+        found: list[tuple[FileRow, float]] = []
+        messages: list[Message] = []
+
+        def number(cells: Sequence[str], i: int, mark: Mark) -> float:
+            factor, power = factors.get(i, (None, ""))
+            cell = cells[i].replace(sign, ".")
+            value = plain_number(cell, power)
+            if value is not None:
+                return value
+            if cell.casefold() in NOTHING:
+                return math.nan
+            try:
+                if factor is None:
+                    return clock_time(cells[i]).seconds
+                return metres_or_radians(cell, factor)
+            except (QuantityError, ClockError) as error:
+                messages.append(mark.message("", str(error)))
+                return math.nan
+
+        u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
+        of_all = math.nan
+        if u is not None and (constant := roles["u"].constant) is not None:
+            u, of_all = None, parse_positive_length(constant)
+        for line, cells in self.form.rows:
+            if len(messages) >= MOST_MESSAGES:
+                break
+            if all(cells[i].casefold() in NOTHING for i in axes):
+                continue
+            mark = Mark(file, line, 1)
+            names = []
+            for role in TEXTS:
+                own = group.texts.get(role) or texts.get(role) or ""
+                if role in places and places[role] >= 0:
+                    own = text_of_cell(cells[places[role]])
+                    if not own:
+                        messages.append(mark.message("", f"no {role}; write its name"))
+                names.append(own)
+            x = [number(cells, i, mark) for i in axes]
+            x.append(of_all if u is None else number(cells, u, mark))
+            if "k" in roles and not math.isnan(x[-1]):
+                x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
+            x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
+            size = math.nan if diameter is None else number(cells, diameter, mark)
+            found.append((FileRow(mark, tuple(names), tuple(x)), size))
+        if messages:
+            raise ExperimentError(messages)
+        return found
+
+    def _times(self) -> tuple[ReadTime, ...]:
+        """Clock times of rows, which have been read."""
+        clocks = [
+            column.place
+            for name, column in self.form.headings.roles.items()
+            if name in self.words.further and column.unit is None
+        ]
+        file = str(self.source)
+        return tuple(
+            (Mark(file, line, 1), cells[i], clock_time(cells[i]))
+            for line, cells in self.form.rows
+            for i in clocks
+            if cells[i].casefold() not in NOTHING
+        )
+
+    def _refuse_doubtful(
+        self, rows: Sequence[FileRow], is_possible: Callable[[Array], bool]
+    ) -> None:
+        """Refuse decimals that could be thousands, unless the readings were outside the machine.
+
+        :raises ExperimentError: they could.
+        """
+        # Where commas separate columns, a point is no sign of thousands.
+        if self.settings.decimal is not None or self.form.separator == "comma":
+            return
+        cell = doubtful_decimals(self.form)
+        x = np.array([row.lengths[: len(self.words.axes)] for row in rows])
+        if cell and is_possible(1e3 * x):
+            other = cell.replace(".", "").replace(",", "")
+            raise self.error(
+                f'"{cell}" could be {cell.replace(",", ".")} or {other}, as could all numbers here;'
+                f" write under readings: {{decimal: {self.form.decimal}}} if it is"
+                f" {cell.replace(',', '.')}, otherwise export without signs between thousands"
+            )
+
+    def _told(self, units: Mapping[int, str], others: Sequence[str]) -> str:
+        """How the table was read, in a sentence."""
+        form, headings = self.form, self.form.headings
+        parts = [SEPARATORS[form.separator][1], f"decimal {form.decimal}s"]
+        parts += [self.encoding] if self.encoding else []
+        parts.append(f"header in line {form.header}" if form.header else "without header")
+        parts.append(" and ".join(dict.fromkeys(units.values())))
+        named = {role: c for role, c in headings.roles.items() if c.place >= 0 and headings.cells}
+        parts += [
+            f'{role} from "{shorten(headings.cells[column.place])}"'
+            for role, column in named.items()
+            if headings.cells[column.place].strip().casefold() != role or role == "k"
+        ]
+        if "k" in headings.roles:
+            parts.append("u is the expanded uncertainty divided by its coverage factor k")
+        if "u" in headings.roles and (u := headings.roles["u"].constant) is not None:
+            parts.append(f"u is {u} in all rows")
+        if len(headings.groups) > 1:
+            of = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
+            parts.append(f"co-ordinates of {of} side by side")
+        parts += others
+        if headings.unused:
+            names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
+            warm = any("temperature" in cell.casefold() for cell in headings.unused)
+            parts.append(f"not used: {names}{f' ({TEMPERATURES})' if warm else ''}")
+        if form.empty:
+            parts.append(f"without co-ordinates, left out: line{_numbers(form.empty)}")
+        return f"{self.source}: read as: {', '.join(parts)}"
+
+
+def _coverage_factor(
+    column: HeadedColumn, cells: Sequence[str], sign: str, mark: Mark, messages: list[Message]
+) -> float:
+    """The coverage factor of a row; NaN after saying what is wrong."""
+    cell = cells[column.place] if column.constant is None else column.constant
+    try:
+        factor = float(cell.replace(sign, "."))
+    except ValueError:
+        factor = math.nan
+    if 0.0 < factor < math.inf:
+        return factor
+    text = f'the coverage factor is "{shorten(cell)}"; it must be above 0'
+    messages.append(mark.message("", text))
+    return math.nan
+
+
+def _numbers(lines: Sequence[int]) -> str:
+    return f"{'s' if len(lines) > 1 else ''} {listing(map(str, lines))}"

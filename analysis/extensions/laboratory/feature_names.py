@@ -1,0 +1,236 @@
+"""Positions, balls and probes out of the names that a measuring program gives to features.
+
+A rule is a name with places in braces, such as {position}_{ball}_{probe}. Where the experiment is
+known, capitals and whatever is no letter or digit do not count.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.name_rules import PLACE
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.settings import listing, shorten
+
+# Tried in this order where the experiment is known and no rule is given.
+RULES = (
+    "{position}_{ball}_{probe}",
+    "{position}_{ball}",
+    "{position}_{probe}_{ball}",
+    "{ball}_{position}_{probe}",
+    "{ball}_{position}",
+    "{probe}_{position}_{ball}",
+    "{ball}_{probe}",
+    "{probe}_{ball}",
+    "{ball}",
+)
+# How names of spheres begin in many programs.
+PREFIXES = ("", "SPHERE_", "SPH_", "KUGEL_", "BALL_")
+SEPARATORS = ("_", ".", "-", ":", "/", " ")
+LONGEST_NAME = 200
+
+Parts = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Named:
+    """The parts of each feature's name by a rule, none where it is not of the rule; `numbered` are
+    those of which names have the number. Those that are `strange` are not the experiment's, and
+    matched by number and place as those of tables are.
+    """
+
+    rule: str
+    parts: tuple[Parts | None, ...]
+    numbered: tuple[str, ...] = ()
+    strange: bool = False
+
+
+def fold(name: str) -> str:
+    """A name in small letters and digits alone, numbers without zeros before them and apart from
+    each other.
+
+    >>> fold("z low: r1-C01"), fold("Z 1.02")
+    ('zlowr1c1', 'z1_2')
+    """
+    apart = re.sub(r"(?<=[0-9])[\W_]+(?=[0-9])", "|", re.sub(r"(?<![0-9])0+(?=[0-9])", "", name))
+    return re.sub(r"[^\w|]|_", "", apart).replace("|", "_").casefold()
+
+
+def named(names: Sequence[str], rule: str | None, design: Design | None, file: str) -> Named:
+    """The parts of names by a rule, or by the one that they follow.
+
+    :raises ExperimentError: they follow several rules, or none.
+    """
+    if design is not None:
+        return _known(names, rule, design, file)
+    rule = rule or _likely(names, file)
+    return Named(rule, tuple(_split(name, rule, file) for name in names))
+
+
+def without_point(rule: str) -> tuple[str, re.Pattern[str] | None]:
+    """A rule without its point, and what parts a name from the number of the point; None where it
+    has none.
+    """
+    if not rule.endswith("{point}"):
+        return rule, None
+    rest = rule.removesuffix("{point}")
+    end = rest.rfind("}") + 1
+    return rest[:end], re.compile(rf"(.+){re.escape(rest[end:])}([0-9]+)", re.DOTALL)
+
+
+def _split(name: str, rule: str, file: str) -> Parts | None:
+    """The parts of a name, of which nothing is known; None where it is not of the rule."""
+    pieces = PLACE.split(rule)
+    found = []
+    for quantifier in ("+?", "+"):
+        pattern = "".join(
+            f"(?P<{piece}>.{quantifier})" if i % 2 else re.escape(piece)
+            for i, piece in enumerate(pieces)
+        )
+        match = re.fullmatch(pattern, name[:LONGEST_NAME])
+        if match is None or len(name) > LONGEST_NAME:
+            return None
+        found.append(match.groupdict())
+    if found[0] != found[1]:
+        text = (
+            f'the name "{shorten(name)}" can be parted as {rule} in several ways; name the'
+            " experiment with --for, or another rule with --name"
+        )
+        raise refused(file, text)
+    return found[0]
+
+
+def _likely(names: Sequence[str], file: str) -> str:
+    """The rule that names follow, by the number of their parts."""
+    for separator in SEPARATORS:
+        counts = {name.count(separator) + 1 for name in names}
+        if len(counts) == 1 and (count := counts.pop()) in (2, 3):
+            return separator.join(["{position}", "{ball}", "{probe}"][:count])
+    if not any(separator in name for name in names for separator in SEPARATORS):
+        return "{ball}"
+    text = (
+        f"no rule parts the names {listing((shorten(name, 30) for name in names), 3)} into"
+        " position, ball and probe; name the experiment with --for, or the rule with --name"
+    )
+    raise refused(file, text)
+
+
+def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Parts | None]:
+    """Names by a rule of all balls in all positions with all probes, folded; None where several
+    have the same. Of what is `numbered` the names have the number in its place, from 1.
+    """
+    places = [name for name in PLACE.findall(rule) if name != "point"]
+    positions = enumerate(design.positions.names) if "position" in places else ((-1, ""),)
+    probes = design.probes.names if "probe" in places else ("",)
+    found: dict[str, Parts | None] = {}
+    for (k, position), probe in product(positions, probes):
+        artefacts = [int(design.positions.artefact[k])] if k >= 0 else design.artefacts.plates
+        for artefact in artefacts:
+            for number, b in enumerate(design.balls.of(artefact), start=1):
+                every = {"position": position, "ball": design.balls.names[b], "probe": probe}
+                numbers = {"position": str(k + 1), "ball": str(number)}
+                written = {**every, **{name: numbers[name] for name in numbered}}
+                parts = {name: every[name] for name in places}
+                key = fold(rule.format(**written))
+                found[key] = None if found.get(key, parts) != parts else parts
+    return found
+
+
+def _known(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named:
+    """The parts of names of an experiment's, by the rule that most of them follow; where none has
+    the names of balls, or of positions, by their numbers.
+    """
+    folded = [fold(name) for name in names]
+    for numbered in ((), ("ball",), ("position", "ball")):
+        prefixes = ("",) if numbered else PREFIXES
+        rules = [rule] if rule else [prefix + one for one in RULES for prefix in prefixes]
+        found = _fitting(folded, [one for one in rules if _has(one, numbered)], design, numbered)
+        if len(found) > 1:
+            told = " and ".join(one.rule for one in found[:2])
+            text = f"the names can be read as {told}; state the one that is right with --name"
+            raise refused(file, text)
+        if found:
+            return found[0]
+    if strange := _strange(names, rule, design, file):
+        return strange
+    some = listing((shorten(name, 30) for name in names), 3)
+    text = (
+        f"no names of the experiment in {some}; its positions are"
+        f" {listing(design.positions.names, 3)}, its balls"
+        f" {listing(dict.fromkeys(design.balls.names), 3)}; state the rule with --name, such as"
+        " {position}_{ball}"
+    )
+    raise refused(file, text)
+
+
+def _strange(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named | None:
+    """The parts of names that are not an experiment's, by the rule that is stated, or by one that
+    all follow if these have numbers of balls; None where there are none, or where the plane of a
+    position has to be known to read it.
+    """
+    if design.positions.across is not None:
+        return None
+    try:
+        found = named(names, rule, None, file)
+    except ExperimentError:
+        return None
+    parts = [part for part in found.parts if part is not None and "ball" in part]
+    is_clear = rule is not None or all(re.search("[0-9]", part["ball"]) for part in parts)
+    whole = {tuple(part.values()) for part in parts}
+    if not is_clear or "{position}" not in found.rule or len(parts) < 2 or len(whole) < 2:
+        return None
+    return Named(found.rule, found.parts, strange=True)
+
+
+def _has(rule: str, places: Sequence[str]) -> bool:
+    return all(f"{{{place}}}" in rule for place in places)
+
+
+def _fitting(
+    folded: Sequence[str], rules: Sequence[str], design: Design, numbered: Sequence[str]
+) -> list[Named]:
+    """The rules by which the most names are those of an experiment, one for each way to read
+    them.
+    """
+    found: list[Named] = []
+    best = 1
+    for rule in rules:
+        beginning = fold(PLACE.split(rule)[0])
+        if not any(name.startswith(beginning) for name in folded):
+            continue
+        lookup = _lookup(rule, design, numbered)
+        parts = tuple(lookup.get(name) for name in folded)
+        count = sum(part is not None for part in parts)
+        if count > best:
+            found, best = [], count
+        if count == best and all(other.parts != parts for other in found):
+            found.append(Named(rule, parts, tuple(numbered)))
+    return found
+
+
+def position_of_file(stem: str, design: Design | None, file: str) -> str:
+    """The position that a file's name tells: all of it, or the one of the experiment in it.
+
+    :raises ExperimentError: it tells none, or several.
+    """
+    if design is None:
+        return stem
+    words = [fold(word) for word in re.split(r"[\W_]+", stem) if word]
+    joined = {"".join(words[i:j]) for i in range(len(words)) for j in range(i + 1, len(words) + 1)}
+    names = [name for name in design.positions.names if fold(name) in joined]
+    longest = max((len(fold(name)) for name in names), default=0)
+    names = [name for name in names if len(fold(name)) == longest]
+    if len(names) != 1 and len(design.positions.names) == 1:
+        names = list(design.positions.names)
+    if len(names) != 1:
+        told = "none" if not names else " and ".join(names)
+        text = (
+            f"neither names of features nor the file's name tell the position ({told}); put it into"
+            " the file's name, or state the rule with --name"
+        )
+        raise refused(file, text)
+    return names[0]

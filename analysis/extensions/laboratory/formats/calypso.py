@@ -1,0 +1,308 @@
+"""Tables of Calypso: characteristics (`…chr.txt`), a row for each co-ordinate of a feature, and
+features (`…fet.txt`), a row for each, with English or German headings.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from ballplate.simulator.inputs.quantities import LENGTH_UNITS
+from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs.yamltree import Mark
+
+from .columns import headings, is_number, with_point
+from .report import (
+    AXES,
+    UNSTATED,
+    Feature,
+    Format,
+    Report,
+    ReportProblems,
+    System,
+    centre_of,
+)
+from .text import Text, read_lines
+
+UNITS = {
+    "mm": LENGTH_UNITS["mm"],
+    "cm": LENGTH_UNITS["cm"],
+    "m": LENGTH_UNITS["m"],
+    "µm": LENGTH_UNITS["um"],
+    "um": LENGTH_UNITS["um"],
+    "inch": LENGTH_UNITS["in"],
+    "in": LENGTH_UNITS["in"],
+    "zoll": LENGTH_UNITS["in"],
+}
+# Headings in letters alone → what the column has.
+OF_CHARACTERISTICS = {
+    **dict.fromkeys(("id", "name", "characteristic", "merkmal", "bezeichnung", "feature"), "id"),
+    **dict.fromkeys(("featureid", "element", "elementid"), "feature"),
+    **dict.fromkeys(("actual", "act", "istwert", "ist", "measuredvalue", "messwert"), "actual"),
+    **dict.fromkeys(("nominal", "nom", "sollwert", "soll", "nennmass", "nennma"), "nominal"),
+    **dict.fromkeys(("deviation", "dev", "abweichung", "abw", "istsoll"), "deviation"),
+    **dict.fromkeys(("unit", "einheit"), "unit"),
+    **dict.fromkeys(("type", "typ"), "type"),
+    **dict.fromkeys(("idsymbol", "idsymb", "symbol"), "symbol"),
+}
+OF_FEATURES = {
+    **dict.fromkeys(("id", "name", "featureid", "element", "elementid", "bezeichnung"), "id"),
+    **dict.fromkeys(("type", "typ", "idtype", "geotype", "geometry", "elementtyp"), "type"),
+    **dict.fromkeys(("idsymbol", "idsymb", "symbol"), "symbol"),
+    **dict.fromkeys(("x", "xactual", "xist", "xistwert"), "X"),
+    **dict.fromkeys(("y", "yactual", "yist", "yistwert"), "Y"),
+    **dict.fromkeys(("z", "zactual", "zist", "zistwert"), "Z"),
+    **dict.fromkeys(("unit", "einheit"), "unit"),
+    **dict.fromkeys(("stylus", "taster"), "stylus"),
+    **dict.fromkeys(("alignment", "koordinatensystem"), "alignment"),
+}
+# Alignments that are the machine's own system.
+OF_MACHINE = ("gerät", "geraet", "machine", "cmm", "gerätekoordinatensystem", "device")
+KINDS = {
+    **dict.fromkeys(("sphere", "kugel"), "sphere"),
+    **dict.fromkeys(("circle", "kreis"), "circle"),
+    **dict.fromkeys(("plane", "ebene"), "plane"),
+    **dict.fromkeys(("point", "punkt", "spacepoint", "raumpunkt"), "point"),
+    **dict.fromkeys(("cylinder", "zylinder"), "cylinder"),
+    **dict.fromkeys(("cone", "kegel"), "cone"),
+    **dict.fromkeys(("line", "gerade", "line2d", "line3d"), "line"),
+}
+# A unit that is given once, above the table or in a heading.
+STATED = re.compile(
+    r"(?:unit|einheit|masseinheit|maßeinheit)s?\s{0,9}[:=]?\s{0,9}\W?(mm|cm|m|µm|inch|in|zoll)\b|"
+    r"[\[(](mm|cm|µm|um|inch|in|zoll)[\])]",
+    re.IGNORECASE,
+)
+AXIS = re.compile(r"([XYZ])(?:[-_ ]?(?:value|wert|coordinate|koordinate|position))?[0-9]*", re.I)
+BEFORE = re.compile(r"([XYZ])[-_ ]?(?:value|wert)?[-_.: ]+(\S.*)", re.IGNORECASE)
+BEHIND = re.compile(r"(\S.*?)[-_.: ]+([XYZ])(?:[-_ ]?(?:value|wert))?", re.IGNORECASE)
+# A row has to agree in itself to this many units of the last digit.
+AGREEMENT = Fraction(2)
+# Lines at the beginning among which the headings are.
+MOST_BEFORE = 200
+LONGEST = 300
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Where the columns are, what parts them, and the lines below."""
+
+    text: Text
+    separator: str
+    columns: dict[str, int]
+    start: int
+    is_of_features: bool
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    parts = re.split(separator, line.strip("\r\n") if "\t" in separator else line.strip())
+    return [part.strip().strip('"').strip() for part in parts]
+
+
+def _table(text: Text) -> _Table | None:
+    """The table of a report: the first line whose cells are headings of either kind."""
+    for number, line in enumerate(text.lines[:MOST_BEFORE], start=1):
+        for separator in ("\t", ";", r"\s{2,}", r"\s+"):
+            cells = _cells(line, separator)
+            for known, needed in (
+                (OF_CHARACTERISTICS, {"id", "actual"}),
+                (OF_FEATURES, {"id", "X", "Y", "Z"}),
+            ):
+                columns = headings([STATED.sub("", cell) for cell in cells], known)
+                if needed <= columns.keys():
+                    return _Table(text, separator, columns, number, "X" in needed)
+    return None
+
+
+def recognises(beginning: str) -> bool:
+    """Whether a text has headings of Calypso within its first lines: those of a table with a
+    characteristic to a row, or one with a feature to a row and its kind.
+    """
+    table = _table(Text("", tuple(beginning.splitlines()), (), False))
+    if table is None:
+        return False
+    if table.is_of_features:
+        return "\t" in table.separator and {"type", "symbol"} & table.columns.keys() != set()
+    return bool({"nominal", "deviation"} & table.columns.keys())
+
+
+@dataclass
+class _Located:
+    """Co-ordinates of a feature as far as rows have told them."""
+
+    mark: Mark
+    name: str
+    kind: str = UNSTATED
+    probe: str = ""
+    alignment: str = ""
+    axes: dict[str, float] = field(default_factory=dict)
+
+    def feature(self) -> Feature:
+        """The feature, lacking its centre if an axis was not told."""
+        centre, missing = centre_of(self.axes)
+        lacks = f"no value of {' or '.join(missing)}" if missing else ""
+        system: System = "part" if self.alignment else "unstated"
+        system = "machine" if self.alignment.casefold() in OF_MACHINE else system
+        return Feature(
+            *(self.mark, self.name, self.kind, centre, None, self.probe, system),
+            of=self.alignment,
+            lacks=lacks,
+        )
+
+
+@dataclass
+class _Reader:
+    table: _Table
+    problems: ReportProblems
+    unit: Fraction | None
+    located: dict[str, _Located] = field(default_factory=dict)
+    complete: list[_Located] = field(default_factory=list)
+    others: Counter[str] = field(default_factory=Counter)
+    ends_in_text: bool = False
+
+    def rows(self) -> Iterator[tuple[Mark, dict[str, str]]]:
+        """Cells of each row by their columns; rows that end before the last needed one are told."""
+        table, text = self.table, self.table.text
+        names = ("id", *AXES) if table.is_of_features else ("id", "actual")
+        needed = max(table.columns[name] for name in names)
+        width = len(_cells(text.lines[table.start - 1], table.separator))
+        for number, line in enumerate(text.lines[table.start :], start=table.start + 1):
+            cells = _cells(line, table.separator)
+            if not line.strip() or set(line.strip()) <= set("-=_*"):
+                continue
+            if len(cells) == 1 or (not table.is_of_features and not _has_number(cells)):
+                self.others["line (text)"] += 1
+                self.ends_in_text = text.is_cut and number == len(text.lines)
+                continue
+            mark = text.mark(number)
+            is_cut = text.is_cut and number == len(text.lines)
+            if len(cells) <= needed or (is_cut and len(cells) - 1 in table.columns.values()):
+                told = f"{len(cells)} cells below {width} headings; was the line cut off?"
+                self.problems.add(mark, told)
+                continue
+            found = {name: cells[i] for name, i in table.columns.items() if i < len(cells)}
+            if len(found["id"]) > LONGEST:
+                self.problems.add(mark, f"a name of {len(found['id'])} characters")
+                continue
+            yield mark, found
+
+    def take(self, mark: Mark, row: dict[str, str]) -> None:
+        """Read one row."""
+        if self.table.is_of_features:
+            self._feature(mark, row)
+            return
+        axis, name = _axis_and_name(row)
+        if not axis:
+            self.others["other characteristic"] += 1
+            return
+        if not is_number(row["actual"]):
+            told = f'"{shorten(row["actual"])}" is no number'
+            self.problems.add(mark, f"{told}; leave the row out, or measure again")
+            return
+        if not _agrees(row):
+            told = f"{axis}: the deviation is not actual minus nominal; is the line damaged?"
+            self.problems.add(mark, told)
+            return
+        self._locate(axis, name, self._length(mark, row, row["actual"]), mark)
+
+    def _feature(self, mark: Mark, row: dict[str, str]) -> None:
+        words = [row.get("type", ""), row.get("symbol", "")]
+        kinds = [
+            KINDS[word]
+            for word in (re.sub("[^a-z]", "", w.lower()) for w in words)
+            if word in KINDS
+        ]
+        kind = kinds[0] if kinds else UNSTATED
+        one = _Located(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", ""))
+        for axis in AXES:
+            if is_number(row[axis]):
+                one.axes[axis] = self._length(mark, row, row[axis])
+        self.complete.append(one)
+
+    def _length(self, mark: Mark, row: dict[str, str], text: str) -> float:
+        name = row.get("unit", "").lower()
+        unit = UNITS.get(name, None if name else self.unit)
+        if unit is None:
+            told = "no column of units; state the unit with --unit mm or --unit in"
+            told = f'unknown unit "{shorten(name)}"' if name else told
+            self.problems.add(mark, told)
+            self.unit = LENGTH_UNITS["mm"]
+            return math.nan
+        return self.problems.length(with_point(text), unit, mark)
+
+    def _locate(self, axis: str, name: str, value: float, mark: Mark) -> None:
+        """Add a co-ordinate to its feature; one that it has already begins another reading."""
+        one = self.located.get(name)
+        if one is None or axis in one.axes:
+            one = _Located(mark, name)
+            self.located[name] = one
+            self.complete.append(one)
+        one.axes[axis] = value
+
+
+def _has_number(cells: list[str]) -> bool:
+    return any(is_number(cell) for cell in cells[1:])
+
+
+def _axis_and_name(row: dict[str, str]) -> tuple[str, str]:
+    """Which co-ordinate a characteristic is, and of which feature; an empty axis where it is none.
+
+    Its type or symbol tells the axis, and a column the feature; else both are in its name.
+    """
+    told = (AXIS.fullmatch(row.get(column, "")) for column in ("type", "symbol"))
+    axis = next((found[1].upper() for found in told if found is not None), "")
+    feature = row.get("feature", "")
+    if axis and feature:
+        return axis, feature
+    before, behind = BEFORE.fullmatch(row["id"]), BEHIND.fullmatch(row["id"])
+    if before is not None and axis in ("", before[1].upper()):
+        return before[1].upper(), feature or before[2]
+    if behind is not None and axis in ("", behind[2].upper()):
+        return behind[2].upper(), feature or behind[1]
+    return axis, feature or row["id"]
+
+
+def _agrees(row: dict[str, str]) -> bool:
+    """Whether a row's deviation is the actual value less the nominal, as far as it has them."""
+    texts = [with_point(row.get(name, "")) for name in ("actual", "nominal", "deviation")]
+    if not all(is_number(text) for text in texts):
+        return True
+    actual, nominal, deviation = (Fraction(text) for text in texts)
+    digits = min(len(text.partition(".")[2]) for text in texts)
+    # Some versions leave the deviation of what is within its tolerance at zero.
+    return deviation == 0 or abs(actual - nominal - deviation) <= AGREEMENT / 10**digits
+
+
+def read(content: bytes, file: str, unit: Fraction | None) -> Report:
+    """Features of a table of Calypso; see `Format`.
+
+    :raises ExperimentError: no headings, a row that is cut off or wrong, or no unit.
+    """
+    text, problems = read_lines(content, file), ReportProblems(file)
+    table = _table(text)
+    if table is None:
+        told = "no headings such as id, actual, nominal, or id, type, x, y, z"
+        raise text.mark(1).refused(told)
+    for line in text.lines[: table.start] if unit is None else ():
+        stated = STATED.search(line)
+        unit = UNITS[(stated[1] or stated[2]).lower()] if stated else unit
+    reader = _Reader(table, problems, unit)
+    for mark, row in reader.rows():
+        reader.take(mark, row)
+    problems.finish()
+    features = tuple(one.feature() for one in reader.complete)
+    remarks = text.remarks
+    if reader.ends_in_text:
+        last = shorten(text.lines[-1].strip(), 30)
+        remarks += (
+            f'{file}: the last line, "{last}", is no row, and has no end; the file may have been'
+            " cut off",
+        )
+    return Report(file, CALYPSO.title, features, reader.others, remarks)
+
+
+CALYPSO = Format("calypso", "Calypso table", recognises, read)

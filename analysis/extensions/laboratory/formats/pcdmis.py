@@ -1,0 +1,282 @@
+"""Text reports of PC-DMIS: dimensions `DIM name= LOCATION OF SPHERE feature`, each with a table of
+axes.
+
+Newer reports head a dimension by its unit, its name and its feature: `MM  LOC1 - SPH1`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import takewhile
+
+from ballplate.simulator.inputs.quantities import LENGTH_UNITS
+from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs.yamltree import Mark
+
+from .columns import is_number, with_point
+from .report import (
+    AXES,
+    CIRCLE,
+    SPHERE,
+    UNSTATED,
+    Feature,
+    Format,
+    Report,
+    ReportProblems,
+    centre_of,
+)
+from .text import Text, read_lines
+
+UNITS = {"MM": LENGTH_UNITS["mm"], "IN": LENGTH_UNITS["in"], "INCH": LENGTH_UNITS["in"]}
+DIMENSION = re.compile(r"\s*DIM(?:ENSION)?\s+([^=]*[^=\s])\s*=\s*(.*)", re.IGNORECASE)
+UNIT = re.compile(r"\bUNITS\s*=\s*(\w+)", re.IGNORECASE)
+# What a dimension is, and of which kind of feature.
+WHAT = re.compile(r"[A-Z0-9 ]*?\b(?:OF|FROM|BETWEEN)\s+\S+", re.IGNORECASE)
+LOCATION = re.compile(r"LOCATION OF\s+(\S+)\s+(\S+)", re.IGNORECASE)
+HEADED = re.compile(r"\s*(?:\S{1,3}\s+)?(MM|IN|INCH)\s+(\S.*?)\s+-\s+(\S.*?)\s*", re.IGNORECASE)
+MEASURED = ("MEAS", "MEASURED")
+NOMINALS = {"NOMINAL", "NOM"}
+ENDING = re.compile(r"\s*END OF DIMENSION\s+\S.*", re.IGNORECASE)
+PROBE = re.compile(r"\s*(TIP|LOADPROBE)\s*/\s*([^,\s]+).*", re.IGNORECASE)
+BEGINNING = re.compile(
+    r"^[ \t]*(?:DIM(?:ENSION)?[ \t][^=\n]*=|AX[ \t]+(?:NOM|MEAS|\+TOL))|\bPC-?DMIS\b",
+    re.MULTILINE | re.IGNORECASE,
+)
+LONGEST = 1000
+# Columns about which a row has to agree: nominal + deviation = measured, to this many units of the
+# last digit.
+AGREEMENT = Fraction(2)
+
+
+@dataclass
+class _Dimension:
+    """The location of a feature that is being read, its unit, its columns (what each is called and
+    where it ends), and whether it has had a row.
+    """
+
+    mark: Mark
+    name: str
+    title: str
+    kind: str
+    unit: Fraction | None
+    columns: list[tuple[str, int]] = field(default_factory=list)
+    has_row: bool = False
+
+
+@dataclass
+class _Located:
+    """Co-ordinates of a feature as far as dimensions have told them."""
+
+    mark: Mark
+    name: str
+    title: str
+    kind: str
+    probe: str
+    axes: dict[str, float] = field(default_factory=dict)
+
+    def feature(self) -> Feature:
+        """The feature, lacking its centre if an axis was not told."""
+        centre, missing = centre_of(self.axes)
+        lacks = f"no row {' or '.join(missing)}" if missing else ""
+        return Feature(
+            *(self.mark, self.name, self.kind, centre),
+            probe=self.probe,
+            lacks=lacks,
+            dimension=self.title,
+        )
+
+
+@dataclass
+class _Reader:
+    text: Text
+    problems: ReportProblems
+    unit: Fraction | None
+    probe: str = ""
+    dimension: _Dimension | None = None
+    located: dict[str, _Located] = field(default_factory=dict)
+    complete: list[_Located] = field(default_factory=list)
+    others: Counter[str] = field(default_factory=Counter)
+
+    def take(self, number: int, line: str) -> None:
+        """Read one line."""
+        mark = self.text.mark(number)
+        if len(line) > LONGEST:
+            self.problems.add(mark, f"{len(line)} characters are too long for a line of a report")
+            return
+        found = DIMENSION.fullmatch(line)
+        if found is not None:
+            unit = UNIT.search(found[2])
+            self._end()
+            self._start(found[1], found[2], unit[1] if unit else None, mark)
+            return
+        headed = HEADED.fullmatch(line)
+        if headed is not None:
+            self._end()
+            own = UNITS[headed[1].upper()]
+            self.dimension = _Dimension(mark, headed[3], headed[2], UNSTATED, own)
+            return
+        probe = PROBE.fullmatch(line)
+        if probe is not None:
+            self.probe = probe[2] if probe[1].upper() == "TIP" else self.probe
+            return
+        words = line.split()
+        if not words:
+            return
+        first = words[0].upper()
+        if first in ("DIM", "DIMENSION"):
+            self._end()
+            self.others["dimension (without its name and =)"] += 1
+        elif ENDING.fullmatch(line):
+            self._end()
+        elif self.dimension is None:
+            return
+        elif first == "AX":
+            headings = list(re.finditer(r"\S+", line))[1:]
+            self.dimension.columns = [(word[0].upper(), word.end()) for word in headings]
+        elif first in AXES and len(first) == 1:
+            self.dimension.has_row = True
+            self._row(first, line, mark, number == len(self.text.lines))
+
+    def _end(self) -> None:
+        """End the dimension that is being read; a location that had no row is left, and told."""
+        ended, self.dimension = self.dimension, None
+        if ended is None or ended.has_row:
+            return
+        if ended.kind != UNSTATED:
+            one = _Located(ended.mark, ended.name, ended.title, ended.kind, self.probe)
+            self.complete.append(one)
+        elif ended.columns:
+            self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
+
+    def finish(self) -> tuple[str, ...]:
+        """End the file; a remark where its last line has no end and is of no known form.
+
+        :raises ExperimentError: something was wrong, or the file ends before the first row of a
+            dimension or within its name.
+        """
+        last = self.text.lines[-1]
+        if self.dimension is not None and not self.dimension.has_row:
+            told = (
+                f'the file ends before the first row of "{shorten(self.dimension.title, 30)}"; it'
+                " was cut off, take a whole copy"
+            )
+            self.problems.add(self.dimension.mark, told)
+        elif self.text.is_cut and last.split()[0].upper() in ("DIM", "DIMENSION"):
+            told = "the file ends within this line; it was cut off, take a whole copy"
+            self.problems.add(self.text.mark(len(self.text.lines)), told)
+        self.problems.finish()
+        return self.text.remarks + self._about_the_end(last)
+
+    def _about_the_end(self, last: str) -> tuple[str, ...]:
+        words = last.split()
+        is_row = self.dimension is not None and words[:1] and words[0].upper() in tuple(AXES)
+        if not self.text.is_cut or is_row or ENDING.fullmatch(last) or PROBE.fullmatch(last):
+            return ()
+        return (
+            f'{self.text.file}: the last line, "{shorten(last.strip(), 30)}", has no end; the file'
+            " may have been cut off",
+        )
+
+    def _start(self, title: str, words: str, unit: str | None, mark: Mark) -> None:
+        located = LOCATION.match(words)
+        if located is None or located[1].lower() not in (SPHERE, CIRCLE):
+            self.dimension = None
+            kind = WHAT.match(words)
+            self.others[f"dimension ({shorten(kind[0].lower() if kind else words, 30)})"] += 1
+            return
+        if unit is not None and unit.upper() not in UNITS:
+            self.problems.add(mark, f'unknown unit "{shorten(unit)}"; PC-DMIS has MM and IN')
+        own = UNITS.get(unit.upper(), self.unit) if unit is not None else self.unit
+        self.dimension = _Dimension(mark, located[2].rstrip(","), title, located[1].lower(), own)
+
+    def _row(self, axis: str, line: str, mark: Mark, is_last: bool) -> None:
+        assert self.dimension is not None
+        names = [name for name, _ in self.dimension.columns]
+        measured = next((name for name in MEASURED if name in names), None)
+        if measured is None:
+            told = "no column MEAS; report measured values, and head the columns AX NOMINAL MEAS …"
+            self.problems.add(mark, told)
+            return
+        row = _by_column(line, self.dimension.columns)
+        if row is None or measured not in row:
+            told = f"its numbers are not below the {len(names)} headings; was the line cut off?"
+            self.problems.add(mark, told)
+            return
+        if is_last and self.text.is_cut and line.rstrip().endswith(row[measured]):
+            told = "the file ends within this line; end it, or take a whole copy"
+            self.problems.add(mark, told)
+            return
+        if self.dimension.unit is None:
+            told = "no UNITS= of this dimension; state the unit with --unit mm or --unit in"
+            self.problems.add(mark, told)
+            self.dimension.unit = LENGTH_UNITS["mm"]
+        if not _agrees(row):
+            told = f"{axis}: the deviation is not measured minus nominal; is the line damaged?"
+            self.problems.add(mark, told)
+            return
+        value = self.problems.length(with_point(row[measured]), self.dimension.unit, mark)
+        self._locate(axis, value, mark)
+
+    def _locate(self, axis: str, value: float, mark: Mark) -> None:
+        """Add a co-ordinate to its feature; one that it has already begins another reading."""
+        assert self.dimension is not None
+        name, title = self.dimension.name, self.dimension.title
+        one = self.located.get(name)
+        if one is None or axis in one.axes:
+            one = _Located(mark, name, title, self.dimension.kind, self.probe)
+            self.located[name] = one
+            self.complete.append(one)
+        one.axes[axis] = value
+
+
+def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | None:
+    """The numbers of a row by their columns; None where it is not clear which is which.
+
+    Where some are blank, the others end where their headings do.
+    """
+    found = list(re.finditer(r"\S+", line))[1:]
+    # Behind the numbers may stand a bar of characters.
+    numbers = list(takewhile(lambda word: is_number(word[0]), found))
+    if len(numbers) == len(columns):
+        return {name: word[0] for (name, _), word in zip(columns, numbers, strict=True)}
+    ends = {end: name for name, end in columns}
+    row = {ends[word.end()]: word[0] for word in numbers if word.end() in ends}
+    # The deviation then checks it.
+    is_clear = len(row) == len(numbers) < len(columns) and "DEV" in row and row.keys() & NOMINALS
+    return row if is_clear else None
+
+
+def _agrees(row: dict[str, str]) -> bool:
+    """Whether a row's deviation is what it measured less the nominal, as far as it tells them.
+
+    Its sign may be turned round, by a setting, where the nominal is negative.
+    """
+    nominal = row.get("NOMINAL", row.get("NOM"))
+    measured = row.get("MEAS", row.get("MEASURED"))
+    deviation = row.get("DEV")
+    if nominal is None or measured is None or deviation is None:
+        return True
+    values = [Fraction(with_point(text)) for text in (measured, nominal, deviation)]
+    digits = min(len(with_point(text).partition(".")[2]) for text in (measured, nominal, deviation))
+    difference = abs(abs(values[0] - values[1]) - abs(values[2]))
+    return difference <= AGREEMENT / 10**digits
+
+
+def read(content: bytes, file: str, unit: Fraction | None) -> Report:
+    """Features of a text report of PC-DMIS; see `Format`.
+
+    :raises ExperimentError: a row of a location is wrong, or its unit is not stated.
+    """
+    text = read_lines(content, file)
+    reader = _Reader(text, ReportProblems(file), unit)
+    for number, line in enumerate(text.lines, start=1):
+        reader.take(number, line)
+    remarks = reader.finish()
+    features = tuple(one.feature() for one in reader.complete)
+    return Report(file, PCDMIS.title, features, reader.others, remarks)
+
+
+PCDMIS = Format("pcdmis", "PC-DMIS report", lambda text: BEGINNING.search(text) is not None, read)

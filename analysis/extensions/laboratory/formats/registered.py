@@ -1,0 +1,76 @@
+"""All formats that are read, and which of them a file has."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+from ballplate.simulator.inputs.decoding import text_and_encoding
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.yamltree import GivenText, read_bytes
+
+from .calypso import CALYPSO
+from .dmis import DMIS
+from .pcdmis import PCDMIS
+from .qif import QIF
+from .report import Format, Report
+
+# Asked in this order: the first that recognises a file reads it.
+FORMATS: tuple[Format, ...] = (QIF, DMIS, PCDMIS, CALYPSO)
+
+NUMBER = re.compile("[+-]?[0-9]+(?:[.,][0-9]*)?(?:[eE][+-]?[0-9]+)?")
+
+# Characters at the beginning of a file by which it is recognised.
+BEGINNING = 100_000
+
+
+def recognised(text: str) -> Format | None:
+    """The format that a text is in by its beginning; None where it is in none of them."""
+    beginning = "\n".join(text[:BEGINNING].splitlines())
+    return next((one for one in FORMATS if one.recognises(beginning)), None)
+
+
+def is_table(text: str) -> bool:
+    """Whether lines of a text are rows of the same columns, of a name at least and three numbers.
+
+    >>> is_table("p;b;x;y;z\\nlow;1;0,1;2,5;3"), is_table("one, two, three, four\\nfive")
+    (True, False)
+    """
+    lines = [line for line in text[:BEGINNING].splitlines() if line.strip()]
+    for separator in ("\t", ";", ","):
+        for before, row in pairwise(lines[:50]):
+            cells = row.split(separator)
+            numbers = sum(NUMBER.fullmatch(cell.strip(' "')) is not None for cell in cells)
+            if numbers >= 3 and 4 <= len(cells) == len(before.split(separator)):
+                return True
+    return False
+
+
+def read_report(
+    path: Path | GivenText, name: str | None = None, unit: Fraction | None = None
+) -> Report:
+    """The report in a file, of the format with a name or of the one that recognises it.
+
+    `unit` is metres per unit for a file that states none.
+
+    :raises ExperimentError: the file cannot be read, is of no known format, or is wrong.
+    """
+    content, file = read_bytes(path), str(path)
+    if name is not None:
+        chosen = {one.name: one for one in FORMATS}
+        if name not in chosen:
+            raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
+        return chosen[name].read(content, file, unit)
+    text = text_and_encoding(content, file)[0]
+    found = recognised(text)
+    if found is not None:
+        return found.read(content, file, unit)
+    if is_table(text):
+        raise refused(file, "this is a table, which needs no import; ballplate fit reads it")
+    titles = listing(one.title for one in FORMATS)
+    names = ", ".join(one.name for one in FORMATS)
+    text = f"not recognised as {titles}; state its format with --from ({names})"
+    raise refused(file, text)

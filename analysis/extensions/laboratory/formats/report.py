@@ -1,0 +1,119 @@
+"""What a report of a measuring program says, whatever its format: features with their centres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+from ballplate.simulator.inputs.messages import (
+    MORE_ERRORS,
+    MOST_MESSAGES,
+    ExperimentError,
+    Message,
+)
+from ballplate.simulator.inputs.quantities import QuantityError, metres_or_radians
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+
+Place = tuple[float, float, float]
+System = Literal["machine", "part", "unstated"]
+
+AXES = "XYZ"
+SPHERE, CIRCLE, POINT = "sphere", "circle", "point"
+# Features of which the centre may be a reading, or a point on a ball.
+LOCATED = (SPHERE, CIRCLE, POINT)
+# Of a feature whose report tells no kind, but three co-ordinates.
+UNSTATED = "feature"
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A measured feature: its centre, or points (n, 3) on its surface, in metres.
+
+    `lacks` says why there is neither. `probe` is the label of the sensor that was in use, empty
+    where the report has none, `system` what its co-ordinates are in, and `of` that system's name.
+    `dimension` is what the report calls the characteristic that tells them, if it has a name.
+    """
+
+    mark: Mark
+    name: str
+    kind: str
+    centre: Place | None = None
+    points: Array | None = None
+    probe: str = ""
+    system: System = "unstated"
+    of: str = ""
+    lacks: str = ""
+    dimension: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Features of a file in their order; `others` counts what is left and is no measured feature.
+
+    `remarks` are to be known by whoever uses the features.
+    """
+
+    file: str
+    title: str
+    features: tuple[Feature, ...]
+    others: Mapping[str, int] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format under the name that options have for it; `title` is its name in sentences.
+
+    `recognises` tells whether the beginning of a file is of it, and `read` makes a report of the
+    whole of it, with a factor of metres per unit for files that do not state their own.
+    """
+
+    name: str
+    title: str
+    recognises: Callable[[str], bool]
+    read: Callable[[bytes, str, Fraction | None], Report]
+
+
+def centre_of(axes: Mapping[str, float]) -> tuple[Place | None, list[str]]:
+    """The centre that co-ordinates by their axes make, None without all; and which are missing."""
+    missing = [axis for axis in AXES if axis not in axes]
+    return (None if missing else (axes["X"], axes["Y"], axes["Z"])), missing
+
+
+@dataclass
+class ReportProblems:
+    """Messages about a file, raised together."""
+
+    file: str
+    messages: list[Message] = field(default_factory=list)
+
+    def add(self, mark: Mark, text: str) -> None:
+        """Add a message about a place.
+
+        :raises ExperimentError: there are too many.
+        """
+        if len(self.messages) >= MOST_MESSAGES:
+            raise ExperimentError([*self.messages, mark.message("", MORE_ERRORS)])
+        self.messages.append(mark.message("", text))
+
+    def finish(self) -> None:
+        """:raises ExperimentError: there is a message."""
+        if self.messages:
+            raise ExperimentError(self.messages)
+
+    def length(self, text: str, factor: Fraction, mark: Mark) -> float:
+        """A number of a unit in metres, NaN after a message."""
+        try:
+            return metres_or_radians(text, factor)
+        except QuantityError as error:
+            self.add(mark, str(error))
+            return math.nan
+
+    def place(self, texts: list[str], factor: Fraction, mark: Mark) -> Place:
+        """Three co-ordinates in metres, NaN after a message."""
+        x, y, z = (self.length(text, factor, mark) for text in texts)
+        return x, y, z

@@ -1,0 +1,361 @@
+"""What the headings of a table of readings name: roles, co-ordinates of probes, and units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+
+from ballplate.simulator.experiment.readings_section import ColumnsSettings
+from ballplate.simulator.inputs.settings import hint, listing, shorten
+
+from .heading_words import (
+    LESS_CLEAR,
+    LONGEST,
+    MEASURED,
+    WORDS,
+    folded,
+    heading,
+    is_clock,
+    unit_of_further,
+)
+from .uncertainty_headings import FACTORS, headed_uncertainty
+
+AXES = ("x", "y", "z")
+# Roles of columns of text.
+TEXTS = ("position", "ball", "probe")
+
+
+class HeadingError(ValueError):
+    """A line that names columns, but not as it has to; the text says what is wrong."""
+
+
+@dataclass(frozen=True)
+class HeadedColumn:
+    """A column by its place, with the unit in its heading; or the `constant` that all rows have."""
+
+    place: int
+    unit: str | None = None
+    constant: str | None = None
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns of the co-ordinates of one reading: `axes` and what their headings say of them."""
+
+    axes: tuple[HeadedColumn, ...]
+    texts: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Headings:
+    """Columns of a table: by role, and of co-ordinates in `groups`, several in a wide table.
+
+    `cells` are the headings, none in a table without; `unused` those of columns that nothing is
+    taken from.
+    """
+
+    roles: Mapping[str, HeadedColumn]
+    groups: tuple[Group, ...]
+    cells: tuple[str, ...]
+
+    @cached_property
+    def used(self) -> frozenset[int]:
+        """Places of the columns that something is taken from."""
+        columns = [*self.roles.values(), *(axis for group in self.groups for axis in group.axes)]
+        return frozenset(column.place for column in columns if column.constant is None)
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        return tuple(cell for i, cell in enumerate(self.cells) if cell and i not in self.used)
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """What headings may name: probes and positions, by their names, columns `stated`, and `further`
+    ones of numbers, with the units that each may have. Cells of the axes `empty` may be so.
+    """
+
+    axes: tuple[str, ...]
+    probes: tuple[str, ...]
+    positions: tuple[str, ...]
+    stated: ColumnsSettings | None = None
+    further: Mapping[str, Mapping[str, Fraction]] = field(default_factory=dict)
+    empty: Collection[str] = ()
+
+    @cached_property
+    def beside_axes(self) -> dict[str, dict[str, str]]:
+        """What a heading may say besides an axis, folded, and which texts of a reading that is."""
+        found: dict[str, dict[str, str]] = {"": {}}
+        probes = {folded(name): {"probe": name} for name in self.probes}
+        positions = {folded(name): {"position": name} for name in self.positions}
+        found |= {word: texts for word, texts in (probes | positions).items() if word}
+        if len(probes) * len(positions) <= 10_000:
+            for one, texts in positions.items():
+                for other, more in probes.items():
+                    found |= {f"{one} {other}": texts | more, f"{other} {one}": texts | more}
+        return found
+
+
+def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
+    """The columns that a line names; None where it does not name co-ordinates.
+
+    :raises HeadingError: it does, but in more than one way, or lacks what is stated.
+    """
+    parsed = [heading(cell) for cell in cells]
+    stated = words.stated
+    groups = _stated_groups(cells, words) or _found_groups(cells, words)
+    if groups is None:
+        return None
+    taken = {axis.place for group in groups for axis in group.axes}
+    roles: dict[str, HeadedColumn] = {}
+    for role in (*TEXTS, "u", "diameter"):
+        name = getattr(stated, role, None)
+        if name is not None:
+            roles[role] = _stated_column(name, cells)
+            taken.add(roles[role].place)
+    for name, units in words.further.items():
+        found = {
+            i: unit
+            for i, cell in enumerate(cells)
+            if (unit := unit_of_further(cell, name)) is not None
+        }
+        if len(found) > 1:
+            raise HeadingError(_which(name, [cells[i] for i in found]))
+        for i, unit in found.items():
+            if is_clock(unit, units):
+                roles[name] = HeadedColumn(i)
+                taken.add(i)
+                continue
+            if unit not in units:
+                text = f'the unit in the column "{shorten(cells[i])}" is not known'
+                raise HeadingError(f"{text}; write {listing(units)}")
+            roles[name] = HeadedColumn(i, unit)
+            taken.add(i)
+    for words_of in (WORDS, LESS_CLEAR):
+        for role, known in words_of.items():
+            if role in roles:
+                continue
+            places = [i for i, (name, _) in enumerate(parsed) if name in known and i not in taken]
+            if len(places) > 1:
+                raise HeadingError(_which(role, [cells[i] for i in places]))
+            if places:
+                roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
+                taken.add(places[0])
+    if "u" in roles:
+        _refuse_expanded(roles["u"], cells)
+    else:
+        roles |= _uncertainty(cells, taken)
+    return Headings(roles, groups, tuple(cells))
+
+
+def _uncertainty(cells: Sequence[str], taken: set[int]) -> dict[str, HeadedColumn]:
+    """The column u of uncertainties by what its heading says, and k of their coverage factors where
+    they are expanded.
+
+    :raises HeadingError: several columns could be it, or one does not say which uncertainty it is.
+    """
+    found = {
+        i: said
+        for i, cell in enumerate(cells)
+        if i not in taken
+        and len(cell) <= LONGEST
+        and (said := headed_uncertainty(cell, heading)) is not None
+    }
+    for kind in ("standard", "expanded", "unclear"):
+        places = [i for i, said in found.items() if said.kind == kind]
+        if len(places) > 1:
+            raise HeadingError(_which("u", [cells[i] for i in places]))
+        if places:
+            break
+    else:
+        return {}
+    (place,) = places
+    named, said = shorten(cells[place]), found[place]
+    unit = said.unit or "um"
+    column = {"u": HeadedColumn(place, said.unit)}
+    if kind == "standard":
+        return column
+    factors = [
+        i
+        for i, cell in enumerate(cells)
+        if i not in taken and i != place and heading(cell)[0] in FACTORS
+    ]
+    if kind == "unclear" and (said.factor is not None or not factors):
+        raise HeadingError(
+            f'"{named}" does not say which uncertainty it is; call it standard_uncertainty_{unit},'
+            f" or expanded_uncertainty_{unit} beside a column k, or something else where it is"
+            " none; or name it as the standard uncertainty under readings:"
+            f" {{columns: {{u: {named}}}}}"
+        )
+    if len(factors) + (said.factor is not None) > 1:
+        raise HeadingError(
+            f'the coverage factor of "{named}" is stated more than once; remove all but one'
+        )
+    if not factors and said.factor is None:
+        raise HeadingError(
+            f'"{named}" has no coverage factor; add a column k, or write it in the heading, as in'
+            f" expanded_uncertainty (k=2) [{unit}]"
+        )
+    return column | {"k": HeadedColumn(factors[0] if factors else -1, constant=said.factor)}
+
+
+def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
+    """Refuse a column named in the experiment file whose heading says that it is expanded.
+
+    :raises HeadingError: it does.
+    """
+    cell = cells[column.place][:LONGEST] if column.place >= 0 else ""
+    said = headed_uncertainty(cell, heading)
+    if said is not None and said.kind == "expanded":
+        raise HeadingError(
+            f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
+            " uncertainties; leave u out there: the heading says what it is"
+        )
+
+
+def numbered_columns(words: Vocabulary, count: int) -> Headings:
+    """The columns of a table without headings, all of them stated by their numbers.
+
+    :raises HeadingError: some are not.
+    """
+    cells = [""] * count
+    groups = _stated_groups(cells, words)
+    if groups is None:
+        raise HeadingError(
+            "without headings, give the numbers of columns: readings: {columns: {position: 1, ball:"
+            " 2, x: 3, y: 4, z: 5}}"
+        )
+    roles = {
+        role: _stated_column(name, cells)
+        for role in (*TEXTS, "u", "diameter")
+        if (name := getattr(words.stated, role, None)) is not None
+    }
+    return Headings(roles, groups, ())
+
+
+def _which(role: str, cells: Sequence[str]) -> str:
+    if len(set(cells)) == 1:
+        return _twice(role, cells[0])
+    named = listing(f'"{shorten(cell)}"' for cell in cells)
+    return (
+        f"the columns {named} could all be {role}; say which: readings: {{columns: {{{role}:"
+        f" {shorten(cells[0])}}}}}"
+    )
+
+
+def _twice(role: str, cell: str) -> str:
+    return (
+        f'the heading "{shorten(cell)}" occurs more than once, and could be {role}; correct it, or'
+        f" give the number of the right column: readings: {{columns: {{{role}: …}}}}"
+    )
+
+
+def _stated_column(name: str, cells: Sequence[str]) -> HeadedColumn:
+    """The column that the experiment file names, exactly, without its unit, or by its number.
+
+    :raises HeadingError: there is none.
+    """
+    if name.startswith("="):
+        return HeadedColumn(-1, constant=name[1:].strip())
+    exact = [i for i, cell in enumerate(cells) if cell == name]
+    alike = [i for i, cell in enumerate(cells) if name and heading(cell)[0] == folded(name)]
+    for places in (exact, alike):
+        if len(places) > 1:
+            raise HeadingError(f'{len(places)} columns are called "{name}"; give the number of one')
+        if places:
+            return HeadedColumn(places[0], heading(cells[places[0]])[1])
+    if re.fullmatch("[0-9]{1,9}", name) and 1 <= int(name) <= len(cells):
+        return HeadedColumn(int(name) - 1, heading(cells[int(name) - 1])[1])
+    there = hint(name, filter(None, cells))
+    raise HeadingError(f'there is no column "{shorten(name)}"; {there}')
+
+
+def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
+    """Groups of co-ordinates that the experiment file names columns of; None where it names none.
+
+    :raises HeadingError: it names some that are not there, or not all.
+    """
+    stated = {axis: getattr(words.stated, axis, None) for axis in words.axes}
+    given = {axis: columns for axis, columns in stated.items() if columns is not None}
+    if not given:
+        return None
+    of_probes = [set(columns) if isinstance(columns, dict) else {""} for columns in given.values()]
+    if any(probes != of_probes[0] for probes in of_probes):
+        raise HeadingError("columns of x, y and z are of different probes; name the same")
+    parsed = [heading(cell) for cell in cells]
+    groups = []
+    for probe in sorted(of_probes[0]):
+        axes = []
+        for axis in words.axes:
+            named = given.get(axis, axis)
+            name = named[probe] if isinstance(named, dict) else named
+            places = [i for i, (word, _) in enumerate(parsed) if word == axis]
+            if axis not in given and len(places) == 1:
+                axes.append(HeadedColumn(places[0], parsed[places[0]][1]))
+            elif name.startswith("="):
+                raise HeadingError(f"{axis} is a co-ordinate of each reading; name its column")
+            else:
+                axes.append(_stated_column(name, cells))
+        groups.append(Group(tuple(axes), {"probe": probe} if probe else {}))
+    return tuple(groups)
+
+
+def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
+    """Groups of co-ordinates by what headings say besides an axis; None where none is complete.
+
+    :raises HeadingError: two columns could be the same co-ordinate.
+    """
+    parsed = [heading(cell) for cell in cells]
+    found: dict[str, dict[str, list[int]]] = {}
+    for i, (name, _) in enumerate(parsed):
+        parts = name.split()
+        for k, axis in enumerate(parts):
+            others = [*parts[:k], *parts[k + 1 :]]
+            beside = " ".join(others)
+            if beside not in words.beside_axes:
+                beside = " ".join(word for word in others if word not in MEASURED)
+            if axis in words.axes and beside in words.beside_axes:
+                found.setdefault(beside, {}).setdefault(axis, []).append(i)
+    groups = {beside: axes for beside, axes in found.items() if set(axes) == set(words.axes)}
+    if not groups:
+        # With one axis missing, the heading of another stands where it should be.
+        for axes in found.values():
+            for axis, places in axes.items():
+                named = [cells[i] for i in places]
+                if len(axes) == len(words.axes) - 1 and len(named) > len(set(named)):
+                    raise HeadingError(_twice(axis, named[0]))
+        return None
+    for axes in groups.values():
+        for axis, places in axes.items():
+            if len(places) > 1:
+                raise HeadingError(_which(axis, [cells[i] for i in places]))
+    if "" in groups and len(groups) > 1:
+        names = listing(beside for beside in groups if beside)
+        raise HeadingError(
+            f"there are co-ordinates by themselves and of {names}; name those that are meant under"
+            " readings: columns"
+        )
+    if "" not in groups and len(groups) < len(found):
+        names = listing(beside or "the others" for beside in found if beside not in groups)
+        text = f"not all of {listing(words.axes)} are there of {names}"
+        raise HeadingError(f"{text}; add the others, or name those meant under readings: columns")
+    return tuple(
+        Group(
+            tuple(HeadedColumn(axes[axis][0], parsed[axes[axis][0]][1]) for axis in words.axes),
+            words.beside_axes[beside],
+        )
+        for beside, axes in groups.items()
+    )
+
+
+def missing_columns(cells: Iterable[str], missing: Sequence[str]) -> str:
+    """What to say of a table that lacks columns: those there are, and what to write."""
+    named = listing((f'"{shorten(cell)}"' for cell in cells if cell), 12)
+    mapping = ", ".join(f"{role}: …" for role in missing)
+    return (
+        f"columns found: {named or 'none'}; missing: {listing(missing)}; name them in the"
+        f" experiment file: readings: {{columns: {{{mapping}}}}}"
+    )

@@ -1,0 +1,102 @@
+"""`ballplate import`: readings out of reports of measuring programs."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from ballplate.cli.outputs import add_force, add_output, text_writer, write
+from ballplate.cli.table_options import rule
+from ballplate.cli.telling import complain, note
+
+HELP = "make a table of readings of reports of CMM programs"
+DESCRIPTION = (
+    "Read the centres of spheres out of reports that measuring programs write (DMIS output,"
+    " PC-DMIS, Calypso, QIF), and write them as a table for fit. Positions, balls and probes are"
+    " found in the names of features. What is taken and what is left is told."
+)
+FORMATS = ("dmis", "pcdmis", "calypso", "qif")
+UNITS = ("mm", "cm", "m", "in")
+
+
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument("reports", metavar="REPORT", nargs="+", type=Path, help="report to read")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="CSV",
+        required=True,
+        takes_screen=True,
+        help="table to write, or - for standard output",
+    )
+    parser.add_argument(
+        "--for",
+        dest="files",
+        metavar="FILE",
+        nargs=1,
+        type=Path,
+        help="experiment file (YAML) whose positions, balls and probes the names are matched with",
+    )
+    parser.add_argument(
+        "--variant",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="with --for: use only this variant",
+    )
+    parser.add_argument(
+        "--name",
+        metavar="RULE",
+        type=rule,
+        help=(
+            'how features are named, such as "{position}_{ball}_{probe}"; points on a ball are'
+            " numbered by {point} at the end; default: found out, and told"
+        ),
+    )
+    parser.add_argument(
+        "--from",
+        dest="form",
+        choices=FORMATS,
+        help="format of the reports; default: recognised",
+    )
+    parser.add_argument(
+        "--unit", choices=UNITS, help="unit of reports that state none; one that is stated counts"
+    )
+    parser.add_argument(
+        "--circles", action="store_true", help="take centres of circles, too, as of a hole plate"
+    )
+    parser.add_argument(
+        "--uncertainty",
+        action="store_true",
+        help=(
+            "write the standard uncertainty of centres that are of points on the surface, which fit"
+            " then uses in place of the machine's repeatability"
+        ),
+    )
+    add_force(parser)
+
+
+def run(options: Namespace) -> int:
+    """Write the table of what the reports have."""
+    from ballplate.api import read_report
+    from ballplate.cli.common import single
+
+    experiment = single(options) if options.files else None
+    found = read_report(
+        options.reports, experiment, options.name, options.form, options.unit, options.circles
+    )
+    imported = found.imported
+    if str(options.output) == "-":
+        imported.write(sys.stdout, options.uncertainty)
+    else:
+        print_to = text_writer(lambda stream: imported.write(stream, options.uncertainty))
+        if not write(options, {options.output: print_to}):
+            return 0
+    for line in found.told:
+        note(options, line)
+    for line in found.remarks:
+        complain(line)
+    note(options, f"{len(imported.readings)} readings written to {options.output}; {imported.key}")
+    return 0

@@ -1,0 +1,62 @@
+"""Readings out of reports of measuring programs, as a result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ballplate.presentation.result import Result
+
+from .imported import ImportedReadings
+
+
+@dataclass(frozen=True)
+class ReadReport(Result):
+    """Readings of reports; `to_frame` is a table that `fit` takes.
+
+    `told` says what was taken of each report and what was left, `remarks` what may matter of it.
+    """
+
+    label: str
+    imported: ImportedReadings
+    title: str = "readings of reports of measuring programs"
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        return self.imported.told
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        return self.imported.remarks
+
+    def headline(self) -> str:
+        return f"{len(self.imported.readings)} readings, {self.imported.coordinates}"
+
+    def lines(self) -> list[str]:
+        return [*self.told, self.imported.key]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.remarks
+
+    def rows(self) -> list[dict[str, Any]]:
+        columns = self.imported.columns()
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "experiment": self.label,
+            "coordinates": self.imported.coordinates,
+            "told": list(self.told),
+            "remarks": list(self.remarks),
+            "readings": [
+                {
+                    "position": one.position,
+                    "ball": one.ball,
+                    "probe": one.probe or None,
+                    "centre": list(one.centre[: self.imported.dimension]),
+                    "uncertainty": one.uncertainty,
+                }
+                for one in self.imported.readings
+            ],
+        }

@@ -1,0 +1,51 @@
+"""Files that are given as readings, or as certificate values, and hold something else: what they
+are, and where they belong.
+"""
+
+from __future__ import annotations
+
+import re
+
+from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.readings.certificate_files import headings
+
+from .formats.registered import recognised
+from .formats.report import Format
+
+POINTS = frozenset(("feature", "nominal_x"))
+CERTIFICATE = frozenset(("item", "first", "second", "value"))
+RUN_SHEET = frozenset(("step", "set_up", "balls", "readings"))
+
+
+def what_it_is(source: GivenText) -> str:
+    """What a file without readings is, and what to do with it; empty where that is not known."""
+    names = headings(source.text)
+    if names >= POINTS:
+        return (
+            "this is a table of the nominal centres of balls, as ballplate sheet --points writes"
+            " it, and has no readings; ballplate sheet --readings writes the table to fill in"
+        )
+    if names >= CERTIFICATE:
+        return "these are values of certificates, not readings; give them with --certificate"
+    if names >= RUN_SHEET:
+        return (
+            "this is a run sheet, and has no readings; ballplate sheet --readings writes the table"
+            " to fill in"
+        )
+    form = recognised(source.text)
+    if form is None:
+        return ""
+    if is_program(form, source.text):
+        return (
+            "this is a DMIS program, not what was measured with it; run it on the machine, then"
+            " ballplate import on its output"
+        )
+    return (
+        f"this is a report of a measuring program ({form.title}), and no table of readings; run"
+        " ballplate import first, which makes one of it"
+    )
+
+
+def is_program(form: Format, text: str) -> bool:
+    """Whether a file of a format moves a machine, and has nothing that was measured."""
+    return form.name == "dmis" and not re.search(r"^[ \t]*FA\(", text, re.MULTILINE)

@@ -1,0 +1,98 @@
+"""Readings straight from reports of measuring programs, in place of tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from pathlib import Path
+
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.quantities import LENGTH_UNITS, plain_unit
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.tables import FileRow
+from ballplate.simulator.inputs.yamltree import GivenText
+
+from .any_table import TableRows
+from .formats.registered import recognised
+from .imported import ImportedReading, ImportSettings, report_readings
+from .other_files import is_program
+
+
+def report_rows(
+    source: Path | GivenText,
+    text: GivenText,
+    design: Design,
+    settings: ReadingsSettings,
+    further: Collection[str],
+) -> TableRows | None:
+    """Rows of a report of a measuring program, without what is in `further` columns of tables; None
+    where the file with this `text` is none.
+
+    :raises ExperimentError: it is one, and wrong, or its names are not those of the design.
+    """
+    form = recognised(text.text)
+    # Who names columns says that it is a table.
+    if form is None or is_program(form, text.text) or settings.columns is not None:
+        return None
+    # A pipe has been read, and is empty now.
+    is_file = isinstance(source, Path) and source.is_file()
+    unit = None if settings.unit is None else LENGTH_UNITS[plain_unit(settings.unit)]
+    of_holes = design.positions.across is not None
+    found = report_readings(
+        [source if is_file else text],
+        ImportSettings(design, settings.names, form.name, unit, circles=of_holes),
+    )
+    rows = tuple(_row(one, design.dimension, len(further)) for one in found.readings)
+    told = (*found.told, *found.remarks)
+    if any(one.uncertainty is not None for one in found.readings):
+        told += ("these uncertainties are not used; import --uncertainty writes them for fit",)
+    return TableRows(rows, told, coordinates=found.coordinates)
+
+
+def _row(one: ImportedReading, dimension: int, further: int) -> FileRow:
+    x = [math.nan if one.across == i else one.centre[i] for i in range(dimension)]
+    blank = [math.nan] * (1 + further)
+    return FileRow(one.mark, (one.position, one.ball, one.probe), (*x, *blank))
+
+
+def with_coordinates(
+    settings: ReadingsSettings, sources: Collection[object], tables: Collection[TableRows]
+) -> tuple[ReadingsSettings, tuple[str, ...]]:
+    """Settings that say what co-ordinates are, where reports do, and that in words.
+
+    :raises ExperimentError: reports say other than stated, or some files say it and others do not.
+    """
+    found = {str(source): table.coordinates for source, table in zip(sources, tables, strict=True)}
+    reports = [name for name, kind in found.items() if kind is not None]
+    if not reports:
+        return settings, ()
+    if settings.coordinates == "scale readings":
+        text = (
+            "the centres in a report have the offsets of probes applied, and scale readings are"
+            " stated; state ball centres, with offsets_in_controller where these are others"
+        )
+        raise refused(reports[0], text)
+    if settings.coordinates is not None:
+        return settings, ()
+    kinds = {kind for kind in found.values() if kind is not None}
+    if len(kinds) > 1:
+        own = [name for name in reports if found[name] == "part"]
+        others = listing(name for name in reports if name not in own)
+        text = (
+            f"centres in a part's co-ordinate system, and others ({others}) in the machine's; state"
+            " coordinates if they are all of one kind, or fit each apart"
+        )
+        raise refused(own[0], text)
+    if len(reports) < len(found):
+        plain = [name for name, kind in found.items() if kind is None]
+        text = (
+            f"a table beside reports ({listing(reports)}), which have ball centres; state what all"
+            " co-ordinates are: readings: {coordinates: ball centres}"
+        )
+        raise refused(plain[0], text)
+    kind = kinds.pop()
+    chosen = settings.model_copy(update={"coordinates": kind})
+    words = "part co-ordinates" if kind == "part" else "ball centres"
+    return chosen, (f"co-ordinates are taken for {words}, as reports have them",)

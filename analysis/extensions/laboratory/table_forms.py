@@ -1,0 +1,375 @@
+"""Forms of tables as programs write them: what separates columns and decimals, and where the
+headings stand.
+
+Every form that can be is tried on the whole table. A table that only one of them reads, or that all
+of them read alike, is in that form; one that they read differently is ambiguous, and refused.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.inputs.messages import MOST_MESSAGES
+from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs.tables import MOST_COLUMNS
+
+from .heading_words import LONGEST, unit_of
+from .headings import HeadingError, Headings, Vocabulary, numbered_columns, read_headings
+
+# What separates columns → how it is told. Blanks by themselves, and two or more where names have
+# single ones.
+SEPARATORS = {
+    "comma": (",", "commas"),
+    "semicolon": (";", "semicolons"),
+    "tab": ("\t", "tabs"),
+    "bar": ("|", "bars"),
+    "wide": ("  ", "two or more blanks"),
+    "space": (" ", "blanks"),
+}
+DECIMALS = {"point": ".", "comma": ","}
+# Lines that headings are looked for in.
+MOST_ABOVE = 200
+_DIGITS = r"[+-]?(?:[0-9]+(?:{0})?|{1}[0-9]+)(?:[eE][+-]?[0-9]+)?"
+# A comma at the end of a number separates it from the next.
+NUMBERS = {
+    "point": re.compile(_DIGITS.format(r"\.[0-9]*", r"\.")),
+    "comma": re.compile(_DIGITS.format(",[0-9]+", ",")),
+}
+# Numbers with signs between thousands: with decimals behind them, or several of them.
+_BETWEEN = r"'\u2019\s\u00a0\u202f"
+THOUSANDS = re.compile(
+    rf"[+-]?[0-9]{{1,3}}(?:(?:[.{_BETWEEN}][0-9]{{3}})+,[0-9]*|(?:[,{_BETWEEN}][0-9]{{3}})+\.[0-9]*"
+    rf"|(?:[{_BETWEEN}][0-9]{{3}})+|(?:\.[0-9]{{3}}){{2,}}|(?:,[0-9]{{3}}){{2,}})"
+)
+# What could be thousands just as well as three decimals.
+EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
+OTHER_DECIMALS = "and others have decimal"
+NOTHING = frozenset(("", "-", "--", "---", "n/a", "na", "nan", "none", "null"))
+
+Line = tuple[int, str]
+Row = tuple[int, list[str]]
+
+
+@dataclass(frozen=True)
+class Form:
+    """A table in one of the forms: its headings, and its rows of cells by the number of their line.
+
+    `units` are those of a line of units below the headings, by place. `empty` are the lines without
+    any co-ordinate, `wrong` what keeps rows from being read so, by line. `above` are the lines
+    above the headings.
+    """
+
+    separator: str
+    decimal: str
+    header: int
+    headings: Headings
+    units: dict[int, str]
+    rows: tuple[Row, ...]
+    empty: tuple[int, ...]
+    wrong: tuple[tuple[int, str], ...]
+    above: tuple[str, ...]
+
+    def content(self) -> tuple[object, ...]:
+        """What it reads; of two forms with the same content either will do."""
+        places = [axis.place for group in self.headings.groups for axis in group.axes]
+        texts = [c.place for c in self.headings.roles.values() if c.constant is None]
+        sign = DECIMALS[self.decimal]
+        return tuple(
+            (
+                *(cells[i] for i in texts),
+                *(cells[i].replace(sign, ".") for i in places if cells[i] not in NOTHING),
+            )
+            for _, cells in self.rows
+        )
+
+
+def split(text: str, separator: str) -> list[str] | None:
+    """The cells of a line; None where its quotation marks do not match."""
+    if separator in (" ", "  "):
+        text = text.strip()
+        blanks = r"\s+" if separator == " " else r"\s{2,}|\t"
+        if '"' in text:
+            found = re.findall(r'"([^"]*)"(?=\s|$)|(\S+)', text)
+            return [quoted or plain for quoted, plain in found]
+        return re.split(blanks, text)
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(separator)]
+    try:
+        (cells,) = csv.reader([text], delimiter=separator, skipinitialspace=True, strict=True)
+    except (csv.Error, ValueError):
+        return None
+    return [cell.strip() for cell in cells]
+
+
+def _split_headings(text: str, separator: str) -> list[str] | None:
+    """The cells of a line of headings, in which a blank before a unit in brackets separates
+    nothing.
+    """
+    if separator == " ":
+        text = re.sub(r"(?<!\s)\s+(?=[\[(][^\])]*[\])])", "_", text)
+    return split(text.removeprefix("#").strip(), separator)
+
+
+class NoFormError(Exception):
+    """No form reads the table: why, of which line, with the headings that are there."""
+
+    def __init__(self, line: int, text: str, cells: Sequence[str] = ()) -> None:
+        self.line, self.text, self.cells = line, text, tuple(cells)
+        super().__init__(text)
+
+
+def forms_of(lines: Sequence[Line], words: Vocabulary, settings: ReadingsSettings) -> list[Form]:
+    """The table in every form in which a line names co-ordinates.
+
+    :raises NoFormError: there is none.
+    """
+    tried = [settings.separator] if settings.separator else list(SEPARATORS)
+    if settings.separator == "space":
+        tried = ["wide", "space"]
+    decimals = [settings.decimal] if settings.decimal else list(DECIMALS)
+    found: list[Form] = []
+    reasons: list[NoFormError] = []
+    for separator in tried:
+        try:
+            header, headings = _find_headings(lines, separator, words, settings)
+        except NoFormError as error:
+            reasons.append(error)
+            continue
+        for decimal in decimals:
+            # Of a table of commas, they separate columns unless quoted.
+            found.append(_form(lines, header, headings, separator, decimal, words.empty))
+    if found:
+        return found
+    raise max(reasons, key=lambda error: len(error.cells))
+
+
+def _find_headings(
+    lines: Sequence[Line], separator: str, words: Vocabulary, settings: ReadingsSettings
+) -> tuple[int, Headings]:
+    """Which of the lines has the headings, -1 without any, and what these are.
+
+    :raises NoFormError: none has.
+    """
+    sign = SEPARATORS[separator][0]
+    if settings.header == 0:
+        row = next((split(t, sign) for _, t in lines if not t.lstrip().startswith("#")), None)
+        try:
+            return -1, numbered_columns(words, len(row or ()))
+        except HeadingError as error:
+            raise NoFormError(1, str(error)) from None
+    wrong: NoFormError | None = None
+    widest = NoFormError(lines[0][0], "", ())
+    comments = [i for i, (_, text) in enumerate(lines[:MOST_ABOVE]) if text.lstrip()[:1] == "#"]
+    others = [i for i in range(min(len(lines), MOST_ABOVE)) if i not in set(comments)]
+    for i in (*others, *comments):
+        number, text = lines[i]
+        if settings.header is not None and number != settings.header:
+            continue
+        cells = _split_headings(text, sign) if len(text) <= LONGEST * MOST_COLUMNS else None
+        if not cells or len(cells) > MOST_COLUMNS:
+            continue
+        try:
+            headings = read_headings(cells, words)
+        except HeadingError as error:
+            if wrong is None or len(cells) > len(wrong.cells):
+                wrong = NoFormError(number, str(error), cells)
+            continue
+        if headings is not None:
+            return i, headings
+        if len(cells) > len(widest.cells) and not any(map(_is_number, cells)):
+            widest = NoFormError(number, "", cells)
+    raise wrong or widest
+
+
+def _is_number(cell: str) -> bool:
+    return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
+
+
+def _form(
+    lines: Sequence[Line],
+    header: int,
+    headings: Headings,
+    separator: str,
+    decimal: str,
+    may_be_empty: Collection[str] = (),
+) -> Form:
+    """The rows below the headings, and what is wrong with them in this form."""
+    sign = SEPARATORS[separator][0]
+    places = [axis.place for group in headings.groups for axis in group.axes]
+    needed = [*places, *(c.place for c in headings.roles.values() if c.constant is None)]
+    width = len(headings.cells) or max(needed) + 1
+    number = NUMBERS[decimal]
+    units: dict[int, str] = {}
+    rows: list[Row] = []
+    empty: list[int] = []
+    remarks: list[int] = []
+    wrong: list[tuple[int, str]] = []
+    ball = headings.roles["ball"].place if "ball" in headings.roles else 0
+    for at, text in _below(lines, header):
+        if len(wrong) > MOST_MESSAGES:
+            break
+        cells = split(text, sign)
+        if cells is None:
+            wrong.append((at, "a quotation mark too many; write one line per row"))
+            continue
+        if not rows and not units and (found := _units(cells, places)):
+            units = found
+            continue
+        cells = _padded(cells, width, needed, sign)
+        if len(cells) < width or (headings.cells and len(cells) > width):
+            if _holds_no_number(cells, places, number):
+                remarks.append(at)
+            else:
+                text = f"{len(cells)} columns instead of {width}; write one line per row"
+                wrong.append((at, text))
+            continue
+        if all(i >= len(cells) or cells[i].casefold() in NOTHING for i in places):
+            (empty if cells[ball] else remarks).append(at)
+            continue
+        if reason := _wrong_row(cells, headings, number, decimal, may_be_empty):
+            wrong.append((at, reason))
+        rows.append((at, cells))
+    # In between they may say what is true of the rows below only.
+    last = rows[-1][0] if rows else 0
+    text = "a line without co-ordinates among the rows; remove it, or say in a column what it says"
+    wrong += [(at, text) for at in remarks if at < last]
+    empty = sorted((*empty, *(at for at in remarks if at > last)))
+    above = tuple(text for _, text in lines[: max(header, 0)])
+    line = lines[header][0] if header >= 0 else 0
+    return Form(
+        separator, decimal, line, headings, units, tuple(rows), tuple(empty), tuple(wrong), above
+    )
+
+
+def _below(lines: Sequence[Line], header: int) -> Iterator[Line]:
+    for at, text in lines[header + 1 :]:
+        # A rule below the headings of a table of bars or blanks holds nothing.
+        if text.lstrip()[:1] != "#" and not re.fullmatch(r"[\s|+:=_-]+", text):
+            yield at, text
+
+
+def _units(cells: Sequence[str], places: Sequence[int]) -> dict[int, str]:
+    """Units by place where a line states that of every co-ordinate, and no number."""
+    if any(i >= len(cells) or unit_of(cells[i]) is None for i in places):
+        return {}
+    return {i: unit for i, cell in enumerate(cells) if (unit := unit_of(cell)) is not None}
+
+
+def _padded(cells: list[str], width: int, needed: Sequence[int], sign: str) -> list[str]:
+    """A row with as many cells as there are headings, where those that are missing or too many are
+    empty ones at its end.
+    """
+    while len(cells) > width and not cells[-1]:
+        cells.pop()
+    # Blanks do not tell which cell is missing.
+    if max(needed) < len(cells) < width and sign not in (" ", "  "):
+        cells += [""] * (width - len(cells))
+    return cells
+
+
+def _holds_no_number(cells: Sequence[str], places: Sequence[int], number: re.Pattern[str]) -> bool:
+    """Whether a line of another width is a remark, and no row that was cut off."""
+    filled = [cell for cell in cells if cell]
+    return len(cells) <= min(places) or (
+        not any(_is_number(cell) for cell in filled) and len(filled) <= 2
+    )
+
+
+def _wrong_row(
+    cells: Sequence[str],
+    headings: Headings,
+    number: re.Pattern[str],
+    decimal: str,
+    may_be_empty: Collection[str],
+) -> str:
+    """What is wrong with a row; empty where nothing is."""
+    for group in headings.groups:
+        own = [cells[axis.place] for axis in group.axes]
+        if len(headings.groups) > 1 and all(cell.casefold() in NOTHING for cell in own):
+            continue
+        for name, cell in zip("xyz", own, strict=False):
+            if name in may_be_empty and cell.casefold() in NOTHING:
+                continue
+            if not number.fullmatch(cell):
+                return wrong_number(cell, name, decimal)
+    return ""
+
+
+def wrong_number(cell: str, name: str, decimal: str) -> str:
+    """What is wrong with a cell that should be a number."""
+    if cell.casefold() in NOTHING:
+        return f"no {name}; write a number, or remove the line"
+    if THOUSANDS.fullmatch(cell[:LONGEST]):
+        return f'"{shorten(cell)}" has signs between thousands; write it without them'
+    other = "comma" if decimal == "point" else "point"
+    if NUMBERS[other].fullmatch(cell):
+        return f'"{cell}" has a decimal {other}, {OTHER_DECIMALS} {decimal}s; write one kind'
+    return f'"{shorten(cell)}" is not a number; write for example "500{DECIMALS[decimal]}0003"'
+
+
+def chosen_form(forms: Sequence[Form]) -> Form:
+    """The one form that reads a table; the nearest to it, with what is wrong, where none does.
+
+    :raises NoFormError: several forms read it differently.
+    """
+    right = [form for form in forms if form.rows and not form.wrong]
+    if not right:
+        # Of a number with thousands and decimals, the sign of the decimals is the last one.
+        return min(forms, key=lambda form: (_share_wrong(form), _of_other_decimals(form)))
+    first = right[0]
+    for other in right[1:]:
+        if other.content() != first.content():
+            one, two = (SEPARATORS[form.separator] for form in (first, other))
+            raise NoFormError(
+                first.header,
+                f"{one[1]} and {two[1]} could both separate the columns; write which under"
+                " readings: separator",
+            )
+    return first
+
+
+def _share_wrong(form: Form) -> float:
+    return len(form.wrong) / max(len(form.rows) + len(form.wrong), 1)
+
+
+def _of_other_decimals(form: Form) -> int:
+    """How many rows are wrong for the sign of their decimals alone."""
+    return sum(OTHER_DECIMALS in text for _, text in form.wrong)
+
+
+def doubtful_decimals(form: Form) -> str:
+    """A number of a table all of whose numbers could have thousands as well as three decimals;
+    empty where one number tells.
+    """
+    sign = DECIMALS[form.decimal]
+    found = ""
+    for _, cells in form.rows:
+        for group in form.headings.groups:
+            for axis in group.axes:
+                cell = cells[axis.place]
+                if sign not in cell:
+                    if len(cell.lstrip("+-")) > 3:
+                        return ""
+                elif not EITHER.fullmatch(cell):
+                    return ""
+                else:
+                    found = found or cell
+    return found
+
+
+def commas_of_both_kinds(form: Form) -> bool:
+    """Whether commas may separate decimals as well as columns: all co-ordinates are whole numbers,
+    and as many numbers as these stand in columns that nothing is taken from.
+    """
+    if form.separator != "comma" or not form.headings.unused:
+        return False
+    used = [axis.place for group in form.headings.groups for axis in group.axes]
+    spare = [i for i in range(len(form.headings.cells)) if i not in form.headings.used]
+    if not all(re.fullmatch(r"[+-]?[0-9]*", row[i]) for _, row in form.rows for i in used):
+        return False
+    whole = [i for i in spare if all(re.fullmatch("[0-9]+", row[i]) for _, row in form.rows)]
+    return len(whole) >= len(form.headings.groups[0].axes)

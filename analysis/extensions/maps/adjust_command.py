@@ -1,0 +1,145 @@
+"""`ballplate adjust`: a machine after adjustments, as predicted and as inspected again."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.common import add_json, map_path, percentage, show, write_noted
+from ballplate.cli.outputs import UsageError, add_force, add_output
+from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
+from ballplate.cli.telling import warn
+
+if TYPE_CHECKING:
+    from ballplate.simulator.maps.fitted_map import FittedMap
+
+HELP = "predict what adjustments leave of a machine's errors, and compare with a second campaign"
+DESCRIPTION = (
+    "Apply stated changes of scales and turns of guideways to a fitted machine: of a map file, or"
+    " of an experiment with its readings. Predict what remains of scale errors, angles between the"
+    " axes and errors along the diagonals of the volume, with U, and compare with what a second"
+    " campaign finds, by E_n. The exit status is 1 if that differs by more than the uncertainties,"
+    " or a fit is not as expected, otherwise 0."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_readings(parser)
+    parser.add_argument(
+        "--scale",
+        metavar="AXIS=RATIO",
+        action="append",
+        default=[],
+        help='a changed scale: x="22 um/m" for X that reads that much more; may be repeated',
+    )
+    parser.add_argument(
+        "--turn",
+        metavar="GUIDEWAY=ANGLE",
+        action="append",
+        default=[],
+        help=(
+            'a guideway that was turned: y-x="12 arcsec" for that of Y towards -X, or by its screw,'
+            ' y-x="0.25 turns of 1 mm at 400 mm"; may be repeated'
+        ),
+    )
+    parser.add_argument(
+        "--uncertainty",
+        metavar="SHARE",
+        type=percentage,
+        default=0.0,
+        help="standard uncertainty of each change, such as 2%% of it; default: made as stated",
+    )
+    parser.add_argument(
+        "--after",
+        metavar="FILE",
+        nargs="+",
+        type=Path,
+        default=[],
+        help="second campaign: its map file, or its readings of the same experiment",
+    )
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=map_path,
+        help="write the predicted machine as a map file: .yaml, or .npz for a large one",
+    )
+    add_force(parser)
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
+    """Print the prediction and the comparison; 1 if something is not as expected."""
+    from ballplate.simulator.experiment.map_files import write_map
+
+    from .adjusted_machine import adjusted_machine
+    from .machine_changes import guideway_turn, scale_change
+
+    if not options.scale and not options.turn:
+        raise UsageError("state what was changed, with --scale or --turn")
+    try:
+        changes = [scale_change(text) for text in options.scale]
+        changes += [guideway_turn(text) for text in options.turn]
+    except ValueError as error:
+        raise UsageError(error) from None
+    first, complaint = _fitted(options, options.files[0], options.readings)
+    if first is None:
+        return 1
+    second = None
+    if options.after:
+        second, other = _second(options)
+        if second is None:
+            return 1
+        complaint |= other
+    try:
+        found = adjusted_machine(first.title, first, changes, second, options.uncertainty)
+    except ValueError as error:
+        raise UsageError(error) from None
+    if options.output:
+        predicted = found.predicted_map
+        write_noted(options, {options.output: lambda path: write_map(predicted, path)})
+    show(options, found)
+    warn(found.notes)
+    return 1 if complaint or (found.found is not None and not found.is_within) else 0
+
+
+def _second(options: Namespace) -> tuple[FittedMap | None, bool]:
+    """The map of the second campaign, and whether there is something to complain of."""
+    if _is_map(options.after[0]):
+        return _fitted(options, options.after[0], options.after[1:])
+    if _is_map(options.files[0]):
+        raise UsageError(
+            f"{options.after[0]} is no map file; readings need the experiment file in the place of"
+            f" {options.files[0]}, or fit them first with fit -o"
+        )
+    return _fitted(options, options.files[0], options.after)
+
+
+def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[FittedMap | None, bool]:
+    """A map, of a file or of a fit, and whether there is something to complain of; None where a fit
+    has failed.
+    """
+    from ballplate.simulator.experiment.map_files import read_map
+
+    if _is_map(file):
+        if readings:
+            raise UsageError(f"{file} is a map, which needs no readings; leave {readings[0]} out")
+        return read_map(file), False
+    from ballplate.results.study import fit
+
+    chosen = Namespace(**{**vars(options), "files": [file], "readings": readings})
+    experiment, observed = observed_readings(chosen)
+    result = fit(experiment, observed, options.sigma)
+    warn_of(result)
+    return (result.to_map() if result.converged else None), bool(result.complaint)
+
+
+def _is_map(path: Path) -> bool:
+    """Whether a file is a map rather than an experiment or readings."""
+    from ballplate.simulator.inputs.yamltree import read_tree, written
+
+    if path.suffix.lower() == ".npz":
+        return True
+    return path.suffix.lower() in (".yaml", ".yml") and written(read_tree(path), "map") is not None

@@ -1,0 +1,75 @@
+"""Errors of a machine, whether a file describes it or a fit has left a map of it behind."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import reduce
+from pathlib import Path
+
+from ballplate.results.wanted_lengths import tasks_of_experiment
+from ballplate.simulator.design.objects import Tasks
+from ballplate.simulator.experiment.map_files import BINARY, read_map
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.yamltree import read_bytes
+from ballplate.simulator.maps.fitted_map import FittedMap
+
+from .error_curves_result import ErrorCurves, error_curves
+from .fitted_errors_result import FittedErrorMap, fitted_map_errors
+from .map_places import PlacesAsked
+from .realisations import Draws
+from .volumetric_results import MachineErrors, machine_errors
+
+# A map file says at its beginning that it is one.
+OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
+
+
+def is_map_file(path: Path) -> bool:
+    """Whether a file is a map, by its name or by what it says.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    return path.suffix.lower() == BINARY or bool(OF_MAPS.search(read_bytes(path)))
+
+
+def map_of_source(source: Path | FittedMap) -> tuple[FittedMap, str]:
+    """A map as it is given, or of a file, with its label.
+
+    :raises ExperimentError: the file is wrong.
+    """
+    return (read_map(source), source.stem) if isinstance(source, Path) else (source, "map")
+
+
+def map_errors(
+    source: Path | FittedMap,
+    asked: PlacesAsked,
+    error: str | None = None,
+    probe: str | None = None,
+    draws: Draws | None = None,
+    with_budget: bool = False,
+    tasks: Sequence[Experiment] = (),
+) -> MachineErrors | FittedErrorMap | ErrorCurves:
+    """Errors of a machine file or of a map at the places asked for, and of the lengths of an
+    experiments with `tasks`, or one of its error functions.
+
+    :raises ExperimentError: the file is wrong.
+    :raises ValueError: what does not go together, or is not in the machine.
+    """
+    if error is not None:
+        given = {**vars(asked), "probe": probe, "draw": draws, "budget": with_budget or None}
+        given["tasks"] = tasks or None
+        others = [name for name, value in given.items() if value is not None]
+        if others:
+            raise ValueError(f"{others[0]} and error do not go together; give one of them")
+    if isinstance(source, Path) and not is_map_file(source):
+        if probe is not None:
+            raise ValueError("a machine file states its own probe; leave the probe out")
+        if tasks:
+            raise ValueError("tasks are measured by a map of a fit; leave them out")
+        return machine_errors(source, asked, error, draws, with_budget)
+    fitted, label = map_of_source(source)
+    if error is not None:
+        return error_curves(fitted, label, (error,))
+    lengths = [tasks_of_experiment(fitted, one) for one in tasks]
+    wanted = reduce(Tasks.beside, lengths) if lengths else None
+    return fitted_map_errors(fitted, label, asked, probe, draws, with_budget, wanted)

@@ -1,0 +1,323 @@
+"""Maps that are compared: the errors of a machine with the covariance of its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from ballplate.results.campaign_tests import EstimatedSigma
+from ballplate.results.fit import Fit
+from ballplate.results.map_of_fit import data_of, maps_known
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.geometry.motions import cross_matrices, pose_size
+from ballplate.simulator.inputs.quantities import LengthFunction
+from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.machines.description import MachineDescription
+from ballplate.simulator.machines.plane import PlaneModel
+from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
+from ballplate.simulator.maps.fit_verdict import LackOfFit
+from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
+from ballplate.simulator.readings.same_readings import (
+    position_fingerprints,
+    same_positions,
+    same_readings,
+)
+
+from .volumetric_errors import Volumetric
+
+# Points at random in a volume, besides one for each parameter, at which a model is asked whether it
+# can do a motion of its frame.
+POINTS = 20
+# Largest part of a motion that may be left over where a model contains it.
+CONTAINED = 1e-6
+
+MOTIONS = {
+    2: ("shift along x", "shift along y", "turn about z"),
+    3: (
+        *(f"shift along {axis}" for axis in "xyz"),
+        *(f"turn about {axis}" for axis in "xyz"),
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class MappedValues:
+    """Functions (m,) with their `values`, a square `root` (m, r) of their covariance, and how much
+    undetermined directions change them, `null` (m, k), of what any could, `size` (m,).
+
+    `shared` (m, q) is what the standard deviations of values that both maps rest on make of them;
+    their part of the covariance is not in that of the root.
+    """
+
+    values: Array
+    root: Array
+    null: Array
+    size: Array
+    shared: Array
+
+    def by(self, matrix: Array) -> MappedValues:
+        """Linear functions of these, by a matrix (k, m)."""
+        return MappedValues(
+            matrix @ self.values,
+            matrix @ self.root,
+            matrix @ self.null,
+            np.abs(matrix) @ self.size,
+            matrix @ self.shared,
+        )
+
+    def without(self, basis: Array) -> MappedValues:
+        """These less their parts in a space of changes of orthonormal columns (m, k)."""
+
+        def rest(some: Array) -> Array:
+            return np.asarray(some - basis @ (basis.T @ some))
+
+        # Twice, because the second pass takes out what rounding left of a large part in the first.
+        values, root, null, shared = (
+            rest(rest(one)) for one in (self.values, self.root, self.null, self.shared)
+        )
+        return MappedValues(values, root, null, self.size, shared)
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedMap:
+    """The errors of a machine by a `model` with the parameters `values` (n,), of which `root`
+    (n, r) is a square root of the covariance and `undetermined` (n, k) what is open.
+
+    `shared` (n, q) is the effect of one standard deviation of each value that both maps rest on,
+    which is not in the root; `absorbed` (q, r) are its rows of the root of the hat matrix. `sigma`
+    is a factor of both, and `degrees_of_freedom` are those that it comes from, infinite where
+    uncertainties are as stated. `offsets` are those of probes by name, `probe` the one that is
+    meant where none is named. Derivatives are taken at the parameters `about` (n,), by default the
+    values; two maps of the same model have them in common, as otherwise their spaces of errors
+    would differ by what is of second order. `fit` has the balls of plates, and `data` are the
+    readings that the map comes from with their `lack_of_fit`, where they are known; `cautions` are
+    those of the fit. `is_expected`: nothing was measured, and the map is exact but for what is
+    stated, of which `stated` is the standard uncertainty of lengths.
+    """
+
+    label: str
+    title: str
+    model: ErrorModel
+    values: Array
+    root: Array
+    undetermined: Array
+    shared: Array
+    degrees_of_freedom: float
+    volume: Volume
+    offsets: Mapping[str, Array]
+    probe: str = ""
+    date: str | None = None
+    fit: Fit | None = None
+    is_expected: bool = False
+    stated: LengthFunction | None = None
+    absorbed: Array | None = None
+    sigma: float = 1.0
+    about: Array | None = None
+    data: MapData | None = None
+    lack_of_fit: LackOfFit | None = None
+    cautions: tuple[str, ...] = ()
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3, the number of machine axes."""
+        return self.model.dimension
+
+    @property
+    def scatter(self) -> EstimatedSigma:
+        """The campaign's sigma."""
+        return EstimatedSigma(self.sigma, self.degrees_of_freedom)
+
+    def displacements(self, points: Array, offset: Array) -> MappedValues:
+        """Errors (n d,) at scale readings `points` (n, d) of a tip with an `offset` (d,), in
+        metres: where the tip is less where the scales say.
+        """
+        offsets = np.broadcast_to(offset, points.shape)
+        rows = self.rows(points, offset)
+        drawn = self.model.jacobian(points, np.zeros(len(self.values)), offsets)
+        drawn = drawn.reshape(rows.shape)
+        effects = [one.effect for one in self.model.parameters]
+        return MappedValues(
+            (self.model.error(points, self.values, offsets) - offsets).ravel(),
+            rows @ self.root,
+            drawn @ self.undetermined,
+            np.linalg.norm(drawn / np.array(effects), axis=1),
+            rows @ self.shared,
+        )
+
+    def rows(self, points: Array, offset: Array) -> Array:
+        """Derivatives (n d, parameters) of the errors at `points` (n, d) by the parameters."""
+        offsets = np.broadcast_to(offset, points.shape)
+        about = self.values if self.about is None else self.about
+        return self.model.jacobian(points, about, offsets).reshape(points.size, -1)
+
+    def line(self, function: str, t: Array) -> MappedValues | None:
+        """An error function at fractions `t` (m,) of its axis; None where it has several lines."""
+        lines = self.model.lines(function, t) if isinstance(self.model, HasLines) else ()
+        if len(lines) != 1:
+            return None
+        own = [k for k, one in enumerate(self.model.parameters) if one.function == function]
+        basis = lines[0].basis
+        effects = np.array([self.model.parameters[k].effect for k in own])
+        return MappedValues(
+            basis @ self.values[own],
+            basis @ self.root[own],
+            basis @ self.undetermined[own],
+            np.linalg.norm(basis / effects, axis=1),
+            basis @ self.shared[own],
+        )
+
+    @cached_property
+    def held(self) -> tuple[str, ...]:
+        """Motions of the frame, and turns of the probe, that conditions of the model's frame take
+        out: none of its parameters can make them.
+        """
+        return self._held()
+
+    @single_threaded
+    def _held(self) -> tuple[str, ...]:
+        d, volume = self.dimension, self.volume
+        generator = np.random.default_rng(np.random.SeedSequence(0))
+        count = POINTS + len(self.values)
+        x = generator.uniform(volume.lower, volume.upper, (count, d))
+        offsets = 0.1 * volume.size.max() * generator.uniform(-1.0, 1.0, x.shape)
+        wanted = np.concatenate([motions(x), motions(offsets)[:, :, d:]], axis=2)
+        wanted = wanted.reshape(x.size, -1)
+        wanted /= np.linalg.norm(wanted, axis=0)
+        columns = self.model.jacobian(x, np.zeros(len(self.values)), offsets).reshape(x.size, -1)
+        size = np.linalg.norm(columns, axis=0)
+        columns = columns / np.where(size > 0.0, size, 1.0)
+        left = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=1e-12)[0]
+        names = (*MOTIONS[d], *(f"{name} of the probe" for name in MOTIONS[d][d:]))
+        missing = np.linalg.norm(left, axis=0) > CONTAINED
+        return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
+
+
+def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:
+    """A square root (m, k) of a covariance without the part of some errors, and the effects (m, q)
+    of one standard deviation of each; `absorbed` (q, k) are their rows of the root of the hat
+    matrix.
+    """
+    if absorbed is None:
+        return root, np.zeros((len(root), 0))
+    _, sizes, axes = np.linalg.svd(absorbed, full_matrices=False)
+    kept = np.sqrt(np.maximum(1.0 - sizes**2, 0.0))
+    return root - (root @ axes.T * (1.0 - kept)) @ axes, root @ absorbed.T
+
+
+def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
+    """What two maps have of each other's readings, which fits compare one by one."""
+    found = readings_in_common(first.data, second.data)
+    one, other = first.fit, second.fit
+    if found == "same" or one is None or other is None:
+        return found
+    read = same_readings(one.observed, other.observed)
+    knows_alike = maps_known(one.experiment) == maps_known(other.experiment)
+    if read == "same":
+        return "same" if knows_alike else "some"
+    return "some" if "some" in (found, read) else "none"
+
+
+def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
+    """Positions whose readings two maps have in common, by their names where one is a fit, or how
+    many they are.
+    """
+    if first.fit is not None and second.fit is not None:
+        read = same_positions(first.fit.observed, second.fit.observed)
+        if read:
+            return read
+    if first.data is None or second.data is None:
+        return ()
+    common = first.data.common(second.data)
+    for fit in filter(None, (second.fit, first.fit)):
+        prints = position_fingerprints(fit.observed)
+        if common <= set(prints.values()):
+            return tuple(name for name, one in prints.items() if one in common)
+    return (number_of(len(common), "position"),) if common else ()
+
+
+def motions(points: Array) -> Array:
+    """What small motions of the frame do at `points` (n, d): (n, d, 6), or (n, d, 3) in the plane;
+    shifts in metres, turns about the origin in radians.
+    """
+    n, d = points.shape
+    found = np.zeros((n, d, pose_size(d)))
+    found[:, range(d), range(d)] = 1.0
+    if d == 3:
+        found[:, :, d:] = cross_matrices(points)
+    else:
+        found[:, 0, d], found[:, 1, d] = -points[:, 1], points[:, 0]
+    return found
+
+
+def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMap:
+    """The map that a fit has estimated.
+
+    :raises ValueError: the fit has not converged.
+    """
+    at = fit.functions.at
+    design, own = at.design, at.layout.model
+    # Such as those of maps that are prior knowledge.
+    doubts = () if fit.experiment is None else fit.experiment.doubts
+    return ComparedMap(
+        label or fit.label,
+        fit.title,
+        design.model,
+        at.state.a,
+        fit.sigma * at.shared[own],
+        at.shared_null[own],
+        np.zeros((len(at.state.a), 0)),
+        fit.degrees_of_freedom if fit.sigma_is_estimated else np.inf,
+        design.machine.volume,
+        dict(zip(design.probes.names, at.state.probes, strict=True)),
+        design.probes.names[design.evaluation.probe],
+        date,
+        fit,
+        data=data_of(fit.observed, fit.experiment),
+        lack_of_fit=fit.lack_of_fit,
+        cautions=(*doubts, *fit.cautions, fit.complaint),
+        sigma=fit.sigma,
+    )
+
+
+def expected_map(
+    machine: MachineDescription,
+    label: str,
+    dimension: int,
+    stated: LengthFunction | None = None,
+    date: str | None = None,
+) -> ComparedMap:
+    """The map that a machine file describes, of two dimensions that at its reference point.
+
+    It is exact, but for squareness errors and temperatures of which the file states how well they
+    are known, and for `stated`, the standard uncertainty of lengths. Bandwidths are scatter of
+    single approaches, which no map has.
+    """
+    described = Volumetric(machine)
+    model: ErrorModel = described.truth.model
+    known, deviations = described.lasting
+    names = [one.name for one in model.parameters]
+    root = np.zeros((len(names), len(deviations)))
+    for k, (field, deviation) in enumerate(zip(known.fields, deviations, strict=True)):
+        root[names.index(field.name), k] = deviation
+    lower, upper = np.array(machine.lower), np.array(machine.upper)
+    if dimension == 2:
+        model, lower, upper = PlaneModel(model, machine.reference[2]), lower[:2], upper[:2]
+    none = np.zeros((len(names), 0))
+    return ComparedMap(
+        label,
+        machine.title,
+        model,
+        described.truth.a,
+        root,
+        none,
+        none,
+        np.inf,
+        Volume(lower, upper),
+        {},
+        date=date,
+        is_expected=True,
+        stated=stated,
+    )

@@ -1,0 +1,339 @@
+"""Comparison of two maps: by length, by place, by error function, and of plates by ball."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ballplate.results.campaign_tests import orthonormal
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines, Integers
+
+from .compared_maps import MOTIONS, ComparedMap, motions
+from .normalised_errors import FigureGroup, JointTest, ValueDifference
+from .plates import PlateDifference, plate_differences
+
+# Places along an axis at which error functions are compared, by fractions of it.
+PLACES = np.linspace(0.1, 1.0, 10)
+# Points of the volume at random, at the least, for the test of the map as a whole.
+LEAST_POINTS = 150
+# Points that lengths are compared between: with more, all pairs take long.
+MOST_POINTS = 200
+# Where a corner differs from another in so many axes, their length is one of these.
+OF_CORNERS = {1: "edges", 2: "face diagonals", 3: "body diagonals"}
+# What makes error functions of two models the same ones.
+SAME = ("arrangement", "lower", "upper", "origin", "full_rotations", "spatial", "z", "chain")
+
+
+@dataclass(frozen=True)
+class ComparisonSettings:
+    """How maps are compared: with which `coverage_factor`, on a grid of so many points along each
+    axis, or at `points` (n, d) in metres or those of a file, and with which probe.
+    """
+
+    coverage_factor: float = 2.0
+    grid: int = 4
+    points: Array | Path | None = None
+    probe: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionDifference:
+    """An error function: its figures along the axis at fractions `t`, and all of it together."""
+
+    name: str
+    axis: str
+    figures: FigureGroup
+    test: JointTest | None
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMotion:
+    """The free motion between the frames of two maps, with `names` and units: what has to be added
+    to the errors of the first so that they come nearest to those of the second.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    standard_uncertainties: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MapComparison:
+    """All that is compared: `lengths` in groups, errors at `points` (n, d) after the `motion` was
+    taken out, error functions, plates, and the test of the map as a whole.
+    """
+
+    volume: Volume
+    probe: str
+    points: Array
+    motion: FrameMotion
+    lengths: tuple[FigureGroup, ...]
+    places: FigureGroup
+    functions: tuple[FunctionDifference, ...]
+    why_no_functions: str
+    plates: tuple[PlateDifference, ...]
+    test: JointTest | None
+
+    @property
+    def groups(self) -> tuple[FigureGroup, ...]:
+        """All figures, in the order in which they are told."""
+        of_functions = (one.figures for one in self.functions)
+        return (*self.lengths, self.places, *of_functions, *(one.figures for one in self.plates))
+
+
+class NotComparableError(ValueError):
+    """Two maps that have nothing in common to be compared."""
+
+
+@single_threaded
+def compared(
+    first: ComparedMap, second: ComparedMap, settings: ComparisonSettings
+) -> MapComparison:
+    """Compare two maps.
+
+    :raises NotComparableError: machines of other dimensions or volumes, no common probe, or points
+        outside.
+    """
+    if first.dimension != second.dimension:
+        axes = f"{first.dimension} and {second.dimension}"
+        raise NotComparableError(f"the machines have {axes} axes; compare maps of the same machine")
+    first, second = _linearised_alike(first, second)
+    volume = _common_volume(first, second)
+    probe, offsets = _offsets(first, second, settings.probe)
+    scatters = first.scatter, second.scatter
+    k = settings.coverage_factor
+
+    def at(points: Array, offset: Array) -> ValueDifference:
+        one, other = (each.displacements(points, offset) for each in (first, second))
+        return ValueDifference(one, other, scatters)
+
+    reference = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
+    points = settings.points if isinstance(settings.points, np.ndarray) else reference
+    _refuse_outside(points, volume)
+    found, offset = at(points, offsets[probe]), offsets[probe]
+    # The motion is that of the volume, wherever points were asked for.
+    middle = reference.mean(axis=0)
+    moving = motions(reference - middle).reshape(reference.size, -1)
+    to_motion = np.asarray(np.linalg.pinv(moving))
+    motion = at(reference, offset).by(to_motion)
+    if points is reference:
+        left = found.without(orthonormal(moving))
+    else:
+        there = motions(points - middle).reshape(points.size, -1)
+        less = np.concatenate([np.eye(points.size), -there @ to_motion], axis=1)
+        left = at(np.concatenate([points, reference]), offset).by(less)
+    names = tuple(
+        f"{axis} at {place}" for place in map(_place, points) for axis in AXIS_NAMES[: len(middle)]
+    )
+    corners = even_grid(volume.lower, volume.upper, [2] * len(volume.lower))
+    of_corners = at(corners, offset)
+    lengths = [
+        _lengths(of_corners, corners, kind, pairs, (first, second), k)
+        for kind, pairs in _of_corners(corners)
+    ]
+    pairs = np.array(list(combinations(range(len(points)), 2)), np.int64).reshape(-1, 2)
+    pairs = pairs[(points[pairs[:, 0]] != points[pairs[:, 1]]).any(axis=1)]
+    what = "lengths through the volume" if settings.points is None else "lengths between the points"
+    lengths.append(_lengths(found, points, what, pairs, (first, second), k))
+    functions, why = _functions(first, second, k)
+    count = max(LEAST_POINTS, *(len(one.values) for one in (first, second)))
+    return MapComparison(
+        volume,
+        probe,
+        points,
+        FrameMotion(MOTIONS[len(middle)], motion.values, motion.standard_uncertainties()),
+        tuple(lengths),
+        left.group("errors at points of the volume", "m", names, k),
+        functions,
+        why,
+        plate_differences(first, second, k),
+        _whole(at, volume, offsets, count),
+    )
+
+
+def _linearised_alike(first: ComparedMap, second: ComparedMap) -> tuple[ComparedMap, ComparedMap]:
+    """Both maps with derivatives at the same parameters, where they have the same."""
+    both = [[(p.name, p.effect) for p in one.model.parameters] for one in (first, second)]
+    if type(first.model) is not type(second.model) or both[0] != both[1]:
+        return first, second
+    about = 0.5 * (first.values + second.values)
+    return replace(first, about=about), replace(second, about=about)
+
+
+def _common_volume(first: ComparedMap, second: ComparedMap) -> Volume:
+    lower = np.maximum(first.volume.lower, second.volume.lower)
+    upper = np.minimum(first.volume.upper, second.volume.upper)
+    if (upper <= lower).any():
+        raise NotComparableError("the volumes of the two maps do not overlap; check their axes")
+    return Volume(lower, upper)
+
+
+def _offsets(
+    first: ComparedMap, second: ComparedMap, probe: str | None
+) -> tuple[str, dict[str, Array]]:
+    """The probe that is compared with, and offsets (d,) of all that the maps have in common.
+
+    An offset of the first map serves for both: it is shifted by less than matters wherever probes
+    were qualified anew.
+    """
+    has = [one for one in (first, second) if not one.is_expected]
+    if not has:
+        # Two described machines: the reference point itself.
+        return "", {"": np.zeros(first.dimension)}
+    offsets = {
+        name: offset
+        for name, offset in has[0].offsets.items()
+        if all(name in one.offsets for one in has)
+    }
+    if probe is None:
+        ranked = [one.probe for one in has if one.probe in offsets] or list(offsets)
+        if not ranked:
+            text = ", ".join(f"{one.label} has {', '.join(one.offsets)}" for one in has)
+            raise NotComparableError(f"the maps have no probe of the same name: {text}")
+        probe = ranked[0]
+    if probe not in offsets:
+        known = ", ".join(offsets) or "none"
+        raise NotComparableError(f'no probe "{probe}" in both maps; in both: {known}')
+    return probe, offsets
+
+
+def _refuse_outside(points: Array, volume: Volume) -> None:
+    slightly = 1e-9 * volume.size
+    outside = (points < volume.lower - slightly) | (points > volume.upper + slightly)
+    if outside.any():
+        where = _place(points[int(outside.any(axis=1).argmax())])
+        raise NotComparableError(
+            f"the point {where} is outside the volume of both maps; leave it out"
+        )
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise NotComparableError(f"{len(points)} points; give 2 to {MOST_POINTS}")
+
+
+def _place(point: Array) -> str:
+    return f"({', '.join(f'{1e3 * value:.6g}' for value in point)}) mm"
+
+
+def _of_corners(corners: Array) -> Iterator[tuple[str, Integers]]:
+    """Pairs of corners by the kind of their length, the longest first."""
+    d = corners.shape[1]
+    for apart in range(d, 0, -1):
+        pairs = [
+            pair
+            for pair in combinations(range(len(corners)), 2)
+            if int((corners[pair[0]] != corners[pair[1]]).sum()) == apart
+        ]
+        yield "diagonals" if d == apart == 2 else OF_CORNERS[apart], np.array(pairs)
+
+
+def _lengths(
+    found: ValueDifference,
+    points: Array,
+    kind: str,
+    pairs: Integers,
+    maps: tuple[ComparedMap, ComparedMap],
+    coverage_factor: float,
+) -> FigureGroup:
+    """Lengths between pairs (m, 2) of points for the same scale readings: no motion of a frame
+    changes them.
+    """
+    n, d = points.shape
+    apart = points[pairs[:, 1]] - points[pairs[:, 0]]
+    length = np.linalg.norm(apart, axis=1)
+    matrix = np.zeros((len(pairs), n, d))
+    rows = np.arange(len(pairs))
+    matrix[rows, pairs[:, 1]] = apart / length[:, None]
+    matrix[rows, pairs[:, 0]] = -apart / length[:, None]
+    names = tuple(f"{_place(points[i])} to {_place(points[j])}" for i, j in pairs.tolist())
+    first, second = (
+        0.0 if one.stated is None else np.square(one.stated.at(length)) for one in maps
+    )
+    return found.by(matrix.reshape(len(pairs), -1)).group(
+        kind, "m", names, coverage_factor, (first, second)
+    )
+
+
+def _functions(
+    first: ComparedMap, second: ComparedMap, coverage_factor: float
+) -> tuple[tuple[FunctionDifference, ...], str]:
+    """Error functions that both maps have, or why they are not compared."""
+    names = [
+        list(dict.fromkeys(p.function for p in one.model.parameters)) for one in (first, second)
+    ]
+    if not all(isinstance(one.model, HasLines) for one in (first, second)):
+        return (), "a model without error functions of one variable"
+    if not _have_same_functions(first.model, second.model) or set(names[0]) != set(names[1]):
+        return (), "the models, or the conditions of their frames, differ"
+    found = []
+    scatters = first.scatter, second.scatter
+    dense = np.linspace(0.0, 1.0, 4 * max(len(first.values), 8))
+    for name in names[0]:
+        parameter = next(p for p in first.model.parameters if p.function == name)
+        is_number = sum(p.function == name for p in first.model.parameters) == 1
+        whole, others = (one.line(name, dense) for one in (first, second))
+        # Along the whole axis: a straightness is zero at both ends.
+        constant = is_number and all(
+            one is not None and float(np.ptp(one.values)) == 0.0 for one in (whole, others)
+        )
+        t = np.array([1.0]) if constant else PLACES
+        one, other = (each.line(name, t) for each in (first, second))
+        if one is None or other is None or whole is None or others is None:
+            continue
+        words = (name,) if constant else tuple(f"{name} at {100 * place:.0f} %" for place in t)
+        figures = ValueDifference(one, other, scatters).group(
+            name, parameter.unit, words, coverage_factor
+        )
+        test = ValueDifference(whole, others, scatters).joint_test(name)
+        found.append(FunctionDifference(name, parameter.meaning, figures, test))
+    return tuple(found), "" if found else "the models have no error functions of one variable"
+
+
+def _have_same_functions(one: ErrorModel, other: ErrorModel) -> bool:
+    """Whether error functions of the same name are the same in both models: in the same frame and
+    volume, whatever their numbers of coefficients.
+    """
+    if type(one) is not type(other):
+        return False
+    for name in SAME:
+        ours, theirs = getattr(one, name, None), getattr(other, name, None)
+        is_same = ours == theirs
+        if isinstance(ours, ErrorModel) and isinstance(theirs, ErrorModel):
+            is_same = _have_same_functions(ours, theirs)
+        if not is_same:
+            return False
+    return True
+
+
+def _whole(at: Any, volume: Volume, offsets: dict[str, Array], count: int) -> JointTest | None:
+    """The test of errors through the volume with all common probes together, whatever the frame
+    and the offsets of the probes.
+    """
+    d = len(volume.lower)
+    generator = np.random.default_rng(np.random.SeedSequence(1))
+    points = generator.uniform(volume.lower, volume.upper, (count, d))
+    parts = [at(points, offset) for offset in offsets.values()]
+    moving = motions(points - points.mean(axis=0)).reshape(points.size, -1)
+    free = np.zeros((len(parts), points.size, moving.shape[1] + d * (len(parts) - 1)))
+    free[:, :, : moving.shape[1]] = moving
+    for k in range(1, len(parts)):
+        start = moving.shape[1] + d * (k - 1)
+        free[k, :, start : start + d] = np.tile(np.eye(d), (count, 1))
+    basis = orthonormal(free.reshape(-1, free.shape[2]))
+    joined = [
+        type(one)(
+            *(
+                np.concatenate([getattr(getattr(part, side), name) for part in parts])
+                for name in ("values", "root", "null", "size", "shared")
+            )
+        )
+        for side, one in (("first", parts[0].first), ("second", parts[0].second))
+    ]
+    found = ValueDifference(joined[0], joined[1], parts[0].scatters)
+    return found.without(basis).joint_test("errors through the volume")

@@ -1,0 +1,219 @@
+"""A fitted map in another error model, and what is lost by that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.formatting import (
+    aligned,
+    amount_of,
+    as_data,
+    number,
+    to_uncertainty,
+)
+from ballplate.presentation.result import Result
+from ballplate.results.map_of_fit import FRAMES
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.experiment.stated_models import stated_model
+from ballplate.simulator.maps.corrected_points import corrected_with_root
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
+from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
+from ballplate.simulator.maps.largest_differences import (
+    Differences,
+    LargestDifference,
+    largest_at_points,
+    largest_of_lengths,
+)
+from ballplate.simulator.maps.map_conversion import MapConversion, converted
+
+# Points between which lengths have the uncertainty that is stated beside their difference.
+POINTS = 60
+
+# Residuals in metres below which the new model can do all that the old one did.
+EXACT = 1e-12
+
+
+@dataclass(frozen=True, repr=False)
+class ConvertedMap(Result):
+    """A map in another error model: its parameters with their uncertainties, and the residuals.
+
+    `points_searched` and `lengths_searched` have the largest differences of corrected points and of
+    lengths by both maps, and `length_uncertainty` the root mean square of the standard ones that
+    the old map gives, None where these are undetermined; all in metres.
+    """
+
+    label: str
+    old: FittedMap
+    conversion: MapConversion
+    points_searched: LargestDifference
+    lengths_searched: LargestDifference
+    length_uncertainty: float | None
+
+    @property
+    def title(self) -> str:
+        return self.old.title
+
+    @property
+    def map(self) -> FittedMap:
+        """The new map, which says what it was converted from."""
+        converted = self.conversion.converted
+        name = f"conversion from {self.old.settings['kind']}"
+        residual = 0.0 if self.is_exact else self.residual[0]
+        one = LeftOut(name, CONVERSION, "m", residual, None)
+        earlier = (other for other in converted.left_out if other.kind != CONVERSION)
+        return replace(converted, left_out=(*earlier, one))
+
+    @property
+    def residual(self) -> tuple[float, float]:
+        """Largest and root mean square residual of a corrected point, in metres."""
+        return self.points_searched.largest, self.points_searched.rms
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Largest and root mean square difference of a length by both maps, in metres."""
+        return self.lengths_searched.largest, self.lengths_searched.rms
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the new model can do all that the old one did."""
+        return self.residual[0] < EXACT + 1e-6 * self._largest
+
+    @property
+    def _largest(self) -> float:
+        """The largest error there is."""
+        x, p = self.conversion.places, self.conversion.offsets
+        return float(np.abs(self.old.model.error(x, self.old.values, p) - p).max())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        caution = self.old.known_lack_of_fit.caution
+        return (f"warning: {caution}",) if caution else ()
+
+    def headline(self) -> str:
+        kind = self.map.settings["kind"]
+        if self.is_exact:
+            return f"{kind}, {len(self.map.values)} parameters, the same corrections"
+        return (
+            f"{kind}, {len(self.map.values)} parameters, residual {1e6 * self.residual[1]:.3g} µm"
+            " rms"
+        )
+
+    def lines(self) -> list[str]:
+        old, new, k = self.old, self.map, self.old.coverage_factor
+        lines = [
+            f"{self.label}: {self.title}",
+            verdict_line(old.lack_of_fit),
+            (
+                f"from {old.settings['kind']}, {len(old.values)} parameters, to"
+                f" {new.settings['kind']}, {len(new.values)} parameters"
+            ),
+        ]
+        if self.is_exact:
+            lines.append("the new error model does all that the old one did")
+        else:
+            largest, rms = (number(1e6 * one, 3) for one in self.residual)
+            places = self.points_searched.places
+            lines.append(
+                "the new error model cannot follow the old one exactly: corrected points differ by"
+                f" {largest} µm at most and {rms} µm rms, by a search from {places}"
+                " points on a grid with corners and edges and at random, with the probes of the map"
+                " and tips along each axis; uncertainties do not contain that"
+            )
+        largest, rms = (number(1e6 * one, 3) for one in self.lengths)
+        beside = (
+            "lengths are undetermined"
+            if self.length_uncertainty is None
+            else f"U (k = {k:g}) of these lengths is {number(1e6 * k * self.length_uncertainty, 3)}"
+            " µm rms"
+        )
+        lines.append(
+            f"lengths differ by {largest} µm at most and {rms} µm rms, by a search from"
+            f" {self.lengths_searched.places} pairs of points, with one of the map's probes each;"
+            f" {beside}"
+        )
+        if np.abs(self.conversion.motion).max() > EXACT:
+            d = old.dimension
+            shift, turn = (np.abs(one).max() for one in np.split(self.conversion.motion, [d]))
+            lines.append(
+                "between the frames of the two models lies a rigid motion, which changes no length:"
+                f" a shift of {number(1e6 * float(shift), 3)} µm and a turn of"
+                f" {number(1e6 * float(turn), 3)} µrad about one axis at most"
+            )
+        rows = [["parameter", "value", "standard uncertainty", "unit"]]
+        for row in self.rows():
+            value, unit = amount_of(row["value"], row["unit"])
+            u, _ = amount_of(row["standard uncertainty"], row["unit"])
+            rows.append([row["parameter"], to_uncertainty(value, u), number(u, 3), unit])
+        return [*lines, "", *aligned(rows, [False, True, True, False])]
+
+    def to_dict(self) -> dict[str, Any]:
+        found: dict[str, Any] = as_data(
+            {
+                "map": self.label,
+                "title": self.title,
+                "error_model": dict(self.map.settings),
+                "lack_of_fit": verdict_data(self.old.lack_of_fit),
+                "exact": self.is_exact,
+                "residual": {**vars(self.points_searched), "unit": "m"},
+                "lengths": {
+                    **vars(self.lengths_searched),
+                    "standard_uncertainty": self.length_uncertainty,
+                    "unit": "m",
+                },
+                "motion": self.conversion.motion,
+                "parameters": self.rows(),
+            }
+        )
+        return found
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each parameter of the new map."""
+        uncertainties = self.map.standard_uncertainties()
+        told = zip(
+            self.map.parameters, self.map.estimates.tolist(), uncertainties.tolist(), strict=True
+        )
+        return [
+            {
+                "parameter": one.name,
+                "value": float("nan") if np.isnan(u) else value,
+                "standard uncertainty": u,
+                "unit": one.unit,
+            }
+            for one, value, u in told
+        ]
+
+
+def _corrections(fitted: FittedMap) -> Differences:
+    """Corrected points of a map by scale readings and probe offsets."""
+    return lambda x, p: np.asarray(x + fitted.model.error(x, fitted.values, p))
+
+
+@single_threaded
+def convert(fitted: FittedMap, to: str, label: str) -> ConvertedMap:
+    """A map in the error model that a text states, see `stated_model`.
+
+    :raises ExperimentError: it states none.
+    """
+    target = stated_model(to, fitted.volume, "--to")
+    found = converted(fitted, target.model, target.settings, FRAMES[target.kind])
+    generator = np.random.default_rng(np.random.SeedSequence(1))
+    points = fitted.volume.lower + fitted.volume.size * generator.random((POINTS, fitted.dimension))
+    old, root = corrected_with_root(fitted, points)
+    first, second = np.triu_indices(POINTS, 1)
+    unit = old[first] - old[second]
+    unit /= np.linalg.norm(unit, axis=1)[:, None]
+    u = np.linalg.norm(np.einsum("md,mdr->mr", unit, root[first] - root[second]), axis=1)
+    known = bool(np.isfinite(u).all())
+    probes = np.unique(fitted.probes.offsets, axis=0)
+    return ConvertedMap(
+        label,
+        fitted,
+        found,
+        largest_at_points(found.differences, fitted.volume, found.tips),
+        largest_of_lengths(
+            _corrections(fitted), _corrections(found.converted), fitted.volume, probes
+        ),
+        float(np.sqrt((u**2).mean())) if known else None,
+    )

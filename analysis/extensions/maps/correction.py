@@ -1,0 +1,417 @@
+"""Points corrected by a fitted map, and lengths between them, with their uncertainties."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TextIO
+
+import numpy as np
+from ballplate.presentation.formatting import aligned, finite, number, picked, to_uncertainty
+from ballplate.presentation.result import Result
+from ballplate.results.adjustments import few_degrees_of_freedom, freedom_words
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.objects import Flags, Tasks
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.inputs.settings import listing, number_of
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.corrected_points import (
+    corrected_with_blocks,
+    corrected_with_root,
+    tips,
+)
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
+from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap
+from ballplate.simulator.maps.mapped_lengths import mapped_lengths
+from ballplate.simulator.readings.point_files import GivenPoints
+from ballplate.uncertainty.scale import stretches
+
+# Points and lengths that the text shows.
+SHOWN = 20
+# Co-ordinates of a covariance, whose size grows with their square.
+MOST_CO_ORDINATES = 2000
+
+
+@dataclass(frozen=True)
+class CorrectedLength:
+    """A length on the corrected machine: `read` is what the scales say, with the stated offsets of
+    probes. The standard uncertainty is NaN where the length is undetermined; all in metres.
+    `target` is what it is to be within, where that is stated.
+    """
+
+    name: str
+    read: float
+    value: float
+    standard_uncertainty: float
+    target: Target | None = None
+
+    @property
+    def is_met(self) -> bool | None:
+        """Whether the uncertainty is within the target; None without one."""
+        if self.target is None:
+            return None
+        return bool(self.standard_uncertainty <= self.target.at(self.value))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Correction(Result):
+    """Scale readings that were `given`, corrected: `points` (n, d) in metres and the covariance
+    `blocks` (n, d, d) of each by itself in square metres, NaN where undetermined.
+
+    With `scatter`, by which the stated repeatability is multiplied, the readings' own scatter is
+    part of all uncertainties; without, it is 0. `coverage_factor` is that of expanded ones.
+    `outside` (n,) are points outside the volume, for which the map is extrapolated.
+    """
+
+    fitted: FittedMap
+    given: GivenPoints
+    points: Array
+    blocks: Array
+    lengths: tuple[CorrectedLength, ...]
+    coverage_factor: float
+    scatter: float = 0.0
+
+    @property
+    def label(self) -> str:
+        return self.fitted.experiment or "map"
+
+    @property
+    def title(self) -> str:
+        return self.fitted.title
+
+    @property
+    def standard_uncertainties(self) -> Array:
+        """Of each co-ordinate (n, d), in metres."""
+        return np.asarray(np.sqrt(np.diagonal(self.blocks, axis1=1, axis2=2)))
+
+    @property
+    def expanded_uncertainties(self) -> Array:
+        """Coverage factor times the standard uncertainties (n, d), in metres."""
+        return self.coverage_factor * self.standard_uncertainties
+
+    @property
+    def corrections(self) -> Array:
+        """What is added (n, d) to where the tips are by the scales with the stated offsets of
+        probes, in metres; the error of indication has the opposite sign.
+        """
+        return np.asarray(self.points - tips(self.fitted, self.given.points, self.given.probes))
+
+    @property
+    def outside(self) -> Flags:
+        x, (lower, upper) = self.given.points, self.fitted.volume.of_readings
+        return np.asarray(((x < lower) | (x > upper)).any(axis=1))
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a co-ordinate or a length is undetermined."""
+        lengths = [one.standard_uncertainty for one in self.lengths]
+        return bool(np.isnan(self.points).any() or np.isnan(lengths).any())
+
+    def covariance(self) -> Array:
+        """Of all co-ordinates together (n d, n d), those of a point side by side, in square metres;
+        NaN where undetermined.
+
+        :raises ValueError: there are too many.
+        """
+        if self.points.size > MOST_CO_ORDINATES:
+            text = (
+                f"the covariance of {self.points.size} co-ordinates is too large; at most"
+                f" {MOST_CO_ORDINATES} are possible: correct fewer points at once"
+            )
+            raise ValueError(text)
+        _, root = corrected_with_root(self.fitted, self.given.points, self.given.probes)
+        flat = root.reshape(-1, root.shape[2])
+        of_readings = np.tile((self.scatter * self.fitted.repeatability) ** 2, len(self.points))
+        return np.asarray(flat @ flat.T + np.diag(of_readings))
+
+    def headline(self) -> str:
+        u = self.expanded_uncertainties
+        open_ = int(np.isnan(u).any(axis=1).sum())
+        count = number_of(len(self.points), "point")
+        if np.isnan(u).all():
+            return f"{count}, undetermined"
+        told = f", {open_} of them undetermined" if open_ else ""
+        largest = float(np.nanmax(u))
+        return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(f"warning: {one}" for one in self.warnings)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user of the points has to know: extrapolation, few degrees of freedom, what is not
+        applied.
+        """
+        fitted, found = self.fitted, [self.fitted.known_lack_of_fit.caution]
+        outside = np.flatnonzero(self.outside)
+        if len(outside):
+            words = listing((self.given.name(int(i)) for i in outside), 3)
+            found.append(
+                f"{len(outside)} of {len(self.points)} points lie outside the volume of the map,"
+                f" where it is extrapolated and its uncertainty need not hold: {words}"
+            )
+        if fitted.without_scatter:
+            found.append(
+                "the readings of the map agree with its model but for rounding, as computed ones"
+                " do: its uncertainties are zero, too, and cannot be relied on"
+            )
+        if fitted.sigma_is_estimated:
+            remedy = f"expanded uncertainties with k = {self.coverage_factor:g} may be too small"
+            freedom = fitted.degrees_of_freedom
+            found.append(few_degrees_of_freedom(freedom, "sigma", remedy))
+        if not stretches(fitted.model, fitted.volume, fitted.values):
+            found.append(OWN_SCALES)
+        if fitted.left_out:
+            found.append(left_out_words(fitted))
+        return tuple(filter(None, found))
+
+    def lines(self) -> list[str]:
+        fitted, k = self.fitted, self.coverage_factor
+        how = "estimated" if fitted.sigma_is_estimated else "as given"
+        of = f" of {fitted.date}" if fitted.date else ""
+        scatter = "with" if self.scatter else "without"
+        lines = [
+            f"{fitted.title}: {self.headline()}",
+            f"map{of}: sigma {fitted.sigma:.4g} ({how}), {freedom_words(fitted.degrees_of_freedom)}"
+            f"; U = {k:g} u, {scatter} the scatter of the readings that are corrected",
+            verdict_line(fitted.lack_of_fit),
+            "a correction is added to what the scales say with the stated offset of the probe; the"
+            " error of indication has the opposite sign",
+            *self._temperature_lines(),
+            "",
+            *self._point_table(),
+        ]
+        return [*lines, "", *self._length_table()] if self.lengths else lines
+
+    def _temperature_lines(self) -> list[str]:
+        stated = self.fitted.temperatures
+        if not stated:
+            return []
+        told = ", ".join(f"{word} {value:.4g} °C" for word, value in stated.items())
+        return [f"temperatures of the campaign: {told}; corrected for none of the points"]
+
+    def _point_table(self) -> list[str]:
+        axes, u = AXIS_NAMES[: self.fitted.dimension], self.expanded_uncertainties
+        rows = [
+            [
+                "point",
+                "probe",
+                *(f"{axis}, mm" for axis in axes),
+                *(f"correction {axis}, µm" for axis in axes),
+                *(f"U {axis}, µm" for axis in axes),
+            ]
+        ]
+        for i in range(min(len(self.points), SHOWN)):
+            standard = u[i] / self.coverage_factor
+            millimetres = zip(1e3 * self.points[i], 1e3 * standard, strict=True)
+            micrometres = zip(1e6 * self.corrections[i], 1e6 * standard, strict=True)
+            rows.append(
+                [
+                    self.given.name(i),
+                    self._probe(i),
+                    *(_value(*both) for both in millimetres),
+                    *(_value(*both) for both in micrometres),
+                    *(_uncertainty(value) for value in u[i].tolist()),
+                ]
+            )
+        found = aligned(rows, [False, False, *[True] * (3 * len(axes))])
+        more = len(self.points) - SHOWN
+        return [*found, f"(and {more} more points, which -o writes)"] if more > 0 else found
+
+    def _length_table(self) -> list[str]:
+        k = self.coverage_factor
+        with_target = any(one.target is not None for one in self.lengths)
+        rows = [["length", "corrected, mm", "correction, µm", "U, µm", "k"]]
+        rows[0] += ["within target"] if with_target else []
+        for one in self.lengths[:SHOWN]:
+            u = one.standard_uncertainty
+            row = [one.name, _value(1e3 * one.value, 1e3 * u)]
+            row += [_value(1e6 * (one.value - one.read), 1e6 * u), _uncertainty(k * u), f"{k:g}"]
+            met = {None: "", True: "yes", False: "no"}[one.is_met]
+            rows.append(row + [met] if with_target else row)
+        found = aligned(rows, [False, True, True, True, True, False][: len(rows[0])])
+        more = len(self.lengths) - SHOWN
+        return [*found, f"(and {more} more lengths, which --json has)"] if more > 0 else found
+
+    def _probe(self, i: int) -> str:
+        return self.fitted.probes.names[self.given.probes[i]]
+
+    def write_points(self, stream: TextIO) -> None:
+        """Write the points as a CSV file, in units that its columns name; what is undetermined is
+        empty.
+        """
+        CsvWriter(stream).writerows(self._point_cells())
+
+    def write_covariance(self, stream: TextIO) -> None:
+        """Write the covariance of all co-ordinates as a CSV file, in square micrometres; what is
+        undetermined is empty.
+
+        :raises ValueError: there are too many.
+        """
+        CsvWriter(stream).writerows(self._covariance_cells())
+
+    def _point_cells(self) -> Iterator[list[str | float]]:
+        axes = AXIS_NAMES[: self.fitted.dimension]
+        heads = ("{}_mm", "correction_{}_um", "U_{}_um")
+        yield [
+            "name",
+            "probe",
+            *(head.format(axis) for head in heads for axis in axes),
+            "k",
+            "outside",
+        ]
+        numbers = np.concatenate(
+            [1e3 * self.points, 1e6 * self.corrections, 1e6 * self.expanded_uncertainties], axis=1
+        )
+        outside = self.outside.tolist()
+        for i, row in enumerate(_cells(numbers)):
+            probe = self._probe(i)
+            said = "yes" if outside[i] else "no"
+            yield [self.given.name(i), probe, *row, self.coverage_factor, said]
+
+    def _covariance_cells(self) -> Iterator[list[str | float]]:
+        axes = AXIS_NAMES[: self.fitted.dimension]
+        names = [f"{self.given.name(i)}: {axis}" for i in range(len(self.points)) for axis in axes]
+        yield ["covariance_um2", *names]
+        for name, row in zip(names, _cells(1e12 * self.covariance()), strict=True):
+            yield [name, *row]
+
+    def to_dict(self) -> dict[str, Any]:
+        fitted, u = self.fitted, self.standard_uncertainties
+        return {
+            **picked(fitted, "title", "sigma", "sigma_is_estimated", "degrees_of_freedom"),
+            "lack_of_fit": verdict_data(fitted.lack_of_fit),
+            "coverage_factor": self.coverage_factor,
+            "with_repeatability": bool(self.scatter),
+            "points": [
+                {
+                    "name": self.given.name(i),
+                    "probe": self._probe(i),
+                    "point": [finite(one) for one in self.points[i].tolist()],
+                    "correction": [finite(one) for one in correction],
+                    "standard_uncertainty": [finite(one) for one in u[i].tolist()],
+                    "outside": is_outside,
+                }
+                for i, (correction, is_outside) in enumerate(
+                    zip(self.corrections.tolist(), self.outside.tolist(), strict=True)
+                )
+            ],
+            "lengths": [
+                {
+                    "name": one.name,
+                    "value": finite(one.value),
+                    "correction": finite(one.value - one.read),
+                    "standard_uncertainty": finite(one.standard_uncertainty),
+                    "within_target": one.is_met,
+                }
+                for one in self.lengths
+            ],
+            "warnings": list(self.warnings),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each point, in metres."""
+        axes, corrections = AXIS_NAMES[: self.fitted.dimension], self.corrections
+        u = self.standard_uncertainties
+        return [
+            {
+                "point": self.given.name(i),
+                "probe": self._probe(i),
+                **{axis: float(self.points[i, k]) for k, axis in enumerate(axes)},
+                **{f"correction {axis}": float(corrections[i, k]) for k, axis in enumerate(axes)},
+                **{f"u {axis}": float(u[i, k]) for k, axis in enumerate(axes)},
+                "unit": "m",
+            }
+            for i in range(len(self.points))
+        ]
+
+
+OWN_SCALES = (
+    "the error model cannot change the scale: lengths are those of the machine's own scales, and U"
+    " does not contain how wrong these may be"
+)
+
+
+def left_out_words(fitted: FittedMap) -> str:
+    """Which estimates of the fit a map does not apply, and what its conversion has changed."""
+    residual = fitted.conversion_residual
+    words = []
+    if residual is not None:
+        told = (
+            f"corrected points differ by up to {number(1e6 * residual, 3)} µm from those of the map"
+            " before, which U does not contain"
+            if residual
+            else "coefficients that the model before did not have are as it implies, and were not"
+            " estimated from readings"
+        )
+        words.append(f"the map was converted from another error model: {told}")
+    campaign = [one.name for one in fitted.left_out if one.kind != CONVERSION]
+    if campaign:
+        words.append(_of_campaign(campaign))
+    return "; ".join(words)
+
+
+def _of_campaign(estimated: Sequence[str]) -> str:
+    names, count = listing(estimated, 4), len(estimated)
+    return (
+        f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"
+        f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"
+        " correct for these beforehand where they matter"
+    )
+
+
+def _cells(rows: Array) -> list[list[str | float]]:
+    return [["" if value != value else value for value in row] for row in rows.tolist()]
+
+
+def _value(value: float, uncertainty: float) -> str:
+    if np.isnan(uncertainty):
+        return "undetermined"
+    return to_uncertainty(value, uncertainty)
+
+
+def _uncertainty(value: float) -> str:
+    return "undetermined" if np.isnan(value) else number(1e6 * value, 3)
+
+
+@single_threaded
+def correction(
+    fitted: FittedMap,
+    given: GivenPoints,
+    lengths: Tasks | None = None,
+    coverage_factor: float | None = None,
+    with_repeatability: bool = False,
+) -> Correction:
+    """Scale readings that are `given`, and lengths, corrected.
+
+    The coverage factor is that of the map where none is given.
+
+    :raises ValueError: both points of a length are at the same place.
+    """
+    scatter = fitted.sigma if with_repeatability else 0.0
+    places, blocks = corrected_with_blocks(fitted, given.points, given.probes)
+    blocks = blocks + np.diag((scatter * fitted.repeatability) ** 2)
+    places = np.where(np.isnan(np.diagonal(blocks, axis1=1, axis2=2)), np.nan, places)
+    found: tuple[CorrectedLength, ...] = ()
+    if lengths is not None and len(lengths.names):
+        ends = lengths.points.reshape(-1, fitted.dimension)
+        pairs = np.arange(len(ends)).reshape(-1, 2)
+        mapped = mapped_lengths(fitted, ends, lengths.probes.ravel(), pairs, scatter)
+        values = np.where(np.isnan(mapped.standard_uncertainties), np.nan, mapped.values)
+        uncertainties = mapped.standard_uncertainties.tolist()
+        found = tuple(
+            CorrectedLength(*one)
+            for one in zip(
+                lengths.names,
+                mapped.read.tolist(),
+                values.tolist(),
+                uncertainties,
+                lengths.targets,
+                strict=True,
+            )
+        )
+    factor = coverage_factor or fitted.coverage_factor
+    return Correction(fitted, given, places, blocks, found, factor, scatter)

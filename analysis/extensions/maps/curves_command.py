@@ -1,0 +1,91 @@
+"""`ballplate curves`: the error functions of a fitted machine, with their bands."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.common import (
+    FITTED,
+    add_formats,
+    add_picture,
+    count,
+    fitted_map,
+    print_json,
+    print_lines,
+    write_picture,
+)
+from ballplate.cli.outputs import UsageError, Writer, add_force
+from ballplate.cli.telling import complain
+
+if TYPE_CHECKING:
+    from .error_curves_result import ErrorCurves
+    from .fitted_errors_result import FittedErrorMap
+    from .volumetric_results import MachineErrors
+
+HELP = "tell the parametric errors of a map that a fit left behind, with their uncertainties"
+DESCRIPTION = (
+    "Tell every error function of a map file (fit -o) along its axis with its expanded uncertainty,"
+    " the squareness errors as angles, and other numbers of the error model. Errors are the"
+    " position of the tip minus the position that the scales indicate."
+)
+
+# Positions along an axis at most.
+MOST_POSITIONS = 10_000
+
+
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument("file", metavar="MAP", type=Path, help=FITTED)
+    parser.add_argument(
+        "--error",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="only this one, such as EXX; may be repeated",
+    )
+    parser.add_argument(
+        "--points",
+        metavar="N",
+        type=_points,
+        help="positions along each line, in CSV, JSON and the drawing; default 41",
+    )
+    add_picture(parser, "--plot", help="also draw all functions side by side")
+    add_force(parser)
+    add_formats(parser, ("text", "csv", "json"), "csv: all positions; json: metres, radians")
+
+
+def _points(text: str) -> int:
+    found = count(text)
+    if not 2 <= found <= MOST_POSITIONS:
+        raise ArgumentTypeError(f"a line has 2 to {MOST_POSITIONS} positions, not {found}")
+    return found
+
+
+def run(options: Namespace) -> int:
+    """Print, and draw, the curves."""
+    from .error_curves_result import error_curves
+    from .error_functions import POSITIONS
+
+    fitted = fitted_map(options.file)
+    try:
+        found = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
+    except ValueError as error:
+        raise UsageError(error) from None
+    show_errors(options, found, found.plot)
+    return 0
+
+
+def show_errors(
+    options: Namespace, found: MachineErrors | FittedErrorMap | ErrorCurves, draw: Writer
+) -> None:
+    """Say what is to be known of errors, draw them, and print them in the form asked for."""
+    for note in found.notes:
+        complain(note)
+    # Before anything is printed that nobody may read to its end.
+    if options.plot is not None:
+        write_picture(options, draw)
+    if options.format == "json":
+        print_json([found.to_dict()])
+    else:
+        print_lines(found.lines() if options.format == "text" else list(found.point_lines()))

@@ -1,0 +1,129 @@
+"""`ballplate diff`: the difference of two maps of a machine."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+
+from ballplate.cli.common import add_json, add_picture, day, show, whole
+from ballplate.cli.outputs import UsageError, add_force, add_output, write
+
+from .lengths_command import coverage_factor
+
+HELP = "compare two maps of a machine: which lengths, errors and balls have changed"
+DESCRIPTION = (
+    "Compare two campaigns, or a campaign with an expected map: lengths, errors at points of the"
+    " volume after the free motion between the frames is taken out, error functions, and balls"
+    " where both are experiments with readings. A normalised error E_n is a difference over its"
+    " expanded uncertainty. The exit status is 0; with --fail it is 1 if the joint test of the map"
+    " shows a change."
+)
+
+# Points along each axis: all pairs of points are lengths.
+LEAST, MOST = 2, 5
+
+
+# In one piece: one option after the other, with its help.
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "files",
+        metavar="MAP",
+        nargs=2,
+        type=Path,
+        help=(
+            "map file that fit -o wrote, machine file (an expected map), or experiment file whose"
+            " section readings names its files; the second is compared with the first"
+        ),
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--points",
+        metavar="CSV",
+        type=Path,
+        help="compare at these points, and lengths between them: columns x_mm, y_mm, z_mm",
+    )
+    where.add_argument(
+        "--grid",
+        metavar="N",
+        type=_grid,
+        default=4,
+        help=f"points along each axis, {LEAST} to {MOST}; default 4",
+    )
+    parser.add_argument(
+        "--probe", metavar="NAME", help="probe that is compared with; default: that of the maps"
+    )
+    parser.add_argument(
+        "--coverage-factor",
+        metavar="K",
+        type=coverage_factor,
+        default=2.0,
+        help="coverage factor of expanded uncertainties; default 2",
+    )
+    parser.add_argument(
+        "--shared",
+        choices=("certificate",),
+        help=(
+            "both campaigns rest on the same certificate, whose errors cancel; for experiment files"
+            " with readings"
+        ),
+    )
+    parser.add_argument(
+        "--stated",
+        metavar="LENGTH",
+        help=(
+            "expanded uncertainty of lengths by a machine file, such as"
+            ' "0.5 um + L/1000000"; default: as exactly known as the file says'
+        ),
+    )
+    parser.add_argument(
+        "--dates",
+        metavar="DAY",
+        nargs=2,
+        type=day,
+        default=(None, None),
+        help="days of the two campaigns, such as 2025-11-22 2026-11-22; default: those of the maps",
+    )
+    parser.add_argument(
+        "--fail", action="store_true", help="end with exit status 1 if a change is shown"
+    )
+    add_output(parser, "--csv", metavar="FILE", help="write a line for each figure")
+    add_picture(parser, "--plot", help="draw what changed, and E_n of all figures")
+    add_force(parser)
+    add_json(parser)
+
+
+def _grid(text: str) -> int:
+    found = whole(text, LEAST)
+    if found > MOST:
+        raise ArgumentTypeError(f"a grid has {LEAST} to {MOST} points along an axis, not {found}")
+    return found
+
+
+def run(options: Namespace) -> int:
+    """Compare, write and print; 1 with --fail if a change is shown."""
+    from ballplate.cli.telling import complain
+    from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
+
+    from .comparison import ComparisonSettings, NotComparableError
+    from .shared_certificates import NothingSharedError
+    from .sources import map_difference
+
+    k = options.coverage_factor
+    try:
+        stated = None
+        if options.stated is not None:
+            stated = Target(parse_length_function(options.stated), k).standard
+        found = map_difference(
+            (options.files[0], options.files[1]),
+            ComparisonSettings(k, options.grid, options.points, options.probe),
+            options.shared is not None,
+            stated,
+            (options.dates[0], options.dates[1]),
+        )
+    except (NotComparableError, NothingSharedError, QuantityError) as error:
+        raise UsageError(error) from None
+    write(options, {options.csv: found.to_csv, options.plot: found.plot})
+    show(options, found)
+    for note in found.notes:
+        complain(note)
+    return 1 if options.fail and found.is_changed is not False else 0

@@ -1,0 +1,127 @@
+"""A picture of what changed between two maps: vectors in the volume, and E_n of all figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ballplate.presentation.pictures import draw_box
+from ballplate.presentation.scene import box, projection
+from ballplate.presentation.svg import (
+    INK,
+    MUTED,
+    SERIES,
+    drawing,
+    legend_above,
+    placed_axes,
+    round_number,
+    save,
+    scale_bar,
+    sticks,
+)
+from ballplate.simulator.computing.rounding import comparable
+
+from .comparison import MapComparison
+from .normalised_errors import FigureGroup
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Points of the drawing, and of what stands around its panels.
+WIDTH, SCENE, ROW, LEFT, RIGHT, BELOW, ABOVE = 480.0, 330.0, 14.0, 150.0, 16.0, 46.0, 40.0
+# Part of the volume's size that the longest vector takes.
+LONGEST = 0.15
+# E_n at which the axis ends at the least, and points of a row that are drawn one by one.
+LEAST_END, MOST_MARKS = 2.0, 400
+
+
+def draw_difference(found: MapComparison, words: str, path: str | Path | None = None) -> Figure:
+    """The difference at points of the volume, those of |E_n| > 1 in a colour, and |E_n| of all
+    figures in rows; it is written to the path, if there is one.
+
+    :raises ImportError: matplotlib is missing.
+    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises OSError: the file cannot be written.
+    """
+    groups = [one for one in found.groups if one.count]
+    rows = ROW * len(groups) + BELOW + ABOVE
+    with drawing(SCENE + rows, WIDTH) as figure:
+        scene = placed_axes(figure, 0.0, rows, WIDTH, SCENE - 24.0)
+        scene.set_axis_off()
+        scene.set_aspect("equal")
+        _vectors(scene, found)
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, rows - BELOW - ABOVE)
+        _rows(axes, groups)
+        return save(figure, path, words)
+
+
+def _vectors(axes: Axes, found: MapComparison) -> None:
+    points, d = found.points, len(found.volume.lower)
+    view, _ = projection(d)
+    volume = box(found.volume.lower, found.volume.upper)
+    draw_box(axes, volume)
+    moved = found.places.differences.reshape(points.shape)
+    is_open = np.isnan(found.places.standard_uncertainties).reshape(points.shape).any(axis=1)
+    changed = (np.abs(np.nan_to_num(found.places.normalised)) > 1.0).reshape(points.shape)
+    is_changed = changed.any(axis=1) & ~is_open
+    longest = float(np.linalg.norm(moved[~is_open], axis=1).max(initial=0.0))
+    size = float(found.volume.size.max())
+    times = round_number(LONGEST * size / longest) if longest else 1.0
+    starts, tips = points @ view.T, (points + times * moved) @ view.T
+    for which, colour, marker, label in (
+        (~is_changed & ~is_open, MUTED, "o", "|E_n| ≤ 1"),
+        (is_changed, SERIES[1], "s", "|E_n| > 1 along an axis"),
+    ):
+        if which.any():
+            sticks(
+                axes,
+                starts[which],
+                tips[which],
+                color=colour,
+                marker=marker,
+                markersize=3.0,
+                linewidth=1.2,
+                label=label,
+            )
+    if is_open.any():
+        axes.plot(*starts[is_open].T, "x", color=INK, markersize=5.0, label="undetermined")
+    ends = np.concatenate([volume.edges.reshape(-1, 2), starts[~is_open], tips[~is_open]])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    axes.set_xlim(low[0] - 0.14 * size, high[0] + 0.14 * size)
+    axes.set_ylim(low[1] - 0.22 * size, high[1] + 0.06 * size)
+    legend_above(axes, 3)
+    length = round_number(longest or 1e-6)
+    told = f"{1e6 * length:g} µm, magnified {times:,.0f} times; the frame's motion is taken out"
+    scale_bar(axes, length * times, 0.03, told)
+
+
+def _rows(axes: Axes, groups: list[FigureGroup]) -> None:
+    """A row for each group: |E_n| of its figures, those above 1 in a colour."""
+    largest = LEAST_END
+    for k, one in enumerate(groups):
+        values = np.sort(np.abs(one.normalised[one.is_compared]))[::-1]
+        largest = max(largest, float(values[0]))
+        # The largest of many, and every so many of the others.
+        step = -(-len(values) // MOST_MARKS)
+        shown = np.concatenate([values[:1], values[1::step]])
+        for which, colour in ((shown <= 1.0, MUTED), (shown > 1.0, SERIES[1])):
+            axes.plot(
+                shown[which],
+                np.full(int(which.sum()), -k),
+                color=colour,
+                marker="|",
+                markersize=8.0,
+                linestyle="none",
+            )
+    axes.axvline(1.0, color=INK, linewidth=1.0, linestyle="--")
+    axes.set_xlim(0.0, 1.05 * float(comparable(largest)))
+    axes.set_ylim(0.6 - len(groups), 0.6)
+    axes.set_yticks([-k for k in range(len(groups))], [_short(one.kind) for one in groups])
+    axes.grid(True, axis="x")
+    axes.set_xlabel("|E_n|; about one in twenty exceeds 1 by chance")
+
+
+def _short(name: str) -> str:
+    return name.removesuffix(" of the volume").removesuffix(" through the volume")

@@ -1,0 +1,275 @@
+"""Lengths throughout the volume as text for people, as CSV and as plain data for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ballplate.presentation.formatting import (
+    aligned,
+    as_data,
+    csv_lines,
+    number,
+    percent,
+    picked,
+    records,
+    uncertainty_words,
+)
+from ballplate.presentation.result import Result
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.machines.protocol import Array
+
+from .length_groups import GroupedLengths, LengthGroups, target_words
+from .length_plots import draw_lengths
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+AXES = "xyz"
+# What of a group says of which lengths it is.
+HEADS = ("from", "to", "direction", "point")
+POINT_COLUMNS = (
+    "lengths,undetermined,u_average_um,u_maximum_um,ratio_average,ratio_maximum,share_within,"
+    "share_expanded_within"
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LengthMap(GroupedLengths, Result):
+    """Grouped lengths that show themselves."""
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the rank is the one that the file expects."""
+        return self.deficiency == (self.expected or 0)
+
+    def headline(self) -> str:
+        factor = self.settings.target_factor
+        u = "u" if factor == 1.0 else f"{factor:g} u"
+        share = float(self.whole.within_target[0] / self.whole.count[0])
+        return f"{u} within {target_words(self.settings.target)} for {percent(share)} of lengths"
+
+    def lines(self) -> list[str]:
+        """The share of lengths that meet the target, and where, how long and in which direction
+        they are.
+        """
+        settings, whole = self.settings, self.whole
+        k = f"{settings.coverage_factor:g}"
+        rank = f"rank deficiency {self.deficiency}; " if self.deficiency else ""
+        scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
+        count, n = int(whole.count[0]), len(self.points)
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"{rank}{count} lengths between {n} points of a grid, with the probe"
+                f" {settings.probe}{scatter}"
+            ),
+            (
+                f"target {target_words(settings.target)}: met by the standard uncertainty u of"
+                f" {_share(whole, False)}, by the expanded uncertainty {k} u of"
+                f" {_share(whole, True)} lengths"
+            ),
+            f"the target is meant for the {uncertainty_words(settings.target_factor)}",
+        ]
+        if whole.undetermined[0]:
+            some = ", ".join(
+                f"{_place(self.points[i])} to {_place(self.points[j])}" for i, j in self.open_pairs
+            )
+            lines.append(
+                f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as"
+                f" {some}"
+            )
+        elif self.deficiency:
+            lines.append(
+                "undetermined directions change none of these lengths, but may change those of"
+                " another --grid"
+            )
+        if self.worst is not None:
+            i, j = self.worst
+            ratio = settings.target_factor * float(whole.maximum_ratio[0])
+            told = f"largest ratio of {_compared(self)} to the target: {number(ratio)}"
+            lines.append(f"{told}, from {_place(self.points[i])} to {_place(self.points[j])}")
+        return [
+            *lines,
+            "",
+            *_table(
+                "length",
+                _class_names(self.edges),
+                self.by_length,
+                self,
+                _class_targets(self),
+            ),
+            "",
+            *_table("direction", list(self.directions), self.by_direction, self, None),
+            "",
+            *_table("point, mm", *_extremes(self), self, None),
+            (
+                f"(points in the order of their largest ratio of {_compared(self)} to the target;"
+                " lengths are those that start or end there)"
+            ),
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain data in metres; what is undetermined is None."""
+        settings, edges = self.settings, self.edges.tolist()
+        classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
+        data: dict[str, Any] = as_data(
+            {
+                "experiment": self.label,
+                "title": self.title,
+                "rank_deficiency": self.deficiency,
+                **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+                "target": picked(settings.target, "constant", "slope"),
+                "target_coverage_factor": settings.target_factor,
+                "all": _group_data([{}], self.whole)[0],
+                "worst": None if self.worst is None else [self.points[k] for k in self.worst],
+                "by_length": _group_data(classes, self.by_length),
+                "by_direction": _group_data(
+                    [{"direction": name} for name in self.directions], self.by_direction
+                ),
+                "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
+            }
+        )
+        return data
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each class of length, direction and point of the grid, lengths in metres."""
+        data = self.to_dict()
+        rows = []
+        for group, name in (
+            ("by_length", lambda one: f"{1e3 * one['from']:g} to {1e3 * one['to']:g} mm"),
+            ("by_direction", lambda one: one["direction"]),
+            ("by_point", lambda one: _place(one["point"])),
+        ):
+            for one in data[group]:
+                kept = {k.replace("_", " "): v for k, v in one.items() if k not in HEADS}
+                rows.append({"group": group.replace("_", " "), "of": name(one), **kept})
+        return rows
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The largest ratio of u to the target at each point, and u over the length.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        return draw_lengths(self, path)
+
+
+def _share(groups: LengthGroups, expanded: bool) -> str:
+    share = percent(float(groups.share(expanded)[0]))
+    return f"{share} of" if expanded else share
+
+
+def _place(point: Iterable[float]) -> str:
+    return f"({', '.join(f'{1e3 * v + 0.0:.6g}' for v in point)}) mm"
+
+
+def _class_names(edges: Array) -> list[str]:
+    return [
+        f"{1e3 * low:g} to {1e3 * high:g} mm" for low, high in zip(edges, edges[1:], strict=False)
+    ]
+
+
+def _class_targets(lengths: LengthMap) -> list[str] | None:
+    if not lengths.settings.target.slope:
+        return None
+    ends = 1e6 * lengths.settings.target.at(lengths.edges)
+    return [
+        f"{number(float(a), 3)} to {number(float(b), 3)}"
+        for a, b in zip(ends, ends[1:], strict=False)
+    ]
+
+
+# Of the points, this many with the largest ratios, and as many with the smallest.
+SHOWN_POINTS = 3
+
+
+def _extremes(lengths: LengthMap) -> tuple[list[str], LengthGroups]:
+    ratio = np.where(
+        np.isnan(lengths.by_point.maximum_ratio), np.inf, lengths.by_point.maximum_ratio
+    )
+    order = np.argsort(-comparable(ratio), kind="stable")
+    chosen = (
+        order
+        if len(order) <= 2 * SHOWN_POINTS
+        else np.concatenate([order[:SHOWN_POINTS], order[-SHOWN_POINTS:]])
+    )
+    names = [_place(lengths.points[i]).removesuffix(" mm") for i in chosen]
+    return names, LengthGroups(
+        **{name: values[chosen] for name, values in vars(lengths.by_point).items()}
+    )
+
+
+def _compared(lengths: LengthMap) -> str:
+    """The uncertainty that the target is meant for, as a symbol."""
+    factor = lengths.settings.target_factor
+    return "u" if factor == 1.0 else f"{factor:g} u"
+
+
+def _table(
+    head: str, names: list[str], groups: LengthGroups, lengths: LengthMap, targets: list[str] | None
+) -> list[str]:
+    factor = lengths.settings.coverage_factor
+    k = f"{factor:g}"
+    heads = [
+        head,
+        "lengths",
+        "undetermined",
+        "u average, µm",
+        "maximum",
+        f"{k} u maximum",
+        "target",
+    ]
+    heads += [f"{_compared(lengths)} / target, maximum", "u within", f"{k} u within"]
+    rows = [heads]
+    for i, name in enumerate(names):
+        if not groups.count[i]:
+            continue
+        row = [name, str(groups.count[i]), str(groups.undetermined[i])]
+        row += [
+            number(1e6 * float(v[i]))
+            for v in (groups.average, groups.maximum, factor * groups.maximum)
+        ]
+        row += [
+            targets[i] if targets else "",
+            number(lengths.settings.target_factor * float(groups.maximum_ratio[i])),
+        ]
+        row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
+        rows.append(row)
+    unused = {6} if not targets else set[int]()
+    unused |= {2} if not groups.undetermined.any() else set()
+    kept = [j for j in range(len(heads)) if j not in unused]
+    return aligned([[row[j] for j in kept] for row in rows], [j > 0 for j in kept])
+
+
+def point_csv(lengths: LengthMap) -> Iterator[str]:
+    """A line for each point of the grid: of the lengths that start or end there."""
+    axes = AXES[: lengths.design.dimension]
+    groups = lengths.by_point
+    return csv_lines(
+        [*(f"{axis}_mm" for axis in axes), POINT_COLUMNS],
+        1e3 * lengths.points,
+        groups.count,
+        groups.undetermined,
+        1e6 * groups.average,
+        1e6 * groups.maximum,
+        groups.average_ratio,
+        groups.maximum_ratio,
+        groups.share(),
+        groups.share(True),
+    )
+
+
+def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[dict[str, Any]]:
+    rows = records(
+        lengths=groups.count,
+        **picked(groups, "undetermined", "average", "maximum", "average_ratio", "maximum_ratio"),
+        share_within=groups.share(),
+        share_expanded_within=groups.share(True),
+    )
+    return [head | row for head, row in zip(heads, rows, strict=True)]

@@ -1,0 +1,134 @@
+"""`ballplate lengths`: lengths throughout the volume against a target."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Iterable
+from pathlib import Path
+
+from ballplate.cli import common
+from ballplate.cli.common import (
+    add_file,
+    add_json,
+    add_picture,
+    coverage_factor,
+    show,
+    single,
+)
+from ballplate.cli.outputs import (
+    UsageError,
+    Writer,
+    add_force,
+    add_output,
+    text_writer,
+    write,
+)
+
+# Lines of a table of all lengths.
+MOST_PAIRS = 500_000
+
+
+HELP = "map the uncertainty of lengths over the volume against a target"
+DESCRIPTION = (
+    "Compute the standard uncertainty u of the length between every two points of a"
+    " grid over the volume, measured on the corrected machine, and compare it and the"
+    " expanded uncertainty k u with the target by length, direction and place. The"
+    " target applies to u, or to U = k u where the file states a coverage_factor. The"
+    " scatter of the readings that will measure a length is not part of u unless"
+    " requested. The exit status is 0 if the rank is as expected and, with --fail, all"
+    " lengths are within the target, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_file(parser)
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
+    )
+    parser.add_argument(
+        "--grid",
+        metavar="N",
+        type=_grid,
+        default=(6,),
+        help="points along each axis, or a number for each such as 6,5,4; default 6",
+    )
+    parser.add_argument(
+        "--probe",
+        metavar="NAME",
+        help="probe that measures the lengths; default: evaluation.probe",
+    )
+    parser.add_argument(
+        "--coverage-factor",
+        metavar="K",
+        type=coverage_factor,
+        help="coverage factor of the expanded uncertainty; default: that of the file, or 2",
+    )
+    parser.add_argument(
+        "--fail",
+        action="store_true",
+        help="end with exit status 1 unless all lengths are within the target",
+    )
+    parser.add_argument(
+        "--with-repeatability",
+        action="store_true",
+        help="include the scatter of the two readings that measure a length",
+    )
+    add_output(parser, "--csv", metavar="FILE", help="write a line for each point of the grid")
+    add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")
+    add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
+    add_force(parser)
+    add_json(parser)
+
+
+def _grid(text: str) -> tuple[int, ...]:
+    counts = common.grid(text)
+    if counts is None or len(counts) > 3:
+        raise ArgumentTypeError(
+            f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
+        )
+    return counts
+
+
+def run(options: Namespace) -> int:
+    """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
+    from ballplate.cli.progress import progress
+
+    from .length_map import length_map, length_settings, pair_csv
+    from .length_tables import point_csv
+
+    experiment = single(options)
+    try:
+        settings = length_settings(
+            experiment,
+            options.target,
+            options.grid,
+            options.probe,
+            options.coverage_factor,
+            options.with_repeatability,
+        )
+    except ValueError as error:
+        raise UsageError(error) from None
+    count = math.comb(math.prod(settings.grid), 2)
+    if options.pairs is not None and count > MOST_PAIRS:
+        raise UsageError(
+            f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
+            " --grid coarser"
+        )
+    with progress(options) as shown:
+        found = length_map(experiment, settings, shown.show)
+    contents: dict[Path | None, Writer] = {
+        options.csv: _of_lines(point_csv(found)),
+        options.pairs: _of_lines(pair_csv(experiment, settings)),
+        options.plot: found.plot,
+    }
+    write(options, contents)
+    show(options, found)
+    is_missed = options.fail and not found.is_met
+    return 0 if found.as_expected and not is_missed else 1
+
+
+def _of_lines(lines: Iterable[str]) -> Writer:
+    return text_writer(lambda stream: stream.writelines(f"{line}\n" for line in lines))

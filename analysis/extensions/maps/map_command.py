@@ -1,0 +1,189 @@
+"""`ballplate map`: volumetric errors of a machine that a file describes."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli import common
+from ballplate.cli.common import (
+    add_formats,
+    add_picture,
+    argument_type,
+    at_most,
+    count,
+    whole,
+)
+from ballplate.cli.outputs import UsageError, add_force
+
+from .curves_command import show_errors
+
+if TYPE_CHECKING:
+    from .map_places import Line
+
+
+HELP = "compute volumetric errors of a machine file, or of the map that a fit left behind"
+DESCRIPTION = (
+    "Combine the parametric errors of a machine file, systematic and random, or the estimates of a"
+    " map file (fit -o), with their expanded uncertainties, into volumetric errors: on a grid with"
+    " the length errors of the body diagonals, in a plane, along a line, at the points of a table,"
+    " or one parametric error along its axis. An error is the position of the tip minus the"
+    " position that the scales indicate; the error of indication has the opposite sign."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", type=Path, help="machine file (YAML) or map file")
+    _add_places(parser)
+    parser.add_argument(
+        "--probe", metavar="NAME", help="of a map file: the probe, default that of the map"
+    )
+    parser.add_argument(
+        "--tasks",
+        metavar="FILE",
+        type=Path,
+        help="of a map file: also the lengths of the measuring tasks of an experiment file",
+    )
+    parser.add_argument(
+        "--draw",
+        metavar="N",
+        type=_draw,
+        help=(
+            "draw so many realisations of the random part, or of what the covariance of a map"
+            " leaves open"
+        ),
+    )
+    parser.add_argument("--seed", metavar="N", type=whole, help="seed of --draw; default 1")
+    parser.add_argument(
+        "--budget",
+        action="store_true",
+        help="what each parametric error contributes to the errors and to their uncertainties",
+    )
+    add_picture(
+        parser,
+        "--plot",
+        help="also draw the errors, in three dimensions or along the line or axis",
+    )
+    add_force(parser)
+    parser.add_argument(
+        "--magnification",
+        metavar="N",
+        type=count,
+        help="magnification of the errors in the drawing of the grid; default: one that fits",
+    )
+    add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")
+
+
+def _add_places(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--grid",
+        metavar="N,N,N",
+        type=_grid,
+        help="points along x, y and z, default 5,5,5; of a plane, along its two axes",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--line",
+        metavar="LINE",
+        type=_line,
+        help=(
+            'errors along a line instead, parallel to an axis as in "y = 600 mm, z = 600 mm", or'
+            ' between two points as in "0 mm, 0 mm, 0 mm to 1.8 m, 1.2 m, 1.2 m"'
+        ),
+    )
+    where.add_argument(
+        "--plane", metavar="PLANE", type=_plane, help='errors in a plane, as in "z = 200 mm"'
+    )
+    where.add_argument(
+        "--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX"
+    )
+    parser.add_argument(
+        "--points",
+        metavar="N|CSV",
+        type=_points,
+        help=(
+            "points along the line, at least 2, default 21; or a table of points, with the columns"
+            " x_mm, y_mm and z_mm (or another unit), where errors are told"
+        ),
+    )
+
+
+def _grid(text: str) -> tuple[int, ...]:
+    from .volumetric_errors import MOST_POINTS
+
+    counts = common.grid(text)
+    if counts is None or len(counts) not in (2, 3):
+        raise ArgumentTypeError(
+            f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"'
+        )
+    at_most(math.prod(counts), MOST_POINTS, "points")
+    return counts
+
+
+def _points(text: str) -> int | Path:
+    from .volumetric_errors import MOST_POINTS
+
+    if not text.isdigit():
+        return Path(text)
+    found = count(text)
+    if not 2 <= found <= MOST_POINTS:
+        raise ArgumentTypeError(f"a line has 2 to {MOST_POINTS} points, not {found}")
+    return found
+
+
+def _draw(text: str) -> int:
+    from .realisations import MOST_DRAWS
+
+    return at_most(count(text), MOST_DRAWS, "realisations")
+
+
+@argument_type
+def _line(text: str) -> Line:
+    from .map_places import parse_places
+
+    return parse_places(text)
+
+
+@argument_type
+def _plane(text: str) -> dict[str, float]:
+    from .map_places import parse_plane
+
+    return parse_plane(text)
+
+
+def run(options: Namespace) -> int:
+    """Print, and draw, what was asked for."""
+    from ballplate.simulator.experiment.load import load
+
+    from .any_map import map_errors
+    from .fitted_errors_result import FittedErrorMap
+    from .map_places import PlacesAsked
+    from .realisations import Draws
+    from .volumetric_results import VolumetricMap
+
+    others = (options.line, options.plane, options.error)
+    table = options.points if isinstance(options.points, Path) else None
+    is_grid = table is None and all(one is None for one in others)
+    if options.magnification is not None and (options.plot is None or not is_grid):
+        raise UsageError("--magnification is for the drawing of the grid; leave it out")
+    if options.seed is not None and options.draw is None:
+        raise UsageError("--seed goes with --draw; leave it out")
+    number = None if table is not None else options.points
+    asked = PlacesAsked(options.grid, options.line, options.plane, number, table)
+    seed = 1 if options.seed is None else options.seed
+    draws = None if options.draw is None else Draws(options.draw, seed)
+    tasks = () if options.tasks is None else load(options.tasks)
+    try:
+        found = map_errors(
+            options.file, asked, options.error, options.probe, draws, options.budget, tasks
+        )
+    except ValueError as error:
+        raise UsageError(error) from None
+    draw = found.plot
+    if options.magnification is not None and isinstance(found, VolumetricMap | FittedErrorMap):
+        draw = partial(found.plot, magnification=options.magnification)
+    show_errors(options, found, draw)
+    return 0

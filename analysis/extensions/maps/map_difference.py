@@ -1,0 +1,462 @@
+"""The difference of two maps as a result: which figures changed, and whether anything did."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ballplate.extensions.judgement.lack_of_fit import TOO_ALIKE, TOO_RARE
+from ballplate.presentation.formatting import aligned, finite, number, picked
+from ballplate.presentation.result import Result
+from ballplate.results.adjustments import FEW
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
+from ballplate.simulator.maps.fitted_map import InCommon
+from ballplate.simulator.readings.same_readings import read_once_words
+
+from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
+from .comparison import MapComparison
+from .normalised_errors import FigureGroup, JointTest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Chance below which a joint test shows a change.
+LEVEL = 0.05
+# Lengths that are told one by one: all of a group as small as this, of others the largest.
+TOLD, LARGEST = 6, 3
+DAYS_OF_A_YEAR = 365.25
+
+INDEPENDENT = (
+    "the campaigns are taken to be independent: if both rest on the same certificate, its errors"
+    " cancel in the difference, U here is too large, and a change may be missed"
+)
+
+SAME_READINGS = (
+    "both rest on the same readings: U and E_n, which take campaigns to be independent, say nothing"
+    " here, and differences are those of the evaluation alone"
+)
+
+SOME_READINGS = (
+    "both rest on some of the same readings: U here, which takes campaigns to be independent, is"
+    " too large, so that a change may be shown, but never that there is none; compare a map of what"
+    " was read anew alone"
+)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class MapDifference(Result):
+    """What the map `second` says less what `first` does, for the same scale readings.
+
+    `comparison` has the figures. `shared` counts the values of certificates that both campaigns
+    rest on, whose errors cancel; None where the campaigns are taken to be independent.
+    """
+
+    first: ComparedMap
+    second: ComparedMap
+    comparison: MapComparison
+    coverage_factor: float
+    shared: int | None = None
+
+    @property
+    def label(self) -> str:
+        return f"{self.second.label} less {self.first.label}"
+
+    @property
+    def title(self) -> str:
+        both = dict.fromkeys([self.first.title, self.second.title])
+        return "; ".join(both)
+
+    @property
+    def years(self) -> float | None:
+        """Time from the first campaign to the second; None where a date is unknown, or both are the
+        same.
+        """
+        if self.first.date is None or self.second.date is None:
+            return None
+        days = date.fromisoformat(self.second.date) - date.fromisoformat(self.first.date)
+        return days.days / DAYS_OF_A_YEAR if days.days else None
+
+    @cached_property
+    def in_common(self) -> InCommon:
+        """What both maps have of each other's readings."""
+        return in_common(self.first, self.second)
+
+    @property
+    def is_too_alike(self) -> bool:
+        """Whether two that were measured differ by less than independent ones do but by a rare
+        chance.
+        """
+        test = self.comparison.test
+        if test is None or len(self._measured()) < 2:
+            return False
+        return 1.0 - test.p < TOO_RARE
+
+    @property
+    def tests(self) -> tuple[JointTest, ...]:
+        """The joint tests that decide: of the map as a whole, and of each plate."""
+        found = self.comparison
+        every = (found.test, *(one.test for one in found.plates))
+        return tuple(one for one in every if one is not None)
+
+    @property
+    def is_changed(self) -> bool | None:
+        """Whether the joint test of the map shows a change; None where nothing can be tested, or
+        readings in common hide it.
+
+        What they have in common makes the sum of both covariances too large for the difference:
+        that of an estimate and its update has the covariance of the one less that of the other.
+        """
+        test = self.comparison.test
+        if test is None or self.in_common == "same":
+            return None
+        is_shown = test.p < LEVEL
+        return is_shown if is_shown or self.in_common == "none" else None
+
+    def headline(self) -> str:
+        test = self.comparison.test
+        if self.in_common == "same":
+            return "the same readings on both sides: no change can be shown"
+        if test is None:
+            return "nothing that is determined in both can be tested"
+        return f"{self._verdict(test)} (p = {_chance(test.p)})"
+
+    def _verdict(self, test: JointTest) -> str:
+        if test.p < LEVEL:
+            return "a change is shown"
+        is_hidden = self.in_common != "none"
+        return "readings in common may hide a change" if is_hidden else "no change is shown"
+
+    def lines(self) -> list[str]:
+        found, k = self.comparison, self.coverage_factor
+        probe = f", measured with probe {found.probe}" if found.probe else ""
+        lines = [
+            f"{self.label}: {self.title}",
+            (
+                f"differences are what {self.second.label} says less what {self.first.label} says"
+                f" of the same scale readings{probe}; U = {k:g} u, E_n = difference / U"
+            ),
+            self._assumption(),
+            *(
+                verdict_line(one.lack_of_fit, one.label)
+                for one in (self.first, self.second)
+                if not one.is_expected
+            ),
+            "",
+            *self._motion_table(),
+            "",
+            *([] if self.in_common == "same" else self._tested_lines()),
+            *self._length_table(),
+        ]
+        if self.in_common == "same":
+            return lines
+        if found.functions:
+            lines += ["", *self._function_table()]
+        else:
+            lines += ["", f"error functions are not compared: {found.why_no_functions}"]
+        return lines
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        found = [
+            f"warning: sigma of {one.label} comes from {one.degrees_of_freedom:g} degrees of"
+            f" freedom; with so few, more than {_share(0.0455)} exceed |E_n| = 1 by chance"
+            for one in (self.first, self.second)
+            if one.degrees_of_freedom < FEW
+        ]
+        for one in (self.first, self.second):
+            found += [f"warning: {one.label}: {caution}" for caution in one.cautions if caution]
+        if self.in_common == "same":
+            found.append(f"warning: {SAME_READINGS}")
+        elif once := positions_in_common(self.first, self.second):
+            found.append(f"warning: {read_once_words(once)}")
+        elif self.is_too_alike:
+            found.append(f"warning: {TOO_ALIKE}")
+        return tuple(found)
+
+    def _assumption(self) -> str:
+        if self.in_common != "none":
+            return SAME_READINGS if self.in_common == "same" else SOME_READINGS
+        expected = [one for one in (self.first, self.second) if one.is_expected]
+        if expected:
+            one = expected[0]
+            known = "exactly known" if not one.root.size and one.stated is None else "as well known"
+            known += "" if known == "exactly known" else " as is stated"
+            return f"{one.label} is no measurement, and is {known}"
+        if self.shared is None:
+            return INDEPENDENT
+        return (
+            f"{self.shared} certified values are the same in both campaigns: their errors cancel,"
+            " as far as both estimates follow them; everything else is taken to be independent"
+        )
+
+    def _motion_table(self) -> list[str]:
+        motion, k = self.comparison.motion, self.coverage_factor
+        rows = [["free motion of the frame", "", "U", ""]]
+        values = zip(motion.names, motion.values, motion.standard_uncertainties, strict=True)
+        for name, value, u in values:
+            unit = "µm" if name.startswith("shift") else "µrad"
+            told = "undetermined" if math.isnan(u) else number(1e6 * value)
+            rows.append([name, told, number(1e6 * k * u), unit])
+        return [*aligned(rows, [False, True, True, False]), *map(self._held, self._measured())]
+
+    def _measured(self) -> tuple[ComparedMap, ...]:
+        return tuple(one for one in (self.first, self.second) if not one.is_expected)
+
+    def _held(self, one: ComparedMap) -> str:
+        every = MOTIONS[one.dimension]
+        turns = {f"{name} of the probe" for name in every[one.dimension :]}
+        held = set(one.held)
+        parts = []
+        if held >= set(every):
+            parts.append("every motion of the frame")
+        else:
+            parts += [name for name in every if name in held]
+        parts += ["the orientation of the probe"] if held >= turns else sorted(held & turns)
+        told = ", ".join(parts) or "nothing"
+        return f"({one.label}: the conditions of its error model take out {told})"
+
+    def _told_groups(self) -> tuple[FigureGroup, ...]:
+        """Groups of figures, those of all error functions as one."""
+        found = self.comparison
+        lengths, plates = found.lengths, tuple(one.figures for one in found.plates)
+        of_functions = [one.figures for one in found.functions]
+        joined = (_joined(of_functions),) if of_functions else ()
+        return (*lengths, found.places, *joined, *plates)
+
+    def _tested_lines(self) -> list[str]:
+        lines = [*_group_table(self._told_groups()), ""]
+        for one in self.tests:
+            freedom = one.degrees_of_freedom
+            scatter = "" if math.isinf(freedom) else f" (sigma of {freedom:.0f} degrees of freedom)"
+            if one.fixed:
+                scatter += (
+                    f", {one.fixed} more fixed by the certificate and not tested, the same to"
+                    f" {number(1e6 * one.held, 2)} µm"
+                )
+            lines.append(
+                f"{one.what}, one joint test: chi-squared {number(one.statistic)} of"
+                f" {one.dimensions} independent differences{scatter}, p = {_chance(one.p)}:"
+                f" {self._verdict(one)}"
+            )
+        lines.append(
+            "a single |E_n| > 1 among many figures shows nothing, since about as many as stated by"
+            f" chance exceed 1; joint tests count, and each errs once in {round(1 / LEVEL)}"
+        )
+        return [*lines, ""]
+
+    def _length_table(self) -> list[str]:
+        years = self.years
+        k = self.coverage_factor
+        heads = ["length", "difference, µm", "U, µm", "E_n"]
+        rows = [heads + (["µm per year", "U, µm per year"] if years else [])]
+        for group in self.comparison.lengths:
+            for place in _told(group):
+                value, u = group.differences[place], group.standard_uncertainties[place]
+                is_open = math.isnan(u)
+                row = [
+                    f"{group.kind}: {group.names[place]}",
+                    "undetermined" if is_open else number(1e6 * value),
+                    number(1e6 * k * u),
+                    number(group.normalised[place], 3),
+                ]
+                if years:
+                    rate = math.nan if is_open else value / years
+                    row += [number(1e6 * rate), number(1e6 * k * u / abs(years))]
+                rows.append(row)
+        return aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+
+    def _function_table(self) -> list[str]:
+        rows = [["error function", "largest |E_n|", "at", "chi-squared", "of", "p"]]
+        for one in self.comparison.functions:
+            place, test = one.figures.largest, one.test
+            value = math.nan if place is None else abs(float(one.figures.normalised[place]))
+            rows.append(
+                [
+                    f"{one.name} {one.axis}",
+                    "undetermined" if place is None else number(value, 3),
+                    "" if place is None else one.figures.names[place].partition(" at ")[2],
+                    "" if test is None else number(test.statistic),
+                    "" if test is None else str(test.dimensions),
+                    "" if test is None else _chance(test.p),
+                ]
+            )
+        count = sum(one.test is not None for one in self.comparison.functions)
+        told = (
+            f"({count} tests: the smallest p of as many is below {LEVEL / max(count, 1):.2g} once"
+            f" in {round(1 / LEVEL)} where nothing has changed)"
+        )
+        return [*aligned(rows, [False, True, False, True, True, True]), told]
+
+    def to_dict(self) -> dict[str, Any]:
+        found, motion = self.comparison, self.comparison.motion
+        tested = (*self.tests, *(one.test for one in found.functions if one.test is not None))
+        return {
+            "first": _map_data(self.first),
+            "second": _map_data(self.second),
+            "probe": found.probe,
+            "coverage_factor": self.coverage_factor,
+            "shared_values": self.shared,
+            "same_readings": self.in_common == "same",
+            "readings_in_common": self.in_common,
+            "years": self.years,
+            "changed": self.is_changed,
+            "level": LEVEL,
+            "motion": [
+                {
+                    "name": name,
+                    "value": finite(float(value)),
+                    "standard_uncertainty": finite(float(u)),
+                    "unit": "m" if name.startswith("shift") else "rad",
+                }
+                for name, value, u in zip(
+                    motion.names, motion.values, motion.standard_uncertainties, strict=True
+                )
+            ],
+            "tests": [_test_data(one) for one in tested],
+            "groups": [
+                {
+                    **picked(group, "kind", "count", "undetermined", "exceeding"),
+                    "share_by_chance": group.by_chance,
+                }
+                for group in found.groups
+            ],
+            "functions_not_compared": found.why_no_functions or None,
+            "figures": [
+                {
+                    name: finite(value) if isinstance(value, float) else value
+                    for name, value in row.items()
+                }
+                for row in self.rows()
+            ],
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each figure that is compared, or undetermined."""
+        found = []
+        for group in self.comparison.groups:
+            normalised, is_compared = group.normalised, group.is_compared
+            for k, name in enumerate(group.names):
+                u = float(group.standard_uncertainties[k])
+                is_open = math.isnan(u)
+                if not is_open and not is_compared[k]:
+                    continue
+                difference = math.nan if is_open else float(group.differences[k])
+                row = {
+                    "kind": group.kind,
+                    "figure": name,
+                    "difference": difference,
+                    "standard uncertainty": u,
+                    "unit": group.unit,
+                    "E_n": float(normalised[k]),
+                }
+                if self.years:
+                    row["per year"] = difference / self.years
+                found.append(row)
+        return found
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """What changed: the difference at points of the volume as magnified vectors, and E_n of
+        lengths and error functions.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        from .difference_plots import draw_difference
+
+        return draw_difference(self.comparison, f"{self.label}: {self.headline()}", path)
+
+
+def _chance(p: float) -> str:
+    return "below 1e-6" if p < 1e-6 else number(p, 2)
+
+
+def _share(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _told(group: FigureGroup) -> list[int]:
+    """Figures of a group that are told one by one."""
+    if len(group.names) <= TOLD:
+        return list(range(len(group.names)))
+    sizes = comparable(np.nan_to_num(np.abs(group.normalised)))
+    found: list[int] = np.argsort(-sizes, kind="stable")[:LARGEST].tolist()
+    return found
+
+
+def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
+    """Groups of several units as one, of differences in their own standard uncertainties."""
+    compared = [one.is_compared | np.isnan(one.standard_uncertainties) for one in groups]
+    open_ = [
+        np.isnan(one.standard_uncertainties[w]) for one, w in zip(groups, compared, strict=True)
+    ]
+    u = np.where(np.concatenate(open_), np.nan, 1.0)
+    normalised = [one.normalised[which] for one, which in zip(groups, compared, strict=True)]
+    names = (
+        name
+        for one, which in zip(groups, compared, strict=True)
+        for name, is_in in zip(one.names, which, strict=True)
+        if is_in
+    )
+    chances = [one.chances[which] for one, which in zip(groups, compared, strict=True)]
+    k = groups[0].coverage_factor
+    return FigureGroup(
+        "error functions",
+        "1",
+        tuple(names),
+        k * np.concatenate(normalised),
+        u,
+        np.concatenate(chances),
+        k,
+    )
+
+
+def _group_table(groups: Sequence[FigureGroup]) -> list[str]:
+    rows = [["figures", "compared", "|E_n| > 1", "by chance", "largest |E_n|", "at"]]
+    for one in groups:
+        place = one.largest
+        count = str(one.count)
+        if one.undetermined:
+            count += f" ({one.undetermined} undetermined)"
+        share = f"{one.exceeding} ({_share(one.exceeding / one.count)})" if one.count else ""
+        rows.append(
+            [
+                one.kind,
+                count,
+                share,
+                _share(one.by_chance) if one.count else "",
+                "" if place is None else number(abs(float(one.normalised[place])), 3),
+                "" if place is None else one.names[place],
+            ]
+        )
+    return aligned(rows, [False, True, True, True, True, False])
+
+
+def _map_data(one: ComparedMap) -> dict[str, Any]:
+    return {
+        "label": one.label,
+        "title": one.title,
+        "date": one.date,
+        "expected": one.is_expected,
+        "degrees_of_freedom": finite(one.degrees_of_freedom),
+        **({} if one.is_expected else {"lack_of_fit": verdict_data(one.lack_of_fit)}),
+        "frame_takes_out": list(one.held),
+    }
+
+
+def _test_data(test: JointTest) -> dict[str, Any]:
+    return {
+        "what": test.what,
+        "chi_squared": test.statistic,
+        **picked(test, "dimensions", "fixed"),
+        "degrees_of_freedom": finite(test.degrees_of_freedom),
+        "p": test.p,
+    }

@@ -1,0 +1,172 @@
+"""Differences of figures with their uncertainties: normalised errors E_n, and joint tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.results.campaign_tests import (
+    HELD,
+    JointDifference,
+    Roots,
+    SigmaPair,
+    joint_difference,
+    orthonormal,
+    single_chances,
+    with_common,
+)
+from ballplate.simulator.computing.rounding import blank, comparable
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.machines.protocol import Array
+from numpy.typing import NDArray
+
+from .compared_maps import MappedValues
+
+
+@dataclass(frozen=True, eq=False)
+class FigureGroup:
+    """Figures (m,) of one kind, what the second map says less what the first does, with their
+    `names`.
+
+    `standard_uncertainties` (m,) are those of the differences, NaN where one is undetermined;
+    `chances` (m,) are those of |E_n| > 1 where nothing has changed. `unit` is m or rad.
+    """
+
+    kind: str
+    unit: str
+    names: tuple[str, ...]
+    differences: Array
+    standard_uncertainties: Array
+    chances: Array
+    coverage_factor: float = 2.0
+
+    @property
+    def count(self) -> int:
+        """How many are compared: those that are determined, and not held by the frame."""
+        return int(self.is_compared.sum())
+
+    @property
+    def undetermined(self) -> int:
+        return int(np.isnan(self.standard_uncertainties).sum())
+
+    @property
+    def is_compared(self) -> NDArray[np.bool_]:
+        u = self.standard_uncertainties
+        largest = np.nanmax(u, initial=0.0)
+        return np.asarray(~np.isnan(u) & (u > HELD * largest))
+
+    @property
+    def normalised(self) -> Array:
+        """E_n (m,): the difference over its expanded uncertainty; NaN where it is not compared."""
+        u = np.where(self.is_compared, self.standard_uncertainties, np.nan)
+        return np.asarray(self.differences / (self.coverage_factor * u))
+
+    @property
+    def exceeding(self) -> int:
+        """How many have |E_n| > 1."""
+        return int((np.abs(self.normalised) > 1.0).sum())
+
+    @property
+    def by_chance(self) -> float:
+        """Share of |E_n| > 1 that is to be expected where nothing has changed."""
+        return float(self.chances[self.is_compared].mean()) if self.count else 0.0
+
+    @property
+    def largest(self) -> int | None:
+        """Place of the largest |E_n|; None where nothing is compared."""
+        if not self.count:
+            return None
+        return int(comparable(np.nan_to_num(np.abs(self.normalised))).argmax())
+
+
+@dataclass(frozen=True)
+class JointTest(JointDifference):
+    """One test of many figures together, with what they are."""
+
+    what: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ValueDifference:
+    """The same functions (m,) by two maps."""
+
+    first: MappedValues
+    second: MappedValues
+    scatters: SigmaPair
+
+    @property
+    def values(self) -> Array:
+        """What the second says less what the first does."""
+        return self.second.values - self.first.values
+
+    def by(self, matrix: Array) -> ValueDifference:
+        """Linear functions of these, by a matrix (k, m)."""
+        return ValueDifference(self.first.by(matrix), self.second.by(matrix), self.scatters)
+
+    def without(self, basis: Array) -> ValueDifference:
+        """These less their parts in a space of changes of orthonormal columns (m, k)."""
+        return ValueDifference(self.first.without(basis), self.second.without(basis), self.scatters)
+
+    @property
+    def is_open(self) -> NDArray[np.bool_]:
+        """Which (m,) either map leaves undetermined."""
+        values = np.zeros(len(self.values))
+        for one in (self.first, self.second):
+            values = values + blank(np.zeros(len(values)), one.null, one.size)
+        return np.isnan(values)
+
+    @property
+    def roots(self) -> Roots:
+        """Square roots (m, r) of both campaigns' parts of the covariance."""
+        one, other = self.first, self.second
+        first, second = (scatter.sigma for scatter in self.scatters)
+        common = one.shared / first - other.shared / second
+        return with_common((one.root, other.root), common, self.scatters)
+
+    def variances(self) -> Roots:
+        """Both campaigns' parts of the variances (m,)."""
+        first, second = ((root**2).sum(axis=1) for root in self.roots)
+        return first, second
+
+    def standard_uncertainties(self) -> Array:
+        """Of the differences (m,); NaN where one is undetermined."""
+        return np.where(self.is_open, np.nan, np.sqrt(sum(self.variances())))
+
+    def group(
+        self,
+        kind: str,
+        unit: str,
+        names: tuple[str, ...],
+        coverage_factor: float,
+        stated: tuple[Array | float, Array | float] = (0.0, 0.0),
+    ) -> FigureGroup:
+        """The differences as figures of one kind; `stated` variances (m,) of either side are
+        added.
+        """
+        first, second = (one + more for one, more in zip(self.variances(), stated, strict=True))
+        with np.errstate(invalid="ignore"):
+            shares = np.nan_to_num(first / (first + second))
+        u = np.where(self.is_open, np.nan, np.sqrt(first + second))
+        chances = single_chances(coverage_factor, shares, self.scatters)
+        return FigureGroup(kind, unit, names, self.values, u, chances, coverage_factor)
+
+    @single_threaded
+    def joint_test(self, what: str) -> JointTest | None:
+        """The test of all of them together, in the space of what has an uncertainty less what is
+        undetermined; None where nothing is left of it.
+        """
+        both = self.first, self.second
+        found = self.by(
+            orthonormal(np.hstack([m for one in both for m in (one.root, one.shared)])).T
+        )
+        null = np.concatenate([one.null for one in (found.first, found.second)], axis=1)
+        if null.shape[1]:
+            size = max(
+                float(np.abs(one.size).max(initial=0.0)) for one in (found.first, found.second)
+            )
+            open_ = orthonormal(null, 1e-7, size)
+            left = orthonormal(np.eye(len(null)) - open_ @ open_.T, 1e-6, 1.0)
+            found = found.by(left.T)
+        alone = [m for one in (found.first, found.second) for m in (one.root, one.shared)]
+        test = joint_difference(found.values, found.roots, self.scatters, np.hstack(alone))
+        return None if test is None else JointTest(**vars(test), what=what)

@@ -1,0 +1,107 @@
+"""Budgets of parametric errors as text for people and as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.formatting import aligned, number
+
+from .fitted_tables import ROUNDING, UNDETERMINED
+from .part_budget import REST, PartBudget
+
+# A part that contributes less to all figures, in metres, is left out of tables.
+NOTHING = 1e-9
+
+OF_POINTS = (
+    "error alone: root mean square of the part's vectors; share: mean product of the part with the"
+    " whole error, in parts of the mean square; shares add to 1"
+)
+OF_LENGTHS = "contributions to the error of a length add to the whole"
+OF_ESTIMATES = (
+    "share of variance: covariance of the part with the whole; shares add to 1. Estimates are"
+    " correlated: a part alone may be less certain than the whole, and a share negative. Parts"
+    " depend on the frame, the whole of a length does not"
+)
+OF_SOURCES = "share of variance: random parts are independent, and add in squares"
+
+
+def budget_lines(
+    figures: Sequence[PartBudget], factor: float = 1.0, correlated: bool = True
+) -> list[str]:
+    """What the parts contribute: to the errors at points, then to all lengths and to their
+    variances.
+    """
+    shown = [k for k in range(len(figures[0].parts)) if any(_is_shown(one, k) for one in figures)]
+    word = f"U alone, k = {factor:g}" if correlated else "random"
+    lines, lengths = [], [one for one in figures if one.is_length]
+    for one in (one for one in figures if not one.is_length):
+        heads = ["error alone, µm", "share", f"{word}, µm", "share of variance"]
+        rows = [[f"budget: {one.figure}", "", *heads]]
+        for k in shown:
+            cells = [_shown(one.errors[k]), _percent(one.shares[k])]
+            cells += [_shown(factor * one.uncertainties[k]), _percent(one.variance_shares[k])]
+            rows.append([*one.parts[k], *cells])
+        rows.append(["whole", "", _shown(one.total), "", _shown(factor * one.uncertainty), ""])
+        lines += [*aligned(rows, [False, False, True, True, True, True]), ""]
+    names = [one.figure for one in lengths]
+    whole = f"U, k = {factor:g}, µm" if correlated else "random, µm"
+    right = [False, *[True] * len(names)]
+    rows = [["error of length, µm", *names]]
+    rows += [[figures[0].parts[k][0], *(_shown(one.errors[k]) for one in lengths)] for k in shown]
+    rows.append(["whole", *(_shown(one.total) for one in lengths)])
+    lines += [*aligned(rows, right), ""]
+    rows = [["share of variance", *names]]
+    if not any(one.uncertainty for one in figures):
+        shown = []
+    for k in shown:
+        shares = [_percent(one.variance_shares[k]) for one in lengths]
+        rows.append([figures[0].parts[k][0], *shares])
+    rows.append([whole, *(_shown(factor * one.uncertainty) for one in lengths)])
+    lines += [*aligned(rows, right), ""]
+    left = len(figures[0].parts) - len(shown)
+    told = [f"(parts that contribute nothing, {left} of them, are left out)"] if left else []
+    return [*lines, *told, OF_POINTS, OF_LENGTHS, OF_ESTIMATES if correlated else OF_SOURCES]
+
+
+def _is_shown(one: PartBudget, k: int) -> bool:
+    sizes = np.array([abs(one.errors[k]), one.uncertainties[k]])
+    if np.isnan(sizes).any():
+        return one.parts[k] != REST
+    return bool(sizes.max() > NOTHING)
+
+
+def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict[str, Any]]:
+    """The same in metres."""
+    return [
+        {
+            "figure": one.figure,
+            "is_length": one.is_length,
+            "error": one.total,
+            "expanded_uncertainty": factor * one.uncertainty,
+            "coverage_factor": factor,
+            "parts": [
+                {
+                    "part": name,
+                    "meaning": meaning,
+                    "error": float(one.errors[k]),
+                    "share": float(one.shares[k]),
+                    "expanded_uncertainty": factor * float(one.uncertainties[k]),
+                    "share_of_variance": float(one.variance_shares[k]),
+                }
+                for k, (name, meaning) in enumerate(one.parts)
+            ],
+        }
+        for one in figures
+    ]
+
+
+def _shown(value: float) -> str:
+    if np.isnan(value):
+        return UNDETERMINED
+    return number(0.0 if abs(value) < ROUNDING else 1e6 * float(value))
+
+
+def _percent(share: float) -> str:
+    return "-" if np.isnan(share) else f"{100.0 * share:z.1f} %"

@@ -1,0 +1,92 @@
+"""Differences of plates that two fits have both estimated: ball by ball, whatever their frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.results.campaign_tests import orthonormal
+from ballplate.results.fit import Fit
+from ballplate.simulator.estimation.functions import BallPlaces, displacements
+from ballplate.simulator.geometry.motions import AXIS_NAMES, fit_motion
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .compared_maps import ComparedMap, MappedValues, motions, without_shared
+from .normalised_errors import FigureGroup, JointTest, ValueDifference
+
+# Balls of a plate beyond which it is not compared: their joint covariance takes too much memory.
+MOST_BALLS = 500
+
+
+@dataclass(frozen=True, eq=False)
+class PlateDifference:
+    """A plate in two fits: the co-ordinates of its balls after the motion of its frame that fits
+    best, and all of them together.
+    """
+
+    artefact: str
+    figures: FigureGroup
+    test: JointTest | None
+
+
+def plate_differences(
+    first: ComparedMap, second: ComparedMap, coverage_factor: float
+) -> tuple[PlateDifference, ...]:
+    """The plates of the same names that both maps' fits have estimated."""
+    if first.fit is None or second.fit is None:
+        return ()
+    found = []
+    scatters = first.scatter, second.scatter
+    for name in _plates(first.fit):
+        if name not in _plates(second.fit):
+            continue
+        balls = [_balls(one, name) for one in (first.fit, second.fit)]
+        common = [ball for ball in balls[0] if ball in balls[1]]
+        d = first.dimension
+        if not d <= len(common) <= MOST_BALLS:
+            continue
+        one, other = (
+            _estimated(of, np.array([own[ball] for ball in common]))
+            for of, own in zip((first, second), balls, strict=True)
+        )
+        places = one.values.reshape(-1, d)
+        rotation, origin = fit_motion(other.values.reshape(-1, d), places)
+        turned = other.by(np.asarray(np.kron(np.eye(len(common)), rotation)))
+        shifted = turned.values + np.tile(origin, len(common))
+        other = MappedValues(shifted, turned.root, turned.null, turned.size, turned.shared)
+        moving = motions(places - places.mean(axis=0)).reshape(places.size, -1)
+        left = ValueDifference(one, other, scatters).without(orthonormal(moving))
+        names = tuple(f"{ball} {axis}" for ball in common for axis in AXIS_NAMES[:d])
+        kind = f"balls of {name}"
+        group = left.group(kind, "m", names, coverage_factor)
+        found.append(PlateDifference(name, group, left.joint_test(kind)))
+    return tuple(found)
+
+
+def _plates(fit: Fit) -> tuple[str, ...]:
+    artefacts = fit.design.artefacts
+    return tuple(
+        name for name, is_plate in zip(artefacts.names, artefacts.is_plate, strict=True) if is_plate
+    )
+
+
+def _balls(fit: Fit, artefact: str) -> dict[str, int]:
+    """Indices of a plate's balls by name."""
+    design = fit.design
+    own = design.balls.of(design.artefacts.names.index(artefact))
+    return {design.balls.names[ball]: int(ball) for ball in own}
+
+
+def _estimated(one: ComparedMap, index: Integers) -> MappedValues:
+    """Co-ordinates (n d,) of the balls of indices (n,) in the frame of their artefact."""
+    assert one.fit is not None
+    moved = displacements(one.fit.functions.at, BallPlaces(index))
+    n, d = moved.places.shape
+    balls = len(one.fit.design.balls.names)
+    own = np.zeros((n, d, balls, moved.own.shape[2]))
+    own[np.arange(n), :, index] = moved.own
+    common = moved.common.reshape(n * d, -1)
+    root: Array = one.fit.sigma * np.concatenate([common, own.reshape(n * d, -1)], axis=1)
+    root, shared = without_shared(root, one.absorbed)
+    null = moved.null.reshape(n * d, -1)
+    return MappedValues(moved.places.ravel(), root, null, moved.size.ravel(), shared)

@@ -1,0 +1,143 @@
+"""Maps to be compared, from files: map files, machine files, experiments with their readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from ballplate.results.fit import Fit
+from ballplate.results.fit_of_file import fit_of_file, kind_of_file
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.experiment.map_files import read_map
+from ballplate.simulator.inputs.quantities import LengthFunction
+from ballplate.simulator.inputs.tables import header_names, read_table
+from ballplate.simulator.machines.description import MachineDescription
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.readings.point_files import NAMING
+from ballplate.simulator.readings.reading_files import AXES
+
+from .compared_maps import ComparedMap, expected_map, map_of_fit
+from .comparison import ComparisonSettings, NotComparableError, compared
+from .map_difference import MapDifference
+from .shared_certificates import with_shared_certificates
+
+Side = Path | Fit | FittedMap
+
+
+def map_difference(
+    sides: tuple[Side, Side],
+    settings: ComparisonSettings,
+    shared: bool = False,
+    stated: LengthFunction | None = None,
+    dates: tuple[str | None, str | None] = (None, None),
+) -> MapDifference:
+    """The second of two `sides` less the first: each a fit, a fitted map, or the path of a map
+    file, a machine file or an experiment that names its readings.
+
+    With `shared` the errors of certified values that both fits have cancel. `stated` is the
+    standard uncertainty of lengths by a machine file; `dates` are days of the campaigns, by default
+    those that the maps state.
+
+    :raises ExperimentError: a file is wrong.
+    :raises NotComparableError: the maps, or what is asked for, do not go together.
+    :raises NothingSharedError: `shared` without two fits that share anything.
+    """
+    labels = _labels(sides)
+    described = [
+        load_machine(side) if isinstance(side, Path) and kind_of_file(side) == "machine" else None
+        for side in sides
+    ]
+    if all(described):
+        text = "both files describe machines, and nothing was measured; name a map, or a fit"
+        raise NotComparableError(text)
+    if stated is not None and not any(described):
+        raise NotComparableError("an uncertainty is stated of a machine file, and there is none")
+    measured = [
+        None if machine else _measured(side, label, day)
+        for side, label, day, machine in zip(sides, labels, dates, described, strict=True)
+    ]
+    dimension = next(one.dimension for one in measured if one is not None)
+    if isinstance(settings.points, Path):
+        settings = replace(settings, points=read_points(settings.points, dimension))
+    first, second = (
+        one or _expected(machine, label, dimension, stated, day)
+        for one, machine, label, day in zip(measured, described, labels, dates, strict=True)
+    )
+    count = None
+    if shared:
+        first, second, count = with_shared_certificates(first, second)
+    return MapDifference(
+        first, second, compared(first, second, settings), settings.coverage_factor, count
+    )
+
+
+def read_points(path: Path, dimension: int) -> Array:
+    """Points (n, d) in metres of a CSV file with the columns x_mm, y_mm and, in space, z_mm; their
+    names, if it has any, are not needed.
+
+    :raises ExperimentError: the file is wrong.
+    """
+    names = tuple(name for name in header_names(path) if name in NAMING)
+    rows = read_table(path, names, AXES[:dimension])
+    return np.array([row.lengths for row in rows])
+
+
+def _expected(
+    machine: MachineDescription | None,
+    label: str,
+    dimension: int,
+    stated: LengthFunction | None,
+    day: str | None,
+) -> ComparedMap:
+    assert machine is not None
+    return expected_map(machine, label, dimension, stated, day)
+
+
+def _labels(sides: tuple[Side, Side]) -> tuple[str, str]:
+    """Short names of both sides that differ."""
+    names = [
+        side.stem
+        if isinstance(side, Path)
+        else side.experiment
+        if isinstance(side, FittedMap)
+        else side.label
+        for side in sides
+    ]
+    paths = [
+        str(side) if isinstance(side, Path) else name
+        for side, name in zip(sides, names, strict=True)
+    ]
+    for first, second in (names, paths):
+        if first != second and first and second:
+            return first, second
+    return "first", "second"
+
+
+def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
+    if isinstance(side, Fit):
+        return map_of_fit(side, label, day)
+    if isinstance(side, Path):
+        if kind_of_file(side) == "experiment":
+            return map_of_fit(fit_of_file(side), label, day)
+        side = read_map(side)
+    own = slice(len(side.values))
+    return ComparedMap(
+        label,
+        side.title,
+        side.model,
+        side.values,
+        side.root[own],
+        side.undetermined[own],
+        np.zeros((len(side.values), 0)),
+        side.degrees_of_freedom if side.sigma_is_estimated else np.inf,
+        side.volume,
+        dict(zip(side.probes.names, side.probes.offsets, strict=True)),
+        side.probe,
+        day or side.date,
+        data=side.data,
+        lack_of_fit=side.lack_of_fit,
+        cautions=(side.known_lack_of_fit.caution,),
+        sigma=side.sigma,
+    )

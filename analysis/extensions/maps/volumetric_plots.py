@@ -1,0 +1,263 @@
+"""Drawings of volumetric errors: a displaced grid, errors along a line, and a parametric error
+along its axis.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ballplate.presentation.formatting import SHOWN, number
+from ballplate.presentation.pictures import draw_box
+from ballplate.presentation.scene import box, projection
+from ballplate.presentation.svg import (
+    DASHES,
+    INK,
+    MARKERS,
+    MUTED,
+    PAPER,
+    SERIES,
+    blank_axes,
+    drawing,
+    legend_above,
+    placed_axes,
+    round_number,
+    save,
+)
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.machines.arrangement import AXES
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.volumetric import meaning, symbol
+
+from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 52.0
+
+# Part of the volume's diagonal that the largest displacement is drawn as, about.
+LARGEST = 0.06
+
+# Lines that are drawn of a face of the grid in each direction, and points of each line; the table
+# has them all.
+MOST_LINES, MOST_ON_LINE = 41, 201
+
+# Between the plot and its title, in points: the legend stands there and covers nothing.
+TITLE_PAD = 26.0
+
+# Points beyond which they are not marked one by one.
+MOST_MARKS = 60
+
+
+def magnification_of(errors: VolumetricErrors) -> float:
+    """A round factor that makes the largest error well visible in the volume."""
+    size = float(np.linalg.norm(np.ptp(errors.points, axis=0)))
+    largest = float(np.nanmax(errors.resultant))
+    return round_number(LARGEST * size / largest) if largest else 1.0
+
+
+def draw_grid(
+    errors: VolumetricErrors,
+    diagonals: LengthErrors,
+    counts: tuple[int, int, int],
+    magnified: float | None = None,
+    path: str | Path | None = None,
+) -> Figure:
+    """A picture of the grid's outside, nominal and displaced, which is written to the path if there
+    is one.
+
+    :raises OSError: the file cannot be written.
+    """
+    factor = magnified or magnification_of(errors)
+    view, away = projection(3)
+    nominal = errors.points.reshape(*counts, 3)
+    moved = nominal + factor * errors.systematic.reshape(*counts, 3)
+    with drawing(430.0, WIDTH) as figure:
+        axes = blank_axes(figure)
+        volume = box(nominal[0, 0, 0], nominal[-1, -1, -1])
+        draw_box(axes, volume)
+        for axis in range(3):
+            near = -1 if away[axis] < 0 else 0
+            for side, is_near in ((near, True), (-1 - near, False)):
+                # The front faces with all their lines, the rear ones by their edges, so that the
+                # front stays readable.
+                _face(axes, nominal.take(side, axis) @ view.T, MUTED, 0.5, is_near)
+                _face(axes, moved.take(side, axis) @ view.T, SERIES[0], 1.1, is_near)
+        size = volume.size
+        drawn = np.concatenate([volume.edges.reshape(-1, 2), moved.reshape(-1, 3) @ view.T])
+        low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
+        middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
+        for k, corner in enumerate(diagonals.starts @ view.T):
+            x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
+            circle = {
+                "boxstyle": "circle,pad=0.2",
+                "facecolor": PAPER,
+                "edgecolor": MUTED,
+                "linewidth": 0.7,
+            }
+            axes.text(x, y, str(k + 1), ha="center", va="center", fontsize=8.5, bbox=circle)
+        axes.plot([], [], color=MUTED, linewidth=0.9, label="nominal grid")
+        axes.plot(
+            [], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor:g} times"
+        )
+        axes.legend(loc="upper left", borderaxespad=0.8)
+        told = [
+            f"{k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)
+        ]
+        lengths = f"length errors of the diagonals from the corners {', '.join(told)}"
+        figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
+        axes.set_xlim(low[0] - 0.2 * size, high[0] + 0.16 * size)
+        axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
+        return save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
+
+
+def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
+    """Lines of a face (n, m, 2) of the grid."""
+    for lines in (face, face.transpose(1, 0, 2)):
+        chosen = lines[_spread(len(lines), MOST_LINES)] if is_near else lines[[0, -1]]
+        for line in chosen[:, _spread(lines.shape[1], MOST_ON_LINE)]:
+            axes.plot(*line.T, color=colour, linewidth=width, linestyle="-" if is_near else ":")
+
+
+def _spread(count: int, most: int) -> Integers:
+    """Indices of all, or of `most` evenly spread ones of them, both ends included."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+
+
+def draw_line(
+    found: VolumetricErrors,
+    path: str | Path | None = None,
+    factor: float = 2.0,
+    band: str = "2 standard deviations",
+    what: str = "error",
+) -> Figure:
+    """A picture of the errors along a line: components, resultant, and a `factor` times the random
+    part about them, as `band` says, with `what` they are; it is written to the path, if there is
+    one.
+
+    :raises OSError: the file cannot be written.
+    """
+    start, end = 1e3 * found.points[0], 1e3 * found.points[-1]
+    moving = np.flatnonzero(start != end)
+    if len(moving) == 1:
+        axis = int(moving[0])
+        name, positions = "xyz"[axis], 1e3 * found.points[:, axis]
+        others = [k for k in range(len(start)) if k != axis]
+        where = ", ".join(f"{'xyz'[k]} = {start[k] + 0.0:.6g} mm" for k in others)
+        along = f"along {name} at {where}"
+    else:
+        name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
+        ends = [f"({', '.join(f'{v + 0.0:.6g}' for v in point)})" for point in (start, end)]
+        where = along = f"from {ends[0]} to {ends[1]} mm"
+    with drawing(320.0, WIDTH) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 320.0 - BELOW - ABOVE)
+        axes.set_title(where, loc="left", pad=TITLE_PAD)
+        for k, letter in enumerate("XYZ"[: len(start)]):
+            values, half = 1e6 * found.systematic[:, k], 1e6 * factor * found.deviation[:, k]
+            _band(axes, positions, values, half, k, letter)
+        axes.plot(
+            positions,
+            1e6 * found.resultant,
+            color=INK,
+            linewidth=1.2,
+            linestyle=DASHES[3],
+            label="resultant",
+        )
+        _band_in_legend(axes, bool(found.deviation.any()), band)
+        _finish(axes, f"{name}, mm", f"{what}, µm")
+        worst = int(comparable(np.nan_to_num(found.resultant)).argmax())
+        told = (
+            f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
+            f" {positions[worst]:.6g} mm"
+        )
+        return save(figure, path, f"Volumetric errors {along}: {told}")
+
+
+def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
+    """A picture of a parametric error along its axis, as stated and at the reference point; it is
+    written to the path, if there is one.
+
+    :raises OSError: the file cannot be written.
+    """
+    positions = 1e3 * along.positions
+    name, unit = along.error.name, SHOWN[along.unit]
+    with drawing(280.0, WIDTH) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
+        band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
+        axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left", pad=TITLE_PAD)
+        values = np.zeros(len(positions)) if along.values is None else 1e6 * along.values
+        deviation = np.zeros(len(positions)) if along.deviation is None else 1e6 * along.deviation
+        label = "random part alone" if along.values is None else "at the reference point"
+        _band(axes, positions, values, 2.0 * deviation, 0, label, mark=False)
+        if (
+            along.stated is not None
+            and along.values is not None
+            and (along.stated != along.values).any()
+        ):
+            axes.plot(
+                positions,
+                1e6 * along.stated,
+                color=SERIES[1],
+                linestyle=DASHES[1],
+                label="as stated",
+            )
+        if along.measured is not None:
+            x, y = 1e3 * np.array(along.measured.positions), 1e6 * np.array(along.measured.values)
+            axes.plot(
+                x,
+                y,
+                color=SERIES[1],
+                linestyle="none",
+                marker=MARKERS[1],
+                markersize=4.0,
+                markerfacecolor=PAPER,
+                label="measured",
+                clip_on=False,
+                zorder=3,
+            )
+        _band_in_legend(axes, bool(deviation.any()))
+        _finish(axes, f"{AXES[along.error.axis]}, mm", unit)
+        return save(figure, path, f"{name}, {meaning(name)}{band}")
+
+
+def _band(
+    axes: Axes, x: Array, values: Array, half: Array, k: int, label: str, mark: bool = True
+) -> None:
+    """A curve, and a band of `half` its width on either side."""
+    marker = MARKERS[k] if mark and len(x) <= MOST_MARKS else ""
+    axes.plot(
+        x,
+        values,
+        color=SERIES[k],
+        linestyle=DASHES[k],
+        marker=marker,
+        markersize=3.5,
+        markerfacecolor=PAPER,
+        label=label,
+        clip_on=not marker,
+        zorder=3,
+    )
+    if half.any():
+        low, high = values - half, values + half
+        axes.fill_between(x, low, high, color=SERIES[k], alpha=0.1, linewidth=0)
+        # Where bands overlap their edges tell whose they are.
+        for edge in (low, high):
+            axes.plot(x, edge, color=SERIES[k], linewidth=0.7, linestyle=DASHES[k])
+
+
+def _band_in_legend(axes: Axes, is_drawn: bool, words: str = "2 standard deviations") -> None:
+    """An entry for the bands of all colours."""
+    if is_drawn:
+        axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label=f"± {words}")
+
+
+def _finish(axes: Axes, x: str, y: str) -> None:
+    axes.axhline(0.0, color=MUTED, linewidth=0.6)
+    axes.grid(True)
+    axes.margins(x=0.0)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    legend_above(axes, 5)

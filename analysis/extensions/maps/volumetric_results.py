@@ -1,0 +1,262 @@
+"""Volumetric errors of a machine as they show themselves: on a grid, along a line, and one error
+along its axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ballplate.presentation.formatting import as_data
+from ballplate.presentation.result import Result
+from ballplate.presentation.scene import box_edges, projection
+from ballplate.presentation.vectors import Vectors, draw_vectors
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.inputs.messages import Message
+from ballplate.simulator.machines.volumetric import meaning
+
+from .fitted_tables import realisation_lines
+from .map_places import MapPlaces, PlacesAsked, map_places
+from .part_budget import PartBudget, machine_budget
+from .part_tables import budget_data, budget_lines
+from .realisations import Draws, Realisations
+from .volumetric_errors import (
+    AlongAxis,
+    LengthErrors,
+    Volumetric,
+    VolumetricErrors,
+    along_axes,
+    drawn_machine_errors,
+)
+from .volumetric_plots import draw_along, draw_grid, draw_line
+from .volumetric_tables import (
+    along_csv,
+    along_data,
+    along_lines,
+    diagonal_data,
+    diagonal_lines,
+    error_csv,
+    error_data,
+    error_lines,
+    length_data,
+    length_line,
+    machine_data,
+    machine_lines,
+    why_not_along,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class MachineErrors(Result):
+    """Errors of the machine of a file; `doubts` are what of the file is unlikely to be meant."""
+
+    label: str
+    machine: Volumetric
+    doubts: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        return self.machine.machine.title
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(f"warning: {doubt}" for doubt in self.doubts)
+
+    def point_lines(self) -> Iterator[str]:
+        """The points alone as lines of a CSV file, in units that its columns name."""
+        raise NotImplementedError
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The errors as a picture.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorsAtPoints(MachineErrors):
+    """Volumetric errors at `places`: `errors` at its points, and the errors of its `lengths`.
+
+    `realisations` of the random part are drawn where they were asked for, and `with_budget` says
+    whether the contributions of the parametric errors are shown.
+    """
+
+    places: MapPlaces
+    errors: VolumetricErrors
+    lengths: LengthErrors
+    realisations: Realisations | None = None
+    with_budget: bool = False
+
+    def headline(self) -> str:
+        largest = 1e6 * float(self.errors.resultant.max())
+        return f"{len(self.errors.points)} points, resultant {largest:.4g} µm at most"
+
+    @cached_property
+    def budget(self) -> tuple[PartBudget, ...]:
+        """What each parametric error contributes: to the errors at the points, and to each of the
+        lengths.
+        """
+        return machine_budget(self.machine, self.places)
+
+    def more_lines(self) -> list[str]:
+        """Realisations and budget as lines of text, where they were asked for."""
+        lines = []
+        if self.realisations is not None:
+            lines += ["", *realisation_lines(self.realisations, self.places.names)]
+        if self.with_budget:
+            lines += ["", *budget_lines(self.budget, correlated=False)]
+        return lines
+
+    def more_data(self) -> dict[str, Any]:
+        """Realisations and budget as plain data, where they were asked for."""
+        found: dict[str, Any] = {}
+        if self.realisations is not None:
+            found["realisations"] = self.realisations.to_dict()
+        if self.with_budget:
+            found["budget"] = as_data(budget_data(self.budget))
+        return found
+
+    def lines(self) -> list[str]:
+        diagonals = diagonal_lines(self.lengths)
+        points = error_lines(self.errors)
+        return [*machine_lines(self.machine), "", *diagonals, "", *points, *self.more_lines()]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            **machine_data(self.machine),
+            "diagonals": diagonal_data(self.lengths),
+            self.places.kind: error_data(self.errors),
+            **self.more_data(),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each point, in metres."""
+        found = self.errors
+        columns = {
+            **{axis: found.points[:, k] for k, axis in enumerate("xyz")},
+            **{f"error {axis}": found.systematic[:, k] for k, axis in enumerate("xyz")},
+            "resultant": found.resultant,
+            **{f"random {axis}": found.deviation[:, k] for k, axis in enumerate("xyz")},
+        }
+        values = zip(*(column.tolist() for column in columns.values()), strict=True)
+        return [dict(zip(columns, row, strict=True)) | {"unit": "m"} for row in values]
+
+    def point_lines(self) -> Iterator[str]:
+        return error_csv(self.errors, self.realisations, self.places.names_of_points)
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The errors as vectors, magnified, seen from the front and above."""
+        view, towards = projection(3)
+        volume, found = self.machine.volume, self.errors
+        edges = box_edges(volume.lower, volume.upper, towards)[0]
+        vectors = Vectors("", found.points @ view.T, found.systematic @ view.T)
+        return draw_vectors((vectors,), self.title, path, edges @ view.T, "errors")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VolumetricMap(ErrorsAtPoints):
+    """Errors on a grid over the volume, and of the four body diagonals."""
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Numbers of points along the axes."""
+        x, y, z = self.places.counts
+        return x, y, z
+
+    def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
+        """The outside of the grid, nominal and displaced by its magnified errors."""
+        return draw_grid(self.errors, self.lengths, self.counts, magnification, path)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorsOnLine(ErrorsAtPoints):
+    """Errors along a line, and that of its length."""
+
+    def lines(self) -> list[str]:
+        return [*error_lines(self.errors), length_line(self.lengths), *self.more_lines()]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            **machine_data(self.machine),
+            "length": length_data(self.lengths)[0],
+            "line": error_data(self.errors),
+            **self.more_data(),
+        }
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        return draw_line(self.errors, path)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorAlongAxis(MachineErrors):
+    """One parametric error along its axis."""
+
+    along: AlongAxis
+
+    def headline(self) -> str:
+        error, unit = self.along.error, "µrad" if self.along.error.is_rotation else "µm"
+        return f"{error.name}, {meaning(error.name)}, range {1e6 * self.along.range:.4g} {unit}"
+
+    def lines(self) -> list[str]:
+        return along_lines(self.along)
+
+    def to_dict(self) -> dict[str, Any]:
+        return along_data(self.along)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each place along the axis, in metres and radians."""
+        data = self.to_dict()
+        names = [name for name in ("position", "stated", "value", "random") if data[name]]
+        columns = zip(*(data[name] for name in names), strict=True)
+        return [dict(zip(names, row, strict=True)) | {"unit": data["unit"]} for row in columns]
+
+    def point_lines(self) -> Iterator[str]:
+        return along_csv(self.along)
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        return draw_along(self.along, path)
+
+
+def machine_errors(
+    file: Path,
+    asked: PlacesAsked,
+    error: str | None = None,
+    draws: Draws | None = None,
+    with_budget: bool = False,
+) -> MachineErrors:
+    """Errors of a machine file at the places asked for, or of one parametric error along its axis.
+
+    :raises ExperimentError: the file is wrong.
+    :raises ValueError: what does not go together, or is not in the machine.
+    """
+    doubts: list[Message] = []
+    machine = load_machine(file, doubts)
+    built = Volumetric(machine)
+    common = file.stem, built, tuple(map(str, doubts))
+    if error is not None:
+        every = {one.error.name: one for one in along_axes(machine)}
+        if error not in every:
+            raise ValueError(why_not_along(error, built, str(file)))
+        return ErrorAlongAxis(*common, every[error])
+    if draws is not None and not built.is_random:
+        raise ValueError("this machine has no random part; leave the realisations out")
+    places = map_places(built.volume, asked)
+    kind = {"grid": VolumetricMap, "line": ErrorsOnLine}.get(places.kind, ErrorsAtPoints)
+    return kind(
+        *common,
+        places,
+        built.errors(places.points),
+        built.lengths(places.starts, places.ends),
+        None if draws is None else drawn_machine_errors(built, places, draws),
+        with_budget,
+    )

@@ -1,0 +1,385 @@
+"""Volumetric errors as text for people, as CSV and as plain data for programs."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.formatting import (
+    SHOWN,
+    aligned,
+    as_data,
+    ascii_units,
+    csv_lines,
+    fixed,
+    number,
+    records,
+)
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.machines.arrangement import AXES, Arrangement
+from ballplate.simulator.machines.curves import NAMES, SmoothedPoints
+from ballplate.simulator.machines.protocol import Array, Parameter
+from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
+
+from .realisations import Realisations
+from .volumetric_errors import (
+    AlongAxis,
+    LengthErrors,
+    Volumetric,
+    VolumetricErrors,
+    along_axes,
+)
+
+CONVENTION = (
+    "errors are the tip's position less that of the scales: corrections, to be added to readings"
+)
+RANDOM = (
+    "random: one standard deviation; parts new at each approach and lasting ones, in quadrature"
+)
+
+
+def machine_lines(built: Volumetric) -> list[str]:
+    """What the machine is and its parametric errors."""
+    machine = built.machine
+    name = f"{machine.arrangement_name}: " if machine.arrangement_name else ""
+    lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
+    rows = [["", "symbol", "error", "range", "random", "unit", "stated as"]]
+    for one in along_axes(machine):
+        name = one.error.name
+        random = "" if one.deviation is None else number(1e6 * float(one.deviation.max()))
+        found = "" if one.values is None else number(1e6 * one.range)
+        rows.append([name, symbol(name), meaning(name), found, random, _unit(one), _stated_as(one)])
+    lines += (
+        aligned(rows, [False, False, False, True, True, False, False])
+        if len(rows) > 1
+        else ["no errors of axes"]
+    )
+    others = _others(built)
+    lines += ["", *aligned(others, [False, False, False, True, False])] if others else []
+    return [*lines, *(["", RANDOM] if built.is_random else [])]
+
+
+def _chain(arrangement: Arrangement) -> str:
+    sides = []
+    for side, load in (
+        (arrangement.probe_side, "the probe"),
+        (arrangement.workpiece_side, "the workpiece"),
+    ):
+        if side:
+            sides.append(" carries ".join([*side, load]))
+    return ", ".join(sides)
+
+
+def _stated_as(along: AlongAxis) -> str:
+    error = along.error
+    if along.values is None:
+        return "random"
+    form = "polynomial"
+    if along.measured is not None:
+        form = f"table of {len(along.measured.positions)} points"
+    if isinstance(along.measured, SmoothedPoints):
+        sigma = number(1e6 * along.measured.fitted.sigma, 2)
+        curve = "spline" if along.measured.knots else "polynomial"
+        form = f"{curve} fitted to the {form}, sigma {sigma} {_unit(along)}"
+    if error.line is not None and not error.is_rotation:
+        others = [k for k in range(3) if k != error.axis]
+        form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)
+    return form + (f", {error.criterion}" if error.is_straightness else "")
+
+
+def why_not_along(name: str, built: Volumetric, file: str) -> str:
+    """Why there is no parametric error of that name along an axis."""
+    stated = {one.name for one in built.machine.errors}
+    value = {
+        parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}"
+        for parameter, size in _numbers(built)
+    }
+    if name in SQUARENESS:
+        told = (
+            f"{value[name]} at the reference point, in the table without --error"
+            if name in value
+            else "not stated"
+        )
+        return f"{name} is the {meaning(name)}, a single number: {told}"
+    if name in NAMES:
+        return (
+            f"{file} does not state {name}, {meaning(name)}; it is zero (stated:"
+            f" {listing(sorted(stated))})"
+        )
+    return f'{file} states no error "{name}"; {hint(name, stated)}'
+
+
+def _others(built: Volumetric) -> list[list[str]]:
+    """Squareness, expansion and droop at the reference point."""
+    rows = []
+    for parameter, value in _numbers(built):
+        square = parameter.name in SQUARENESS
+        unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
+        rows.append(
+            [
+                parameter.name,
+                symbol(parameter.name) if square else "",
+                _told(parameter),
+                number(1e6 * value),
+                unit,
+            ]
+        )
+    return rows
+
+
+def _told(parameter: Parameter) -> str:
+    """What an error that is no function means."""
+    is_droop = parameter.name in ("phi1", "phi2")
+    return parameter.meaning + (", over the whole axis" if is_droop else "")
+
+
+def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
+    """Errors that are no functions, with their values."""
+    every = zip(built.truth.model.parameters, built.truth.a.tolist(), strict=True)
+    names = {one.name for one in built.machine.errors}
+    return [(parameter, value) for parameter, value in every if parameter.function not in names]
+
+
+def diagonal_lines(errors: LengthErrors) -> list[str]:
+    """Length errors of the body diagonals."""
+    is_random = bool(errors.deviation.any())
+    rows = [
+        [
+            "body diagonal",
+            "from",
+            "to",
+            "length, mm",
+            "error, µm",
+            *(["random, µm"] if is_random else []),
+        ]
+    ]
+    for k in range(len(errors.error)):
+        ends = [
+            f"({', '.join(_millimetres(v) for v in point)})"
+            for point in (errors.starts[k], errors.ends[k])
+        ]
+        told = [float(errors.error[k]), *([float(errors.deviation[k])] if is_random else [])]
+        rows.append(
+            [
+                str(k + 1),
+                *ends,
+                f"{1e3 * errors.nominal[k]:.3f}",
+                *(number(1e6 * value) for value in told),
+            ]
+        )
+    return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
+
+
+def length_line(errors: LengthErrors) -> str:
+    """The length error of a single line."""
+    random = (
+        f", random {number(1e6 * float(errors.deviation[0]))} µm" if errors.deviation.any() else ""
+    )
+    return (
+        f"length {1e3 * errors.nominal[0]:.3f} mm, length error"
+        f" {number(1e6 * float(errors.error[0]))} µm{random}"
+    )
+
+
+def error_lines(errors: VolumetricErrors) -> list[str]:
+    """Errors point by point, and their extremes."""
+    heads = ["x, mm", "y, mm", "z, mm", "X, µm", "Y, µm", "Z, µm", "resultant"]
+    is_random = bool(errors.deviation.any())
+    rows = [[*heads, *(["random X", "Y", "Z"] if is_random else [])]]
+    for point, error, resultant, random in zip(
+        errors.points, errors.systematic, errors.resultant, errors.deviation, strict=True
+    ):
+        cells = [_millimetres(value) for value in point]
+        cells += [
+            fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
+        ]
+        rows.append(cells)
+    return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(errors)]
+
+
+def extreme_lines(errors: VolumetricErrors) -> list[str]:
+    """Ranges of the components, and the largest resultant."""
+    worst = int(comparable(errors.resultant).argmax())
+    at = ", ".join(
+        f"{axis} = {format_length(v)}"
+        for axis, v in zip(AXES, errors.points[worst].tolist(), strict=True)
+    )
+    bands = ", ".join(
+        f"{axis.upper()} {number(1e6 * float(np.ptp(errors.systematic[:, k])))}"
+        for k, axis in enumerate(AXES)
+    )
+    resultant = errors.resultant
+    return [
+        (
+            f"range in µm: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
+            f"largest resultant {number(1e6 * float(resultant[worst]))} µm at {at}"
+        ),
+    ]
+
+
+def along_lines(along: AlongAxis) -> list[str]:
+    """A parametric error along its axis."""
+    given, unit = _given(along, "at the reference point"), _unit(along)
+    positions = along.positions
+    keep = (
+        np.arange(0, len(positions), 5)
+        if along.measured is None
+        else np.flatnonzero(np.isin(positions, along.measured.positions))
+    )
+    axis = AXES[along.error.axis]
+    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name in given)]]
+    for k in keep:
+        rows.append(
+            [
+                _millimetres(float(positions[k])),
+                *(fixed(1e6 * values[k], 3) for values in given.values()),
+            ]
+        )
+    head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
+    band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
+    told = (
+        []
+        if along.values is None
+        else [f"stated as {_stated_as(along)}; {_line_stated(along)}".rstrip("; ")]
+    )
+    return [head + band, *told, *aligned(rows, [True] * len(rows[0]))]
+
+
+def _line_stated(along: AlongAxis) -> str:
+    if along.error.is_rotation:
+        return "a rotation is the same on all lines"
+    return "at the reference point (no line stated)" if along.error.line is None else ""
+
+
+def error_csv(
+    errors: VolumetricErrors, realisations: Realisations | None, names: Sequence[str] = ()
+) -> Iterator[str]:
+    """Errors as lines of a CSV file."""
+    heads = [*(f"{axis}_mm" for axis in AXES), *(f"error_{axis}_um" for axis in AXES)]
+    heads += ["resultant_um", *(f"random_{axis}_um" for axis in AXES)]
+    tables = [
+        [1e3 * errors.points, 1e6 * error, 1e6 * np.linalg.norm(error, axis=1), 1e6 * deviation]
+        for error, deviation in with_drawn(errors.systematic, errors.deviation, realisations)
+    ]
+    return tables_csv(heads, tables, realisations is not None, names)
+
+
+def with_drawn(
+    errors: Array, uncertainties: Array, realisations: Realisations | None
+) -> list[tuple[Array, Array]]:
+    """Errors (m, d) with their uncertainties, then those of realisations, which have none."""
+    drawn = [] if realisations is None else list(realisations.errors)
+    none = np.full_like(uncertainties, np.nan)
+    return [(errors, uncertainties), *((error, none) for error in drawn)]
+
+
+def tables_csv(
+    heads: Sequence[str],
+    tables: Sequence[Sequence[Array]],
+    numbered: bool,
+    names: Sequence[str] = (),
+) -> Iterator[str]:
+    """Tables of the same columns as lines of one CSV file, with the `names` of their points; in
+    those that are `numbered` a column tells which realisation a row is of, 0 the estimate.
+    """
+    yield ",".join([*(["realisation"] if numbered else []), *(["point"] if names else []), *heads])
+    labels = io.StringIO()
+    CsvWriter(labels).writerows([name] for name in names)
+    quoted = [f"{label}," for label in labels.getvalue().splitlines()] or [""] * len(tables[0][0])
+    for i, columns in enumerate(tables):
+        for name, line in zip(quoted, islice(csv_lines([], *columns), 1, None), strict=True):
+            yield (f"{i}," if numbered else "") + name + line
+
+
+def along_csv(along: AlongAxis) -> Iterator[str]:
+    """A parametric error along its axis as lines of a CSV file."""
+    given = _given(along, along.error.name)
+    return csv_lines(
+        ["position_mm", *(f"{name}_{ascii_units(_unit(along))}" for name in given)],
+        1e3 * along.positions,
+        *(1e6 * values for values in given.values()),
+    )
+
+
+def _given(one: AlongAxis, name: str) -> dict[str, Array]:
+    """What there is of an error along its axis, where `name` is what it is at the reference
+    point.
+    """
+    columns = {"stated": one.stated, name: one.values, "random": one.deviation}
+    return {key: values for key, values in columns.items() if values is not None}
+
+
+def _unit(one: AlongAxis) -> str:
+    return SHOWN[one.unit]
+
+
+def machine_data(built: Volumetric) -> dict[str, Any]:
+    """What the machine is and its parametric errors, in metres and radians."""
+    machine = built.machine
+    functions = {}
+    for one in along_axes(machine):
+        functions[one.error.name] = {
+            "symbol": symbol(one.error.name),
+            "unit": one.unit,
+            "range": None if one.values is None else one.range,
+            "random": None if one.deviation is None else float(one.deviation.max()),
+        }
+    return {
+        "machine": machine.title,
+        "arrangement": machine.arrangement_name or None,
+        "probe_side": list(machine.arrangement.probe_side),
+        "workpiece_side": list(machine.arrangement.workpiece_side),
+        "convention": CONVENTION,
+        "parametric_errors": functions,
+        "other_errors": {
+            parameter.name: {"value": value, "unit": parameter.unit, "meaning": _told(parameter)}
+            for parameter, value in _numbers(built)
+        },
+    }
+
+
+def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
+    """Length errors of the body diagonals, in metres."""
+    return [{"diagonal": k + 1, **one} for k, one in enumerate(length_data(errors))]
+
+
+def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
+    """Length errors, in metres."""
+    ends = {"from": errors.starts, "to": errors.ends}
+    rows = records(**ends, length=errors.nominal, error=errors.error, random=errors.deviation)
+    return list(as_data(rows))
+
+
+def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
+    """Errors point by point, in metres."""
+    rows = records(
+        position=errors.points,
+        error=errors.systematic,
+        resultant=errors.resultant,
+        random=errors.deviation,
+    )
+    return list(as_data(rows))
+
+
+def along_data(along: AlongAxis) -> dict[str, Any]:
+    """A parametric error along its axis, in metres and radians."""
+    data = {
+        "error": along.error.name,
+        "symbol": symbol(along.error.name),
+        "unit": along.unit,
+        "position": along.positions,
+        "stated": along.stated,
+        "value": along.values,
+        "random": along.deviation,
+    }
+    return dict(as_data(data))
+
+
+def _millimetres(value: float) -> str:
+    return f"{1e3 * value + 0.0:.10g}"

@@ -1,0 +1,216 @@
+"""Curves and dots over two axes as SVG within a page: small, sharp, and in the page's colours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.presentation.svg import round_number
+from ballplate.simulator.machines.protocol import Array
+
+from .elements import Html, element, joined
+
+# Of a chart and the room around what is drawn, in units of which a letter is about ten high.
+WIDTH, HEIGHT = 360.0, 200.0
+LEFT, RIGHT, ABOVE, BELOW = 46.0, 16.0, 10.0, 34.0
+# Ticks along an axis, about.
+TICKS = 4
+# Letters of a name below an axis that is told.
+LETTERS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Values `y` (m,) over `x` (m,), NaN where there are none: a line, dots, or a band up to
+    `upper` (m,). `style` is a class of the page.
+    """
+
+    kind: str
+    style: str
+    x: Array
+    y: Array
+    upper: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Traces over two axes. `places` are names along the first axis in place of numbers, each with
+    where it stands; `words` tell those who do not see the chart what it shows.
+    """
+
+    traces: Sequence[Trace]
+    across: str
+    up: str
+    words: str
+    places: Sequence[tuple[float, str]] = ()
+    from_zero: bool = False
+    height: float = HEIGHT
+
+
+def chart_svg(chart: Chart) -> Html:
+    """The chart as an element of a page."""
+    horizontal, vertical = _limits(chart)
+    scale = _Scale(horizontal, vertical, chart.height)
+    parts = [*_grid(chart, scale), *(_trace(one, scale) for one in chart.traces)]
+    return element(
+        "svg",
+        joined(parts),
+        class_="chart",
+        viewBox=f"0 0 {WIDTH:g} {chart.height:g}",
+        role="img",
+        aria_label=chart.words,
+    )
+
+
+@dataclass(frozen=True)
+class _Scale:
+    across: tuple[float, float]
+    up: tuple[float, float]
+    height: float
+
+    def x(self, values: Array) -> Array:
+        low, high = self.across
+        return np.asarray(LEFT + (values - low) / (high - low) * (WIDTH - LEFT - RIGHT))
+
+    def y(self, values: Array) -> Array:
+        low, high = self.up
+        room = self.height - ABOVE - BELOW
+        return np.asarray(ABOVE + (high - values) / (high - low) * room)
+
+
+def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
+    across = np.concatenate([one.x for one in chart.traces])
+    up = np.concatenate(
+        [part for one in chart.traces for part in (one.y, one.upper) if part is not None]
+    )
+    ends = _ends(up)
+    low = min(ends[0], 0.0) if chart.from_zero else ends[0]
+    room = 0.06 * ((ends[1] - low) or abs(low) or 1.0)
+    vertical = (0.0 if chart.from_zero and low >= 0.0 else low - room, ends[1] + room)
+    if chart.places:
+        return (-0.5, len(chart.places) - 0.5), vertical
+    low, high = _ends(across)
+    return (low, high if high > low else low + 1.0), vertical
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+
+
+def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
+    """Round values between two ends, about so many.
+
+    >>> ticks(0.0, 1000.0), ticks(-1.2, 3.1)
+    ([0.0, 200.0, 400.0, 600.0, 800.0, 1000.0], [-1.0, 0.0, 1.0, 2.0, 3.0])
+    """
+    step = round_number((high - low) / count)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [round(k * step, 12) + 0.0 for k in range(first, last + 1)]
+
+
+def _grid(chart: Chart, scale: _Scale) -> list[Html]:
+    """Lines, numbers and titles of both axes."""
+    bottom = scale.height - BELOW
+    lines, texts = [], []
+    for value, y in zip(
+        ticks(*scale.up), scale.y(np.array(ticks(*scale.up))).tolist(), strict=True
+    ):
+        kind = "zero" if value == 0.0 and scale.up[0] < 0.0 else "grid"
+        lines.append(_path(f"M{LEFT:g} {y:.1f}H{WIDTH - RIGHT:g}", kind))
+        texts.append(_text(LEFT - 5, y + 3.5, f"{value:g}", "end"))
+    if chart.places:
+        for x, name in _shown_places(chart, scale):
+            texts.append(_text(x, bottom + 13, name, "middle"))
+    else:
+        values = ticks(*scale.across)
+        for value, x in zip(values, scale.x(np.array(values)).tolist(), strict=True):
+            lines.append(_path(f"M{x:.1f} {ABOVE:g}V{bottom:g}", "grid"))
+            texts.append(_text(x, bottom + 13, f"{value:g}", "middle"))
+    texts.append(_text((LEFT + WIDTH - RIGHT) / 2, bottom + 28, chart.across, "middle"))
+    middle = ABOVE + (bottom - ABOVE) / 2
+    turned = f"rotate(-90 11 {middle:g})"
+    texts.append(element("text", chart.up, x=11, y=middle, text_anchor="middle", transform=turned))
+    return [*lines, *texts]
+
+
+def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
+    """Names along the axis where there is room for them, otherwise some of their numbers."""
+    where = scale.x(np.array([at for at, _ in chart.places])).tolist()
+    room = (WIDTH - LEFT - RIGHT) / max(len(where), 1)
+    longest = max(len(name) for _, name in chart.places)
+    if 5.6 * min(longest, LETTERS) < room:
+        names = [
+            name if len(name) <= LETTERS else f"{name[: LETTERS - 1]}…" for _, name in chart.places
+        ]
+        return list(zip(where, names, strict=True))
+    every = -(-24 // max(int(room), 1))
+    return [(x, str(k + 1)) for k, x in enumerate(where) if k % every == 0]
+
+
+def _trace(one: Trace, scale: _Scale) -> Html:
+    known = np.isfinite(one.x) & np.isfinite(one.y)
+    if one.upper is not None:
+        known &= np.isfinite(one.upper)
+    x, y = np.round(scale.x(one.x), 1).tolist(), np.round(scale.y(one.y), 1).tolist()
+    runs = _runs(known)
+    if one.kind == "dots":
+        path = "".join(f"M{x[k]:g} {y[k]:g}h0" for run in runs for k in run)
+    elif one.kind == "band" and one.upper is not None:
+        top = np.round(scale.y(one.upper), 1).tolist()
+        path = "".join(
+            _line([x[k] for k in run], [y[k] for k in run])
+            + _line([x[k] for k in reversed(run)], [top[k] for k in reversed(run)]).replace(
+                "M", "L"
+            )
+            + "Z"
+            for run in runs
+        )
+    else:
+        path = "".join(_line([x[k] for k in run], [y[k] for k in run]) for run in runs)
+    return _path(path, f"{one.kind} {one.style}")
+
+
+def _runs(known: np.ndarray) -> list[list[int]]:
+    """Indices of neighbouring values that are known."""
+    index = np.flatnonzero(known)
+    return [
+        run.tolist() for run in np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(run)
+    ]
+
+
+def _line(x: Sequence[float], y: Sequence[float]) -> str:
+    points = [f"{a:g} {b:g}" for a, b in zip(x, y, strict=True)]
+    return f"M{'L'.join(points)}" if points else ""
+
+
+def _path(d: str, kind: str) -> Html:
+    return Html(f'<path class="{kind}" d="{d}"/>')
+
+
+def _text(x: float, y: float, text: str, anchor: str) -> Html:
+    return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor)
+
+
+def figure(caption: str | Html, *content: str, class_: str = "") -> Html:
+    """Content with words below it."""
+    return element("figure", *content, element("figcaption", caption), class_=class_ or None)
+
+
+def figures(*content: str) -> Html:
+    """Figures beside one another where there is room."""
+    return element("div", *content, class_="figures")
+
+
+def legend(*entries: tuple[str, str, str]) -> Html:
+    """What marks mean: kind and style of each, and the words."""
+    marks = {"dots": "M9 6h0", "band": "M1 1H17V11H1Z"}
+    items = []
+    for kind, style, words in entries:
+        mark = _path(marks.get(kind, "M1 6H17"), f"{kind} {style}")
+        items.append(
+            element("li", element("svg", mark, viewBox="0 0 18 12", aria_hidden="true"), words)
+        )
+    return element("ul", *items, class_="legend")

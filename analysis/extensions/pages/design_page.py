@@ -1,0 +1,304 @@
+"""The page of a design: what it will determine and how well, before anything is measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ballplate.rank.motions import Motion
+from ballplate.simulator.estimation.linearisation import Linearisation
+
+from .design_views import ball_views, motion_view, point_view, volume_view
+from .document import Page, PageSection, facts_list, origin, written
+from .elements import Html, element, folded, joined, note, sentence, table
+from .length_sections import lengths_section
+from .quoted import QuotedData
+from .residual_sections import reliability_section
+from .spatial import figure_of
+from .uncertainty_sections import (
+    expansion,
+    lengths_words,
+    scale_section,
+    task_table,
+    uncertainty_table,
+)
+
+FOOT = (
+    "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
+    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every figure is"
+    " that of ballplate run, lengths, reliability, check --suggest or sheet with --json: its"
+    " data-path says which, and where it stands there."
+)
+
+# Directions that are drawn, of each kind; the others are told in words.
+MOST_DRAWN = 12
+
+
+@dataclass(frozen=True, eq=False)
+class DesignContents:
+    """What a page of a design is made of: plain data as the commands print them, by the command's
+    name; the linearised design with its undetermined and weak motions; `target` in words; the
+    `file` and what was assumed. `unreliable` is the reason why there is no reliability among the
+    data.
+    """
+
+    title: str
+    data: Mapping[str, Any]
+    at: Linearisation
+    null: Sequence[Motion]
+    weak: Sequence[Motion]
+    target: str
+    unreliable: str
+    file: str
+    facts: Sequence[tuple[str, str]]
+
+
+def design_page(contents: DesignContents) -> str:
+    """The page as a file that needs no other."""
+    quoted = {name: QuotedData(f"/{name}", data) for name, data in contents.data.items()}
+    run = quoted["run"]
+    factor = expansion(run.at("quantities"))
+    at = contents.at
+    ellipsoids = [point_view(at, factor)] if len(at.design.evaluation.points) else []
+    ellipsoids += list(ball_views(at, factor))
+    sections = [
+        PageSection("volume", "The experiment", _experiment(contents)),
+        PageSection("rank", "What the readings determine", _rank(run, contents)),
+        PageSection("suggestions", "Suggested changes", _suggestions(quoted)),
+        PageSection(
+            "uncertainties",
+            "Uncertainties",
+            joined([uncertainty_table(run), task_table(run), _influences(run)]),
+        ),
+        PageSection(
+            "lengths",
+            "Lengths throughout the volume",
+            lengths_section(quoted["lengths"], contents.target),
+        ),
+        PageSection("ellipsoids", "Points and balls", figures_wide(map(figure_of, ellipsoids))),
+        PageSection("scale", "Where scale comes from", scale_section(run)),
+        PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
+        PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
+    ]
+    verdict = _verdict(run, contents.target, quoted["lengths"])
+    made = origin(contents.file)
+    return written(Page(contents.title, made, verdict, _is_good(run), sections, FOOT))
+
+
+def _experiment(contents: DesignContents) -> Html:
+    """The volume with what is in it, and what was assumed."""
+    return figures_wide([figure_of(volume_view(contents.at.design)), facts_list(contents.facts)])
+
+
+def figures_wide(content: Iterable[Html]) -> Html:
+    """Pictures beside one another where there is much room."""
+    return element("div", *content, class_="figures views")
+
+
+def _is_good(run: QuotedData) -> bool:
+    shares = [one.get("within_target") for one in run.data["quantities"].values()]
+    missed = any(share is not None and share < 1.0 for share in shares)
+    missed |= any(one["within_target"] is False for one in run.data.get("tasks", {}).values())
+    return run.data["as_expected"] and not run.data["weakly_determined"] and not missed
+
+
+def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
+    data = run.data
+    count = len(data["weakly_determined"])
+    weak = (
+        f"; {count} direction{'s are' if count > 1 else ' is'} weakly determined" if count else ""
+    )
+    counts = joined(
+        [run.number("parameters"), " parameters from ", run.number("observations"), " observations"]
+    )
+    if data["rank_deficiency"]:
+        expected = (
+            "as the file expects" if data["as_expected"] else "which the file does not expect"
+        )
+        first = sentence(
+            "Rank deficiency ",
+            run.number("rank_deficiency"),
+            f", {expected}: the readings leave ",
+            run.number("rank_deficiency"),
+            f" {'change' if data['rank_deficiency'] == 1 else 'changes'} of ",
+            counts,
+            f" undetermined{weak}.",
+        )
+    else:
+        expected = "" if data["as_expected"] else ", though the file expects a deficiency"
+        first = sentence(f"Full rank{expected}: the readings determine all ", counts, f"{weak}.")
+    second = sentence(lengths_words(run, target), *_throughout(run, lengths))
+    return joined([first, second])
+
+
+def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
+    """How lengths throughout the volume compare with the target, beside those between the
+    evaluation points, which may be kinder.
+    """
+    judged = run.data["quantities"].get("U6", {}).get("within_target") is not None
+    shares = {
+        lengths.data["coverage_factor"]: "share_expanded_within",
+        1.0: "share_within",
+    }
+    share = shares.get(lengths.data["target_coverage_factor"])
+    whole = lengths.at("all")
+    if not judged or share is None or whole.data[share] is None:
+        return []
+    return [" Of the lengths throughout the volume, ", whole.share(share), " are within it."]
+
+
+def _rank(run: QuotedData, contents: DesignContents) -> Html:
+    parts = []
+    given = (
+        (
+            "undetermined",
+            "Undetermined",
+            contents.null,
+            "These change together without changing any observation.",
+        ),
+        (
+            "weakly_determined",
+            "Weakly determined",
+            contents.weak,
+            "The observations hardly notice these; each is drawn one standard deviation long.",
+        ),
+    )
+    for key, title, motions, words in given:
+        if not run.data[key]:
+            continue
+        pictures: list[Html] = []
+        rest: list[Html] = []
+        for k, (motion, one) in enumerate(zip(motions, run.at(key).each(), strict=True), start=1):
+            told = one.text() if key == "undetermined" else one.text("text")
+            drawn = None
+            if len(pictures) < MOST_DRAWN:
+                name = f"{key.replace('_', '-')}-{k}"
+                drawn = motion_view(contents.at, motion, name, told, f"{title} {k}")
+            if drawn is None:
+                rest.append(element("li", told, value=k))
+            else:
+                pictures.append(figure_of(drawn))
+        parts += [element("h3", title), note(words), figures_wide(pictures)]
+        if rest:
+            summary = "Directions without a picture" if pictures else "Directions"
+            others = folded(summary, element("ol", *rest), is_open=len(rest) <= 20)
+            parts.append(others)
+    if run.data["reasons"]:
+        reasons = (element("li", one.text()) for one in run.at("reasons").each())
+        parts += [element("h3", "Reasons"), element("ul", *reasons)]
+    if not parts:
+        return sentence("Nothing is undetermined or weakly determined.")
+    return joined(parts)
+
+
+# In one piece: the columns of one table, and what is said of them.
+def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
+    """What would determine the rest, and what each change would do."""
+    if quoted["check"].data.get("repairs") is None:
+        return sentence("None is needed: nothing is undetermined or weakly determined.")
+    repairs, run = quoted["check"].at("repairs"), quoted["run"]
+    before = run.data["quantities"].get("U6", {}).get("average")
+    now = (
+        joined([" U6 is ", run.at("quantities", "U6").micro("average"), " µm on average now."])
+        if before is not None
+        else ""
+    )
+    rows = []
+    for key in ("complete", "partial"):
+        for number, one in enumerate(repairs.at(key).each(), start=1):
+            changes = joined((change.text("text") for change in one.at("changes").each()), "; ")
+            of = ", ".join(map(str, one.data["removes"]))
+            many = "s" if len(one.data["removes"]) > 1 else ""
+            name = f"repair {number}" if key == "complete" else f"of direction{many} {of} alone"
+            edits = joined(
+                element(
+                    "li",
+                    element(
+                        "code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"
+                    ),
+                )
+                for edit in one.data["edits"]
+            )
+            u6, loose = (
+                one.micro(symbol) if one.data[symbol] is not None else "-"
+                for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
+            )
+            rows.append(
+                [
+                    name,
+                    changes,
+                    one.number("rank_deficiency"),
+                    one.number("weakly_determined"),
+                    u6,
+                    loose,
+                    one.number("readings"),
+                    element("ul", edits, class_="edits"),
+                ]
+            )
+    if not rows:
+        return sentence("No changes were found that determine everything.")
+    heads = [
+        "",
+        "change",
+        "rank deficiency then",
+        "weak directions then",
+        "U6 average then, µm",
+        "with 1 µm on exact offsets, µm",
+        "more readings",
+        "in the file",
+    ]
+    title = "Changes, by U6 with uncertain probe offsets, each verified"
+    made_table = table("repairs", title, heads, rows, (0, 1, 7))
+    whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
+    told = "Each of these determines what is open."
+    if not whole:
+        told = "None of these determines all that is open."
+    elif parts:
+        told = "Each repair determines what is open; the other changes determine a part of it."
+    return joined([sentence(told, now), made_table])
+
+
+def _influences(run: QuotedData) -> Html:
+    if not run.data.get("influences"):
+        return Html()
+    rows = []
+    for name, one in zip(run.data["influences"], run.at("influences").each(), strict=True):
+        u, unit = one.amount("standard_uncertainty", "unit")
+        stated = "unknown"
+        if one.data["stated_standard_uncertainty"] is not None:
+            stated, _ = one.amount("stated_standard_uncertainty", "unit")
+        rows.append([name, stated, u, unit])
+    heads = ["influence quantity", "u stated", "u after the readings", "unit"]
+    return table("influences", "Influence quantities", heads, rows, (0, 3))
+
+
+def _reliability(quoted: Mapping[str, QuotedData], unreliable: str) -> Html:
+    if "reliability" not in quoted:
+        return note(unreliable)
+    return reliability_section(quoted["reliability"])
+
+
+def _sheet(sheet: QuotedData) -> Html:
+    """The order of positions."""
+    rows = []
+    for number, step in enumerate(sheet.at("steps").each(), start=1):
+        change = step.text("change") if step.data["change"] else ""
+        name = step.text("name")
+        if step.data["description"]:
+            name = joined([name, ": ", step.text("description")])
+        rows.append(
+            [
+                str(number),
+                name,
+                step.text("set_up"),
+                ", ".join(step.data["probes"]),
+                step.text("balls"),
+                step.number("readings"),
+                change,
+            ]
+        )
+    heads = ["", "position", "set up", "probes", "balls", "readings", "first change"]
+    words = note("ballplate sheet prints it with boxes to tick off.")
+    return joined([table("steps", "Order of positions", heads, rows, (0, 1, 2, 3, 4, 6)), words])

@@ -1,0 +1,283 @@
+"""Pictures in space of a design: plates in the volume, uncertainties of points and balls, and what
+undetermined directions move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from ballplate.presentation.scene import MOST_BALLS, box_edges, hull, names_fit, projection
+from ballplate.presentation.svg import round_number
+from ballplate.rank.motions import Motion, moved_balls, moved_points
+from ballplate.simulator.design.arrays import Design, locations, nominal_state
+from ballplate.simulator.estimation.corrections import correction_rows
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .elements import Html, element, joined
+from .spatial import Layer, SpatialPicture
+
+# Of the picture's size: the longest half axis of an ellipsoid, and the largest displacement.
+LONGEST_AXIS, LARGEST_MOTION = 0.05, 0.09
+# What moves no point by more, in metres, moves none: a direction moves something by 1e-6.
+NO_MOTION = 1e-12
+# Balls in moving pictures, of all positions together, and points along a line of the grid.
+MOST_MOVING, ALONG = 600, 9
+STYLES = 6
+
+
+def volume_layers(design: Design) -> list[Layer]:
+    """The volume with the names and ends of its axes."""
+    lower, upper = design.machine.volume.lower, design.machine.volume.upper
+    d = len(lower)
+    _, away = projection(d)
+    edges, hidden = box_edges(lower, upper, away)
+    ends, names = [], []
+    off = 0.14 * float((upper - lower).max())
+    for k in range(d):
+        # Outside the edges that the eye of still pictures sees in front, and at the left.
+        start = lower.copy()
+        if k == 1 and d == 3:
+            start[0] = upper[0] + off
+        else:
+            start[1 if k == 0 else 0] -= off
+        for share, text in ((0.0, lower[k]), (0.5, None), (1.0, upper[k])):
+            place = start.copy()
+            place[k] = lower[k] + share * (upper[k] - lower[k])
+            ends.append(place)
+            names.append(f"{'xyz'[k]}, mm" if text is None else f"{1e3 * text + 0.0:.6g}")
+    seen, unseen = edges[~hidden].reshape(-1, d), edges[hidden].reshape(-1, d)
+    return [
+        Layer("lines", "faint thin dotted", unseen, (2,) * int(hidden.sum())),
+        Layer("lines", "faint thin", seen, (2,) * int((~hidden).sum())),
+        Layer("labels", "axes", np.array(ends), names=tuple(names)),
+    ]
+
+
+def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
+    """Positions in the volume, the balls that are read, `most` of each position, and styli."""
+    where = locations(design, nominal_state(design), design.readings)
+    layers = volume_layers(design)
+    labels, names, styli = [], [], []
+    read = [k for k in range(len(design.positions.names)) if (design.readings.position == k).any()]
+    position_names = [design.positions.names[k] for k in read]
+    is_named = names_fit(position_names)
+    for number, k in enumerate(read):
+        mine = np.flatnonzero(design.readings.position == k)
+        balls = where[mine]
+        outline = _outline(balls)
+        style = f"s{number % STYLES}"
+        if len(outline) > 2:
+            layers.append(Layer("areas", style, outline, (len(outline),)))
+        closed = np.concatenate([outline, outline[:1]])
+        dash = " dashed" if number // STYLES % 2 else ""
+        layers.append(Layer("lines", style + dash, closed, (len(closed),)))
+        layers.append(Layer("dots", style, balls[_some(design.readings.ball[mine], most)]))
+        middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
+        offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
+        styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
+        # Plates in a plane do not hide one another's middle.
+        centre = outline.mean(axis=0)
+        is_flat = design.dimension == 2
+        labels.append(centre if is_flat else outline[0] + 0.12 * (outline[0] - centre))
+        names.append(position_names[number] if is_named else str(number + 1))
+    if styli:
+        layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
+        layers.append(Layer("dots", "ink", np.stack([one[1] for one in styli])))
+    layers.append(Layer("labels", "names", np.array(labels), names=tuple(names)))
+    words = f"{len(read)} positions in the volume, which the run sheet lists"
+    caption = (
+        "Positions in the volume: balls that are read, and from one ball of each position the styli"
+        " to the machine's reference point."
+    )
+    if not is_named:
+        caption += " Positions are numbered as in the run sheet."
+    if len(design.readings.ball) and max(_counts(design)) > most:
+        caption += " Only some of the balls are drawn."
+    whole = joined([caption, turning_words(design)])
+    return SpatialPicture(layers, "volume-view", "positions", words, whole)
+
+
+def turning_words(design: Design) -> Html:
+    """How a picture is turned, for screens."""
+    if design.dimension == 2:
+        return Html()
+    words = " Drag it, or press arrow keys while it has the focus, to turn it."
+    return element("span", words, class_="turning")
+
+
+def point_view(at: Linearisation, factor: float, sigma: float = 1.0) -> SpatialPicture:
+    """Ellipsoids of the corrected evaluation points, enlarged, with their expanded uncertainties
+    as half axes.
+    """
+    design, given = at.design, at.design.evaluation
+    probes = np.full(len(given.points), given.probe)
+    rows = correction_rows(design, at.layout, at.state, given.points, probes)
+    open_ = np.isnan(at.of_shared(rows.reshape(-1, rows.shape[2]))).reshape(rows.shape[:2])
+    known = ~open_.any(axis=1)
+    layers = volume_layers(design)
+    points = given.points[known]
+    spread = factor * sigma * (rows[known] @ at.shared)
+    size = float(
+        np.ptp(np.stack([design.machine.volume.lower, design.machine.volume.upper]), axis=0).max()
+    )
+    told = "point-view", "points", "Corrected evaluation points"
+    return _ellipsoids(layers, points, spread, given.points[~known], size, told, factor)
+
+
+def ball_views(at: Linearisation, factor: float, sigma: float = 1.0) -> Iterator[SpatialPicture]:
+    """Ellipsoids of each plate's balls in the plate's frame, likewise."""
+    design = at.design
+    of_balls = at.of_balls()
+    spread = np.concatenate([at.balls.common, at.balls.own], axis=2)
+    for number, artefact in enumerate(design.artefacts.plates):
+        members = np.asarray(design.balls.of(artefact))
+        known = members[~np.isnan(of_balls[members]).any(axis=1)]
+        places = design.balls.places
+        size = float(np.ptp(places[members], axis=0).max(initial=0.0)) or 0.1
+        outline = _outline(places[members])
+        layers = [
+            Layer(
+                "lines", "faint thin", np.concatenate([outline, outline[:1]]), (len(outline) + 1,)
+            )
+        ]
+        plate = design.artefacts.names[artefact]
+        what = f"Balls of {plate} in its own frame"
+        told = f"ball-view-{number}", f"balls of {plate}", what
+        open_ = places[np.setdiff1d(members, known)]
+        yield _ellipsoids(
+            layers, places[known], factor * sigma * spread[known], open_, size, told, factor
+        )
+
+
+def _ellipsoids(
+    layers: list[Layer],
+    points: Array,
+    spread: Array,
+    undetermined: Array,
+    size: float,
+    told: tuple[str, str, str],
+    factor: float,
+) -> SpatialPicture:
+    """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r), `told` by
+    a name, in short, and in words.
+    """
+    name, label, what = told
+    variances, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
+    half = np.sqrt(np.maximum(variances, 0.0))
+    longest = float(half.max(initial=0.0))
+    times = round_number(LONGEST_AXIS * size / longest) if longest > 0.0 else 1.0
+    layers = [
+        *layers,
+        Layer("ellipsoids", "s0", points, shapes=times * axes * half[:, None, :]),
+        Layer("dots", "alert", undetermined),
+    ]
+    caption = (
+        f"{what}: half axes are expanded uncertainties U, k = {factor:g}, enlarged"
+        f" {times:,.0f} times. They refer to the frame that the error model's constraints"
+        " and the poses fix."
+    )
+    if not len(points):
+        caption = f"{what}: all {len(undetermined)} are undetermined, and have no ellipsoid."
+    elif len(undetermined):
+        caption += f" {len(undetermined)} are undetermined: dots without an ellipsoid."
+    return SpatialPicture(layers, name, label, what, caption)
+
+
+def motion_view(
+    at: Linearisation, motion: Motion, name: str, words: str, kind: str, most: int = MOST_MOVING
+) -> SpatialPicture | None:
+    """A direction as an enlarged, moving picture of the machine's grid and of the balls that are
+    read, about `most` of them; None where it moves neither.
+    """
+    design = at.design
+    grid, sizes = _grid(design)
+    of_probes = [
+        moved_points(at, motion, grid, np.full(len(grid), probe))
+        for probe in range(len(design.probes.names))
+    ]
+    # The probe of the evaluation, unless the direction shows with others only.
+    probe = design.evaluation.probe
+    if not _largest(of_probes[probe]) > NO_MOTION:
+        probe = int(np.argmax([_largest(one) > NO_MOTION for one in of_probes]))
+    readings = design.readings.select(_moving_readings(design, most))
+    balls = locations(design, at.state, readings)
+    of_grid, of_balls = of_probes[probe], moved_balls(at, motion, readings)
+    largest = max(_largest(of_grid), _largest(of_balls))
+    if not largest > NO_MOTION:
+        return None
+    times = round_number(LARGEST_MOTION * float(design.machine.volume.size.max()) / largest)
+    ends = np.stack([0.0 * of_balls, of_balls], axis=1).reshape(-1, design.dimension)
+    trails = np.repeat(balls, 2, axis=0)
+    layers = [
+        Layer("lines", "faint thin dotted", grid, sizes),
+        *volume_layers(design)[2:],
+        Layer("lines", "s0", grid, sizes, times * of_grid),
+        Layer("dots", "s0 fine", grid, (), times * of_grid),
+        Layer("dots", "faint", balls),
+        Layer("lines", "s1 thin", trails, (2,) * len(balls), times * ends),
+        Layer("dots", "s1", balls, (), times * of_balls),
+    ]
+    what = f"the grid of corrected points with the probe {design.probes.names[probe]} (blue)"
+    if len(balls):
+        what = f"{what} and the balls (orange)"
+    told = f". Enlarged {times:,.0f} times: {what}, as against where they are drawn (grey)."
+    caption = joined([element("strong", kind), ": ", words, told])
+    return SpatialPicture(layers, name, kind.lower(), f"{kind} as a moving picture", caption)
+
+
+def _largest(moved: Array) -> float:
+    return float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+
+
+def _grid(design: Design) -> tuple[Array, tuple[int, ...]]:
+    """Lines parallel to the axes over the faces of the volume: points, and how many each has."""
+    lower, upper = design.machine.volume.lower, design.machine.volume.upper
+    d = len(lower)
+    levels, along = np.linspace(0.0, 1.0, 3), np.linspace(0.0, 1.0, ALONG)
+    lines = []
+    for axis in range(d):
+        others = [k for k in range(d) if k != axis]
+        for place in np.array(np.meshgrid(*[levels] * (d - 1), indexing="ij")).reshape(d - 1, -1).T:
+            if d == 3 and (place == 0.5).all():
+                continue
+            line = np.zeros((ALONG, d))
+            line[:, axis], line[:, others] = along, place
+            lines.append(line)
+    points = np.concatenate(lines)
+    return lower + points * (upper - lower), (ALONG,) * len(lines)
+
+
+def _moving_readings(design: Design, most: int) -> Integers:
+    """Readings of plates whose balls are drawn: each ball of a position once, and of many some."""
+    mine = design.plate_readings
+    keys = np.stack([design.readings.position[mine], design.readings.ball[mine]], axis=1)
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return np.asarray(mine[first[:: -(-len(first) // most) or 1]])
+
+
+def _outline(points: Array) -> Array:
+    """Corners (k, d) of points' convex hull in the plane that they are closest to."""
+    centre = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - centre, full_matrices=False)
+    plane = axes[:2]
+    corners = (
+        hull(np.round((points - centre) @ plane.T, 9))
+        if len(points) > 1
+        else np.zeros((1, len(plane)))
+    )
+    return np.asarray(centre + corners @ plane[: corners.shape[1]])
+
+
+def _some(balls: Integers, most: int) -> Integers:
+    """Places of each ball's first reading, and of many balls some."""
+    _, first = np.unique(balls, return_index=True)
+    return np.asarray(first[:: -(-len(first) // most) or 1])
+
+
+def _counts(design: Design) -> Sequence[int]:
+    """How many balls are read in each position."""
+    pairs = np.stack([design.readings.position, design.readings.ball], axis=1)
+    counts: list[int] = np.unique(np.unique(pairs, axis=0)[:, 0], return_counts=True)[1].tolist()
+    return counts

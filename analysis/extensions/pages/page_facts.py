@@ -1,0 +1,77 @@
+"""What pages of results take for granted of an experiment, by name and in words."""
+
+from __future__ import annotations
+
+from ballplate.extensions.maps.length_groups import target_words
+from ballplate.gross_errors.leftover import too_many_entries
+from ballplate.presentation.formatting import uncertainty_words
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.settings import listing
+
+# Readings of plates beyond which judging every bias takes longer than a page should.
+MOST_JUDGED = 1500
+
+
+def target_in_words(experiment: Experiment) -> str:
+    """The target of lengths; empty where the file states none."""
+    target = experiment.target_uncertainty
+    return "" if target is None else target_words(target.stated)
+
+
+def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]]:
+    """File, error model with so many `parameters`, repeatability, certificates, probes, influence
+    quantities and target.
+    """
+    sides = zip(*experiment.machine.volume.corners, strict=True)
+    volume = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in sides)
+    repeatability = [f"{1e6 * u:.4g}" for u in experiment.machine.repeatability.tolist()]
+    model = experiment.error_model
+    known = {
+        "File": str(experiment.source),
+        "Variant": experiment.name or "",
+        "Description": " ".join(experiment.description.split()),
+        "Volume": f"{volume} mm",
+        "Error model": f"{model.kind}, {parameters} parameters",
+        "Repeatability": f"{', '.join(dict.fromkeys(repeatability))} µm (standard uncertainty)",
+        "Certificates": _certificates(experiment),
+        "Probe offsets": _offsets(experiment),
+        "Influence quantities": _influences(experiment),
+    }
+    target = experiment.target_uncertainty
+    if target is None:
+        known["Target"] = "none is stated"
+    else:
+        by = uncertainty_words(target.coverage_factor)
+        known["Target"] = f"{target_in_words(experiment)}, compared with the {by}"
+    return [(name, words) for name, words in known.items() if words]
+
+
+def _certificates(experiment: Experiment) -> str:
+    told = [f"{one.kind} of {one.artefact} ({one.size})" for one in experiment.calibration]
+    told += [f"prior of {one.name}" for one in experiment.priors]
+    return listing(told) or "none: nothing is known of artefacts but what the readings say"
+
+
+def _offsets(experiment: Experiment) -> str:
+    estimated = [one.name for one in experiment.probes.values() if one.is_estimated]
+    exact = [one.name for one in experiment.probes.values() if not one.is_estimated]
+    parts = [f"estimated: {listing(estimated)}"] if estimated else []
+    return "; ".join([*parts, *([f"exact as stated: {listing(exact)}"] if exact else [])])
+
+
+def _influences(experiment: Experiment) -> str:
+    kinds = [str(getattr(one, "kind", type(one).__name__)) for one in experiment.influences]
+    left = [kind for kind in ("temperature", "drift") if kind not in kinds]
+    without = f"no effect of {' and '.join(left)} is assumed" if left else ""
+    return "; ".join(filter(None, [listing(kinds), without]))
+
+
+def unjudged(design: Design) -> str:
+    """Why a page does not judge every bias; empty where it does."""
+    count = len(design.plate_readings)
+    if count <= MOST_JUDGED:
+        return too_many_entries(design)
+    return (
+        f"{count} readings are too many to be judged one by one here; ballplate reliability does it"
+    )

@@ -1,0 +1,232 @@
+"""Sections on what a fit leaves over: residuals, suspected gross errors, variance components,
+reliability.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.formatting import SHOWN
+from ballplate.presentation.svg import round_number
+from ballplate.simulator.machines.protocol import Array, Integers
+
+from .charts import Chart, Trace, chart_svg, figure, figures, legend
+from .elements import Html, element, joined, note, sentence, table
+from .quoted import QuotedData
+from .spatial import Layer, SpatialPicture
+
+AXES = "xyz"
+# Of the volume's size, the longest residual takes this part at most.
+LONGEST = 0.12
+# Readings whose residuals have room for large dots.
+FEW = 400
+# Biases that a table names.
+MOST = 12
+
+
+def _size(values: Array) -> str:
+    """Class of dots: small where there are many."""
+    return "" if len(values) <= FEW else "fine"
+
+
+def dots_by_group(values: Array, group: Integers, names: Sequence[str], across: str) -> Html:
+    """Standardised residuals (m, d), NaN where nothing is read, by the group that each is of."""
+    d = values.shape[1]
+    traces = []
+    for k in range(d):
+        shift = 0.22 * (k - 0.5 * (d - 1))
+        traces.append(Trace("dots", f"{_size(values)} s{k}", group + shift, values[:, k]))
+    words = f"standardised residuals by {across}"
+    chart = Chart(traces, across, "standardised residual", words, tuple(enumerate(names)))
+    return chart_svg(chart)
+
+
+def dots_in_order(values: Array) -> Html:
+    """Standardised residuals (m, d) in the order of the readings."""
+    order = np.arange(1.0, len(values) + 1.0)
+    traces = [
+        Trace("dots", f"{_size(values)} s{k}", order, values[:, k]) for k in range(values.shape[1])
+    ]
+    words = "standardised residuals in the order of the readings"
+    return chart_svg(Chart(traces, "number of the reading", "standardised residual", words))
+
+
+def residual_charts(
+    values: Array,
+    position: Integers,
+    probe: Integers,
+    positions: Sequence[str],
+    probes: Sequence[str],
+) -> Html:
+    """Standardised residuals against position, order and direction."""
+    axes = [("dots", f"s{k}", f"along {AXES[k]}") for k in range(values.shape[1])]
+    told = "Positions are numbered as in the table below." if len(positions) > 6 else ""
+    return joined(
+        [
+            legend(*axes),
+            figures(
+                figure(
+                    f"Residuals by position, in standard uncertainties. {told}",
+                    dots_by_group(values, position, positions, "position"),
+                ),
+                figure(
+                    "Residuals in the order of the readings: a drift would show.",
+                    dots_in_order(values),
+                ),
+                figure(
+                    "Residuals by probe, and so by the direction from which balls are probed.",
+                    dots_by_group(values, probe, probes, "probe"),
+                ),
+            ),
+        ]
+    )
+
+
+def residual_view(places: Array, residuals: Array, edges: Array) -> SpatialPicture:
+    """Residuals (m, d) at `places` (m, d) as enlarged vectors, with the edges (k, 2, d) of the
+    volume.
+    """
+    size = float(np.ptp(edges, axis=(0, 1)).max())
+    longest = float(np.linalg.norm(residuals, axis=1).max(initial=0.0))
+    times = round_number(LONGEST * size / longest) if longest > 0.0 else 1.0
+    ends = np.stack([places, places + times * residuals], axis=1).reshape(-1, places.shape[1])
+    layers = [
+        Layer("lines", "faint thin", edges.reshape(-1, edges.shape[2]), (2,) * len(edges)),
+        Layer("lines", "s1", ends, (2,) * len(places)),
+        Layer("dots", "s0", places),
+    ]
+    caption = f"Residuals as vectors from where the balls were read, enlarged {times:,.0f} times."
+    words = "Residuals as vectors in the volume"
+    return SpatialPicture(layers, "residual-vectors", "residuals", words, caption)
+
+
+def residual_tables(fit: QuotedData) -> Html:
+    """Root mean squares by position, probe and direction, and the largest residuals."""
+    parts = []
+    for kind, words in (("position", "position"), ("probe", "probe"), ("axis", "direction")):
+        rows = [
+            [
+                *([str(k)] if kind == "position" else []),
+                one.text("name"),
+                one.number("count"),
+                one.micro("root_mean_square"),
+                one.number("standardised"),
+            ]
+            for k, one in enumerate(fit.at("residuals", f"by_{kind}").each(), start=1)
+        ]
+        heads = ["number"] if kind == "position" else []
+        heads += [words, "co-ordinates", "root mean square, µm", "in standard uncertainties"]
+        texts = (0, 1) if kind == "position" else (0,)
+        caption = f"Residuals by {words}"
+        parts.append(table(f"residuals-{kind}", caption, heads, rows, texts, len(rows) > 30))
+    rows = [
+        [
+            *(one.text(name) for name in ("position", "ball", "probe", "axis")),
+            one.micro("value"),
+            one.number("standard_uncertainties"),
+        ]
+        for one in fit.at("largest_residuals").each()
+    ]
+    heads = ["position", "ball", "probe", "along", "µm", "standard uncertainties"]
+    parts.append(table("largest", "Largest residuals", heads, rows, (0, 1, 2, 3)))
+    return joined(parts)
+
+
+def suspects_section(fit: QuotedData, untested: str) -> Html:
+    """What the residuals make suspect, or why they were not tested."""
+    if untested:
+        return sentence(f"Not tested: {untested}.")
+    if "suspected" not in fit:
+        return sentence("None: no test of the residuals exceeds its limit.")
+    items = (element("li", one.text("words")) for one in fit.at("suspected").each())
+    return element("ol", *items)
+
+
+def components_section(fit: QuotedData) -> Html:
+    """Variance components, where these were asked for."""
+    if fit.data.get("variance_components") is None:
+        return Html()
+    found = fit.at("variance_components")
+    rows = [
+        [
+            one.text("group"),
+            one.number("observations"),
+            one.number("redundancy"),
+            *(
+                one.number(name, digits=3)
+                for name in ("ratio", "standard_uncertainty", "lower", "upper")
+            ),
+            one.text("verdict"),
+        ]
+        for one in found.at("groups").each()
+    ]
+    heads = [
+        "group",
+        "observations",
+        "redundancy",
+        "ratio to stated",
+        "u of ratio",
+        "95 % from",
+        "to",
+        "",
+    ]
+    caption = f"Variances by {found.data['by']}, as ratios to what is stated"
+    made = table("components", caption, heads, rows, (0, 7))
+    words = "All other figures are as if these estimates had been stated."
+    return joined([made, note(words) if fit.data.get("reweighted") else Html()])
+
+
+def reliability_section(reliability: QuotedData) -> Html:
+    """Which biases would be noticed, and what those change that would not."""
+    data = reliability.data
+    words = sentence(
+        "The observations have a redundancy of ",
+        reliability.number("redundancy"),
+        " in all, of ",
+        reliability.number("observations"),
+        ". A bias of the size of the MDB (minimal detectable bias) is found with a power of ",
+        reliability.share("power"),
+        " by a test with a false alarm of ",
+        reliability.share("false_alarm"),
+        "; the change that it causes in lengths is the largest that goes unnoticed.",
+    )
+    parts = [words]
+    symbol = "U6" if any("U6" in one["effects"] for one in data["events"]) else "U5"
+    for key, title in (("observations_by_name", "Observations"), ("events", "Events")):
+        every = list(enumerate(data[key]))
+        # What cannot be detected and does harm first, then by what it changes.
+        every.sort(key=lambda pair: (-_harm(pair[1], symbol), pair[0]))
+        rows = [_bias(reliability.at(key, k), symbol) for k, _ in every[:MOST]]
+        if rows:
+            heads = ["bias", "MDB", "found by fit from", "unit", f"changes {symbol} by, µm", "at"]
+            caption = f"{title} that matter most"
+            parts.append(table(f"reliability-{key}", caption, heads, rows, (0, 3, 5)))
+            left = len(every) - len(rows)
+            told = f"{left} others are told by ballplate reliability --json."
+            parts.append(note(told) if left else Html())
+    return joined(parts)
+
+
+def _harm(bias: Mapping[str, Any], symbol: str) -> float:
+    """What a bias that goes unnoticed changes at most; infinite where it can never be noticed."""
+    if bias["minimal_detectable"] is None:
+        return -1.0 if bias.get("harmless") else np.inf
+    # Equal effects stay in their order, whatever the rounding.
+    return float(f"{bias['effects'].get(symbol, {}).get('change', 0.0):.6g}")
+
+
+def _bias(one: QuotedData, symbol: str) -> list[str]:
+    found = one.data["minimal_detectable"] is not None
+    effect = one.at("effects", symbol) if found and symbol in one.data["effects"] else None
+    harmless = "never; harmless" if one.data.get("harmless") else "never"
+    fit = one.micro("found_by_fit", digits=3) if one.data["found_by_fit"] is not None else "-"
+    return [
+        one.text("name"),
+        one.micro("minimal_detectable", digits=3) if found else harmless,
+        fit,
+        SHOWN[one.data["unit"]],
+        effect.micro("change", digits=3) if effect is not None else "-",
+        effect.text("at") if effect is not None else "",
+    ]

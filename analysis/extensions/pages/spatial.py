@@ -1,0 +1,203 @@
+"""Pictures in space that can be turned, and that may move: a still SVG as well as a script's data.
+
+All layers are drawn with the eye of `scene`. In a page with the script `view.js` the same layers
+follow the eye, and those with displacements swing along them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.scene import RISE, TURN, projection
+from ballplate.simulator.machines.protocol import Array
+
+from .document import shipped
+from .elements import Html, element, joined
+
+WIDTH, HEIGHT = 480.0, 360.0
+MARGIN = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """What is drawn alike, of class `style`: lines or areas through `points` (m, d) in metres,
+    `sizes` points each; dots; labels with `names`; ellipsoids with square roots `shapes` (m, d, d).
+
+    With `moves` (m, d) points swing by so much, in metres of the picture.
+    """
+
+    kind: str
+    style: str
+    points: Array
+    sizes: tuple[int, ...] = ()
+    moves: Array | None = None
+    shapes: Array | None = None
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Eye:
+    """What takes points to the paper: a projection (2, d), the middle (d,) and the scale."""
+
+    view: Array
+    centre: Array
+    scale: float
+
+    def paper(self, points: Array) -> Array:
+        across = (points - self.centre) @ self.view.T * self.scale
+        return np.asarray(np.round([0.5 * WIDTH, 0.5 * HEIGHT] + across * [1.0, -1.0], 1))
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialPicture:
+    """Layers as a picture: the `name` is its id on a page, the `label` its short name, and `words`
+    are for those who do not see it.
+    """
+
+    layers: Sequence[Layer]
+    name: str
+    label: str
+    words: str
+    caption: str | Html
+
+
+def figure_of(picture: SpatialPicture) -> Html:
+    """The picture as a figure of a page, with its controls."""
+    layers = [one for one in picture.layers if len(one.points)]
+    eye = _eye(layers)
+    d = len(eye.centre)
+    moving = any(one.moves is not None for one in layers)
+    svg = _svg(layers, eye, picture.words, tabindex="0" if d == 3 else None)
+    data = {
+        "centre": [round(1e3 * v, 3) for v in eye.centre.tolist()],
+        "scale": eye.scale / 1e3,
+        "turn": TURN,
+        "rise": RISE,
+        "layers": [_data(one) for one in layers],
+    }
+    # No text in the data may end the element.
+    stored = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    return element(
+        "figure",
+        svg,
+        _controls(d, moving),
+        element("figcaption", picture.caption),
+        Html(f'<script type="application/json">{stored}</script>'),
+        class_="view moving" if moving else "view",
+        id=picture.name,
+    )
+
+
+def still(picture: SpatialPicture) -> str:
+    """The picture as an SVG file of its own."""
+    layers = [one for one in picture.layers if len(one.points)]
+    paper = element("rect", width="100%", height="100%", style="fill: var(--paper)")
+    before = Html(f"<style>{shipped('marks.css')}</style>"), paper
+    size = {"width": f"{WIDTH:g}", "height": f"{HEIGHT:g}", "class_": "view"}
+    space = "http://www.w3.org/2000/svg"
+    return _svg(layers, _eye(layers), picture.words, *before, xmlns=space, **size)
+
+
+def _svg(
+    layers: Sequence[Layer],
+    eye: _Eye,
+    words: str,
+    *before: Html,
+    **attributes: str | None,
+) -> Html:
+    return element(
+        "svg",
+        *before,
+        joined(_drawn(one, k, eye) for k, one in enumerate(layers)),
+        viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}",
+        role="img",
+        aria_label=words,
+        **attributes,
+    )
+
+
+def _eye(layers: Sequence[Layer]) -> _Eye:
+    every = np.concatenate([one.points for one in layers])
+    lower, upper = every.min(axis=0), every.max(axis=0)
+    centre = 0.5 * (lower + upper)
+    flat, _ = projection(len(centre))
+    on_paper = (every - centre) @ flat.T
+    extent = 2.0 * np.abs(on_paper).max(axis=0)
+    room = np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN
+    return _Eye(flat, centre, float((room / np.maximum(extent, 1e-9)).min()))
+
+
+def _controls(dimension: int, moving: bool) -> Html:
+    """Buttons that the script shows; without it there is nothing to press."""
+    views = ("oblique", "above", "front", "right") if dimension == 3 else ()
+    parts = [
+        element(
+            "button", one, type="button", data_view=one, title=f"seen from {one}" if k else None
+        )
+        for k, one in enumerate(views)
+    ]
+    parts += [
+        element("button", "+", type="button", data_zoom="1.25", aria_label="larger"),
+        element("button", "−", type="button", data_zoom="0.8", aria_label="smaller"),
+    ]
+    if moving:
+        parts.insert(
+            0, element("button", "move", type="button", data_play=True, aria_pressed="false")
+        )
+    return element("div", *parts, class_="controls", hidden=True)
+
+
+def _drawn(one: Layer, number: int, eye: _Eye) -> Html:
+    points = one.points if one.moves is None else one.points + one.moves
+    paper = eye.paper(points).tolist()
+    if one.kind == "labels":
+        texts = (
+            element("text", name, x=f"{x:g}", y=f"{y:g}", text_anchor="middle")
+            for name, (x, y) in zip(one.names, paper, strict=True)
+        )
+        return element("g", joined(texts), class_=f"labels {one.style}", data_layer=number)
+    if one.kind == "dots":
+        path = "".join(f"M{x:g} {y:g}h0" for x, y in paper)
+    elif one.kind == "ellipsoids" and one.shapes is not None:
+        path = "".join(
+            _ellipse(at, shape)
+            for at, shape in zip(paper, eye.scale * (eye.view @ one.shapes), strict=True)
+        )
+    else:
+        end = "Z" if one.kind == "areas" else ""
+        ends = np.cumsum([0, *one.sizes])
+        path = "".join(
+            "M" + "L".join(f"{x:g} {y:g}" for x, y in paper[first:last]) + end
+            for first, last in zip(ends, ends[1:], strict=False)
+        )
+    return element("path", class_=f"{one.kind} {one.style}", d=path, data_layer=number)
+
+
+def _ellipse(at: Sequence[float], root: Array) -> str:
+    """Outline of an ellipsoid on the paper, whose root there is (2, d)."""
+    axes, sizes, _ = np.linalg.svd(root, full_matrices=False)
+    x, y = (axes[:, 0] * sizes[0] * [1.0, -1.0]).tolist()
+    angle = np.degrees(np.arctan2(y, x))
+    arc = f"a{sizes[0]:.1f} {sizes[1]:.1f} {angle:.0f} 1 0"
+    there, back = (f"{arc} {2 * way * x:.1f} {2 * way * y:.1f}" for way in (1, -1))
+    return f"M{at[0] - x:.1f} {at[1] - y:.1f}{there}{back}"
+
+
+def _data(one: Layer) -> dict[str, Any]:
+    found: dict[str, Any] = {"kind": one.kind, "points": _millimetres(one.points, 1)}
+    if one.sizes:
+        found["sizes"] = list(one.sizes)
+    if one.moves is not None:
+        found["moves"] = _millimetres(one.moves, 1)
+    if one.shapes is not None:
+        found["shapes"] = _millimetres(one.shapes, 2)
+    return found
+
+
+def _millimetres(values: Array, digits: int) -> list[float]:
+    flat = (np.round(1e3 * values, digits) + 0.0).ravel().tolist()
+    return [int(one) if one == int(one) else one for one in flat]

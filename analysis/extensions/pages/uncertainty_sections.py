@@ -1,0 +1,181 @@
+"""Sections on uncertainties: U1 to U6, measuring tasks, and what carries scale."""
+
+from __future__ import annotations
+
+from ballplate.presentation.formatting import shown_unit, uncertainty_words
+
+from .elements import Html, folded, joined, note, sentence, table
+from .quoted import UNDETERMINED, QuotedData
+
+
+def expansion(quantities: QuotedData) -> float:
+    """The factor of expanded uncertainties on a page: that of the target, or 2."""
+    stated = [one.data.get("target_coverage_factor") for one in quantities.each()]
+    return next((one for one in stated if one is not None and one != 1.0), 2.0)
+
+
+def uncertainty_table(result: QuotedData) -> Html:
+    """U1 to U6 with their expanded uncertainties."""
+    quantities = result.at("quantities")
+    k = expansion(quantities)
+    rows, notes = [], []
+    for one in quantities.each():
+        if ", " in one.data["unit"]:
+            # Lengths and angles have no common unit; each has a row of its own.
+            continue
+        symbol = one.path.rpartition("/")[2].partition(" ")[0]
+        count: Html = one.number("count")
+        if one.data["undetermined"]:
+            count = joined([count, " (", one.number("undetermined"), f" {UNDETERMINED})"])
+        figures = [one.micro(name) for name in ("maximum", "average")]
+        expanded = [one.micro(name, factor=k) for name in ("maximum", "average")]
+        unit = shown_unit(one.data["unit"])
+        rows.append(
+            [
+                symbol,
+                one.text("description"),
+                *figures,
+                *expanded,
+                unit,
+                count,
+                one.text("largest_at"),
+            ]
+        )
+        if one.data.get("within_target") is not None:
+            by = uncertainty_words(one.data["target_coverage_factor"])
+            within = one.share("within_target")
+            notes.append(note(f"Within the target ({by}): ", within, f" of {symbol}."))
+        if one.data.get("parameters"):
+            each = (
+                joined([f"{name} ", one.micro("parameters", name)])
+                for name in one.data["parameters"]
+            )
+            notes.append(note(f"{one.data['description']}, {unit}: ", joined(each, ", "), "."))
+    if not rows:
+        return Html()
+    heads = ["", "uncertainty of", "u maximum", "u average", f"U maximum, k = {k:g}"]
+    heads += [f"U average, k = {k:g}", "unit", "count", "largest at"]
+    caption = f"Standard uncertainties u and expanded uncertainties U = {k:g} u"
+    return joined([table("quantities", caption, heads, rows, (0, 1, 6, 8)), *notes])
+
+
+def task_table(result: QuotedData) -> Html:
+    """Measuring tasks one by one."""
+    if "tasks" not in result:
+        return Html()
+    rows = []
+    for name, one in zip(result.data["tasks"], result.at("tasks").each(), strict=True):
+        judged = {True: "yes", False: "no", None: ""}[one.data["within_target"]]
+        target = "" if one.data["target"] is None else one.micro("target")
+        rows.append(
+            [
+                name,
+                one.number("length", factor=1e3, digits=6),
+                one.micro("standard_uncertainty"),
+                one.micro("expanded_uncertainty"),
+                one.number("coverage_factor"),
+                target,
+                judged,
+            ]
+        )
+    heads = ["task", "length, mm", "u, µm", "U, µm", "k of U", "target, µm", "within target"]
+    return table("tasks", "Measuring tasks", heads, rows, (0, 6))
+
+
+def lengths_words(result: QuotedData, target: str) -> Html:
+    """In a sentence, how the lengths that the corrected machine measures compare with the
+    target, or how uncertain they are where none is stated.
+    """
+    u6 = result.at("quantities").data.get("U6")
+    if u6 is None:
+        return Html("The design has no evaluation points, so that no lengths are judged.")
+    lengths = result.at("quantities", "U6")
+    if u6["average"] is None:
+        return Html("All distances between corrected points are undetermined.")
+    amounts = joined(
+        [
+            lengths.micro("average", digits=3),
+            " µm on average and ",
+            lengths.micro("maximum", digits=3),
+            " µm at most",
+        ]
+    )
+    open_ = (
+        joined(
+            [lengths.number("undetermined"), " of ", lengths.number("count"), " are undetermined. "]
+        )
+        if u6["undetermined"]
+        else Html()
+    )
+    if u6.get("within_target") is None:
+        words = joined(
+            ["Distances between corrected points have a standard uncertainty of ", amounts]
+        )
+        return joined([open_, words, "; the file states no target."])
+    by = uncertainty_words(u6["target_coverage_factor"])
+    share = lengths.share("within_target")
+    told = (
+        f" of the distances between corrected points are within the target {target} ({by}); u is "
+    )
+    return joined([open_, share, told, amounts, "."])
+
+
+def scale_section(result: QuotedData) -> Html:
+    """Where scale comes from."""
+    if result.data.get("scale") is None:
+        return sentence("Scale is not determined, or nothing carries it.")
+    scale = result.at("scale")
+    carriers = [
+        [one.text("text"), "" if one.data["without"] is None else one.micro("without", digits=3)]
+        for one in scale.at("carried_by").each()
+    ]
+    for row, one in zip(carriers, scale.data["carried_by"], strict=True):
+        row[1] = row[1] if one["without"] is not None else UNDETERMINED
+    known = sentence(
+        "Scale is known to ",
+        scale.micro("standard_uncertainty", digits=3),
+        " ppm (standard uncertainty).",
+    )
+    parts = [
+        known,
+        table(
+            "scale", "What carries scale", ["carried by", "u of scale without it, ppm"], carriers
+        ),
+    ]
+    if scale.data["rests_on_exact_offsets"]:
+        parts.append(
+            sentence(
+                "Warning: the scale rests on probe offsets that are held exact; calibrate a"
+                " distance, or state the standard uncertainty of the offsets."
+            )
+        )
+    if scale.data["with_uncertain_offsets"] is not None:
+        loose = scale.at("with_uncertain_offsets")
+        parts.append(
+            sentence(
+                "With a standard uncertainty of ",
+                loose.micro("standard_uncertainty"),
+                " µm of each offset but one, U6 would be ",
+                loose.micro("U6_average"),
+                " µm on average and ",
+                loose.micro("U6_maximum"),
+                " µm at most.",
+            )
+        )
+    return joined(parts)
+
+
+def estimates_table(result: QuotedData, names: list[str], name: str, caption: str) -> Html:
+    """Estimates with standard and expanded uncertainties."""
+    k = expansion(result.at("quantities"))
+    rows = []
+    for key in names:
+        one = result.at("estimates", key)
+        value, unit = one.amount("value", "unit", "standard_uncertainty")
+        factor = 1e3 if unit == "mK" else 1e6
+        u = one.number("standard_uncertainty", factor=factor, digits=3)
+        expanded = one.number("standard_uncertainty", factor=k * factor, digits=3)
+        rows.append([key, value, u, expanded, unit])
+    heads = ["parameter", "value", "u", f"U, k = {k:g}", "unit"]
+    made = table(name, caption, heads, rows, (0, 4), is_long=len(rows) > 40)
+    return folded(caption, made, is_open=len(rows) <= 12) if rows else Html()

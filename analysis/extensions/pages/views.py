@@ -1,0 +1,80 @@
+"""Results as pictures in space that notebooks show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from ballplate.presentation.scene import box_edges, projection
+from ballplate.rank.motions import Motion, null_motions, weak_motions
+from ballplate.rank.verdict import Direction, Verdict
+from ballplate.results.residuals import reading_residuals
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design, measured
+from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+
+from .design_views import ball_views, motion_view, point_view, volume_view
+from .residual_sections import residual_view
+from .spatial import SpatialPicture
+
+# A notebook keeps every picture that it has shown: balls that are drawn of all positions together,
+# where they stand and where they move, and directions of each kind.
+MOST_DRAWN, MOST_MOVING, MOST_DIRECTIONS = 1000, 150, 4
+
+
+def position_picture(design: Design) -> SpatialPicture:
+    """Positions in the volume."""
+    return volume_view(design, max(MOST_DRAWN // max(len(design.positions.names), 1), 1))
+
+
+def residual_pictures(observed: ObservedReadings, solution: Solution) -> tuple[SpatialPicture, ...]:
+    """Residuals of a fit where the balls of plates were read; none if there are no such balls."""
+    design = observed.design
+    if not len(design.plate_readings):
+        return ()
+    readings, residuals, _ = reading_residuals(design, solution, observed.x)
+    shown = np.where(measured(design, readings), residuals, 0.0)
+    volume = design.machine.volume
+    edges, _ = box_edges(volume.lower, volume.upper, projection(design.dimension)[1])
+    return (residual_view(observed.x[design.plate_readings], shown, edges),)
+
+
+@single_threaded
+def judged_pictures(
+    at: Linearisation,
+    judged: Verdict,
+    target: Target | None,
+    sigma: float = 1.0,
+    residuals: Sequence[SpatialPicture] = (),
+) -> tuple[SpatialPicture, ...]:
+    """A design that was judged, the most important first: an undetermined direction, where there is
+    one, positions, `residuals`, ellipsoids of points and balls with `sigma` times the stated
+    uncertainties, further undetermined directions, and weak ones.
+    """
+    stated = 1.0 if target is None else target.coverage_factor
+    factor = stated if stated != 1.0 else 2.0
+    undetermined = list(_moving(at, null_motions(at), judged.null, "Undetermined"))
+    weak = _moving(at, weak_motions(at, target), judged.weak, "Weakly determined")
+    points = [point_view(at, factor, sigma)] if len(at.design.evaluation.points) else []
+    balls = ball_views(at, factor, sigma)
+    first = [*undetermined[:1], position_picture(at.design), *residuals]
+    return (*first, *points, *balls, *undetermined[1:], *weak)
+
+
+def _moving(
+    at: Linearisation, motions: Sequence[Motion], told: Sequence[Direction], kind: str
+) -> Iterator[SpatialPicture]:
+    """Directions that move something, the first few of them."""
+    of = f" of {len(told)}" if len(told) > 1 else ""
+    shown = 0
+    for k, (motion, direction) in enumerate(zip(motions, told, strict=True), start=1):
+        name, words = f"{kind.lower().replace(' ', '-')}-{k}", f"{kind} {k}{of}"
+        picture = motion_view(at, motion, name, str(direction), words, MOST_MOVING)
+        if picture is not None:
+            shown += 1
+            yield picture
+        if shown == MOST_DIRECTIONS:
+            return

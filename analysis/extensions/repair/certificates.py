@@ -1,0 +1,181 @@
+"""Distances and radii that may be calibrated, or calibrated better."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.design.lookup import Indices
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.radius import RadiusCalibration
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout, pairs
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length
+
+from .changes import Change, ChangeKind, distances, pair_set, with_calibration
+from .written import can_be_written
+
+# Distances between two balls of a line.
+MOST_DISTANCES = 200
+
+
+def certificates(experiment: Experiment) -> Iterator[Change]:
+    """Distances of plates and lengths of bars and gauges that are not calibrated yet."""
+    for name, settings in experiment.artefacts.items():
+        layout = experiment.layouts[name]
+        if isinstance(settings, BryanGaugeSettings):
+            if not any(item.artefact == name for item in experiment.calibration):
+                u = float(experiment.machine.repeatability.min())
+                radius = RadiusCalibration(name, settings.radius, u)
+                add = partial(with_calibration, item=radius)
+                words = f"calibrate the radius of {name} to {format_length(u)}"
+                yield Change(
+                    ChangeKind.CERTIFICATE, words, 1.0, frozenset({f"length of {name}"}), add
+                )
+            continue
+        if settings.role != "plate" and not isinstance(settings, TwoSpheresSettings):
+            continue
+        known = [item for item in experiment.calibration if item.artefact == name]
+        if settings.role != "plate" and known:
+            continue
+        like = like_distances(experiment, name)
+        calibrated = {
+            frozenset(pair)
+            for item in known
+            if isinstance(item, DistanceCalibration)
+            for pair in item.pairs.tolist()
+        }
+        for words, chosen in natural_distances(layout):
+            if any(frozenset(pair) not in calibrated for pair in chosen.tolist()):
+                new = distances(like, layout, chosen)
+                yield calibrated_distances(name, words, new)
+
+
+def better_certificates(experiment: Experiment) -> Iterator[Change]:
+    """Calibration with smaller uncertainties, of the kinds that can be written."""
+    for k, item in enumerate(experiment.calibration):
+        if not can_be_written(item):
+            continue
+        for factor in (0.5, 0.1):
+            better, layout = item.times_as_uncertain(factor), experiment.layouts[item.artefact]
+            least = min(one.standard_uncertainty for one in better.certified_values(layout))
+            if not least:
+                # What is exact cannot be calibrated better.
+                break
+            what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
+            words = format_length(least)
+            if isinstance(better, DistanceCalibration):
+                what = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
+                assert better.standard_uncertainty is not None
+                words = length_words(better.standard_uncertainty)
+            told = (
+                f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard"
+                " uncertainty)"
+            )
+            apply = partial(_with_better, k=k, item=better)
+            yield Change(
+                ChangeKind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply
+            )
+
+
+def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
+    """The change of calibrating distances."""
+    assert item.standard_uncertainty is not None
+    u = length_words(item.standard_uncertainty)
+    told = f"calibrate the {words.replace('{}', artefact)} to {u}"
+    touched = frozenset(
+        f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist()
+    )
+    return Change(
+        ChangeKind.CERTIFICATE,
+        told,
+        float(len(item.pairs)),
+        touched,
+        partial(with_calibration, item=item),
+        item,
+    )
+
+
+def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration:
+    """Distances of an artefact, none yet, as certain as others of it, or else as readings."""
+    own = [
+        c
+        for c in experiment.calibration
+        if isinstance(c, DistanceCalibration)
+        and c.artefact == artefact
+        and c.standard_uncertainty not in (None, LengthFunction(0.0))
+    ]
+    uncertainty = (
+        own[0].standard_uncertainty
+        if own
+        else LengthFunction(float(experiment.machine.repeatability.min()))
+    )
+    none, no_pairs = np.zeros(0), np.zeros((0, 2), np.intp)
+    dimensions: Any = 2 if experiment.dimension == 2 else 3
+    return DistanceCalibration(
+        artefact, no_pairs, dimensions, none, False, uncertainty, none, "distance", "included"
+    )
+
+
+def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
+    """Words and pairs (m, 2) of single distances along the edges, diagonals and rows, and of sets
+    of them.
+    """
+    n = len(layout.names)
+    if n < 2:
+        return
+    if n == 2:
+        yield "distance of its balls on {}", np.array([[0, 1]], np.intp)
+        return
+    singles = [
+        pair
+        for name in ("corner sides", "corner diagonals")
+        for pair in layout.pair_sets.get(name, ())
+    ]
+    if not layout.pair_sets:
+        far = np.linalg.norm(layout.coordinates[:, None] - layout.coordinates[None], axis=2)
+        order = np.argsort(-far[np.triu_indices(n, 1)], kind="stable")[:10]
+        singles = [(int(i), int(j)) for i, j in np.column_stack(np.triu_indices(n, 1))[order]]
+    singles += row_pairs(layout)
+    for pair in dict.fromkeys(singles):
+        one, other = (layout.names[k] for k in pair)
+        yield f"distance {one}-{other} of {{}}", np.array([pair], np.intp)
+    for name, words in (
+        ("corner sides", "four sides of {}"),
+        ("corner diagonals", "two diagonals of {}"),
+        ("neighbours", "distances between neighbours on {}"),
+        ("braced", "braced net of distances on {}"),
+    ):
+        if name in layout.pair_sets:
+            yield f"{words} ({len(layout.pair_sets[name])})", pairs(layout, name)
+
+
+def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
+    """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`,
+    evenly from all.
+    """
+    found = []
+    xy = np.round(layout.coordinates[:, :2], 9)
+    for across, along in ((1, 0), (0, 1)):
+        for line in np.unique(xy[:, across]):
+            members = np.flatnonzero(xy[:, across] == line)
+            members = members[np.argsort(xy[members, along], kind="stable")]
+            found += [(int(members[0]), int(one)) for one in members[:0:-1]]
+    if len(found) <= MOST_DISTANCES:
+        return found
+    return [found[k] for k in np.linspace(0, len(found) - 1, MOST_DISTANCES).astype(int)]
+
+
+def length_words(value: LengthFunction) -> str:
+    """An uncertainty that may grow with length, in words."""
+    constant = format_length(value.constant)
+    return f"{constant} + L/{1.0 / value.slope:.6g}" if value.slope else constant
+
+
+def _with_better(experiment: Experiment, k: int, item: Any) -> Experiment:
+    items = (*experiment.calibration[:k], item, *experiment.calibration[k + 1 :])
+    return replace(experiment, calibration=items)

@@ -1,0 +1,115 @@
+"""Fast assessment of changed experiments: the verdict without its words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from ballplate.rank.verdict import effects, weak_limit
+from ballplate.simulator.computing.rounding import above, comparable
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Array
+
+from .changes import Change, apply_all
+
+# Part of a null direction that counts as its being there, and not rounding.
+COMPONENT_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A design's rank and what it knows least.
+
+    `weak` counts weakly determined directions, `worst` is what one standard deviation along the
+    weakest adds to corrected points, and `spread` the same of all directions together, in metres.
+    `open_errors` (model parameters, deficiency) is what null directions do to the machine, scaled
+    to micrometres.
+    """
+
+    deficiency: int
+    weak: int
+    worst: float
+    spread: float
+    smallest: float
+    open_errors: Array
+
+    @property
+    def is_cured(self) -> bool:
+        """Whether nothing is undetermined, or weakly determined."""
+        return not self.deficiency and not self.weak
+
+    @property
+    def order(self) -> tuple[int, int, float]:
+        """The better, the smaller."""
+        return self.deficiency, self.weak, float(comparable(self.spread))
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """An experiment and its design, linearised."""
+
+    experiment: Experiment
+    at: Linearisation
+
+    @cached_property
+    def judged(self) -> Judged:
+        """The summary."""
+        found, model = self.at.spectrum, self.at.layout.model
+        effect = effects(self.at)
+        limit = weak_limit(self.at.design, self.experiment.target_uncertainty)
+        return Judged(
+            found.deficiency,
+            int(above(effect, limit).sum()),
+            float(effect.max(initial=0.0)),
+            float(np.sqrt((effect**2).sum())),
+            float(found.values[found.rank - 1]) if found.rank else 0.0,
+            found.null[model] / found.scale[model, None],
+        )
+
+
+def examine(experiment: Experiment) -> Examined:
+    """Rank of an experiment's design in full, without what only its pool places.
+
+    :raises ExperimentError: the design cannot be laid out.
+    """
+    return Examined(experiment, linearise(lay_out(placed_only(experiment))))
+
+
+def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | None:
+    """What an experiment determines after changes; None where they contradict something else that
+    it says.
+    """
+    try:
+        return examine(apply_all(changes, experiment)).judged
+    except ExperimentError:
+        return None
+
+
+def work(base: Examined) -> float:
+    """Size of one judgement: observations times shared parameters."""
+    return float(base.at.design.observation_count * len(base.at.layout))
+
+
+def removed(before: Array, after: Array) -> tuple[int, ...]:
+    """Which null directions, told by what they do to the machine (parameters, k), are no part of
+    those afterwards.
+
+    Directions that do nothing to the machine, or the same as others, are never reported as removed.
+    """
+    if not after.shape[1]:
+        return tuple(range(before.shape[1]))
+    parts, _, rank, _ = np.linalg.lstsq(before, after, rcond=1e-9)
+    if rank < before.shape[1]:
+        return ()
+    return tuple(
+        int(k)
+        for k in np.flatnonzero(
+            np.abs(parts).max(axis=1) < COMPONENT_TOLERANCE * max(np.abs(parts).max(), 1e-300)
+        )
+    )

@@ -1,0 +1,256 @@
+"""Repairs written into an experiment's file, with the text about them kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ballplate.rank.verdict import Verdict
+from ballplate.results.study import check
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import place_of
+from ballplate.simulator.inputs.messages import Steps, format_path
+from ballplate.simulator.inputs.trust import UNKNOWN, Trust
+from ballplate.simulator.inputs.yamltext import TextChange, changed_data, with_changes
+from ballplate.simulator.inputs.yamltree import (
+    Mapping as MappingNode,
+)
+from ballplate.simulator.inputs.yamltree import (
+    Node,
+    mark_of,
+    parse_tree,
+    to_python,
+    written,
+)
+
+from .changes import apply_all
+from .repair_search import Repair, Repairs
+from .written import Edit, edits, lacks_probes, position_settings
+
+PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
+READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
+
+
+def to_write(found: Repairs | None, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
+    """The repair of a design that may be written without being asked about: the cheapest; None
+    where none is needed, or where it repairs the design in name only.
+
+    A design that leaves nothing undetermined needs one where `nothing_weak` is to be left either.
+    """
+    if found is None or not found.complete or not (judged.deficiency or nothing_weak):
+        return None
+    cheapest = found.complete[0]
+    is_enough = judged.deficiency or not cheapest.weak
+    return cheapest if is_enough and not cheapest.is_faint else None
+
+
+def mended(
+    text: str, source: Path, variant: str | None, repair: Repair, trust: Trust = UNKNOWN
+) -> str:
+    """The text of an experiment's file with a repair in it; what a variant does not say itself is
+    changed for that variant alone.
+
+    The experiment is loaded from the new text, and its rank computed from that.
+
+    :raises ExperimentError: the repair cannot be written without changing what stands about it, or
+        what others refer to.
+    """
+    loaded = load(source, True, trust, text)
+    (experiment,) = (one for one in loaded if one.name == variant)
+    changed = apply_all(repair.changes, experiment)
+    # Nothing is left undetermined, whatever the file expected until now.
+    extra = (
+        [TextChange(("expected_rank_deficiency",), 0)]
+        if experiment.expected_rank_deficiency
+        else []
+    )
+    extra += _taken_from_pool(experiment, repair)
+    new = with_experiment(text, source, experiment, changed, repair.edits, extra)
+    (checked,) = (one for one in load(source, False, trust, new) if one.name == variant)
+    verdict = check(checked).verdict
+    if verdict.deficiency or len(verdict.weak) > repair.weak:
+        text = "the repaired file does not have the rank that was found; nothing is changed"
+        raise experiment.refused((), text)
+    return new
+
+
+def _taken_from_pool(experiment: Experiment, repair: Repair) -> Iterator[TextChange]:
+    """What the pool no longer offers, as it is in the experiment now."""
+    said, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
+    indices = [change.candidate for change in repair.changes if change.candidate >= 0]
+    taken = {pool.candidates[k].name for k in indices} if pool is not None else set()
+    for key in ("candidates", "calibration"):
+        entries = said.get(key) or ()
+        gone = [k for k, one in enumerate(entries) if str(one.get("name")) in taken]
+        if gone and len(gone) == len(entries):
+            yield TextChange(("pool", key), [])
+            continue
+        for k in reversed(gone):
+            yield TextChange(("pool", key, k), kind="remove")
+
+
+def with_experiment(
+    text: str,
+    source: Path,
+    experiment: Experiment,
+    changed: Experiment,
+    needed: Iterable[Edit] | None = None,
+    extra: Iterable[TextChange] = (),
+) -> str:
+    """The text of an experiment's file that says what has changed of it; what a variant does not
+    say itself is changed for that variant alone.
+
+    `needed` are the edits where these are known, and `extra` changes are made besides.
+
+    :raises ExperimentError: this cannot be written without changing what stands about it, or what
+        others refer to.
+    """
+    before = {experiment.name: experiment}
+    if experiment.name is not None:
+        before = {one.name: one for one in load(source, True, experiment.trust, text)}
+    # A variant with more entries of a list has a list of its own, in which the others are changed.
+    changes = sorted(
+        [
+            *changes_of(experiment, edits(experiment, changed) if needed is None else needed),
+            *extra,
+        ],
+        # What the pool no longer offers is left out last, so that the others keep their numbers.
+        key=lambda one: (one.steps[0] == "pool" and len(one.steps) < 4, len(one.steps)),
+    )
+    new = with_text_changes(text, source, experiment.name, changes)
+    after = {one.name: one for one in load(source, True, experiment.trust, new)}
+    others_differ = before.keys() != after.keys() or any(
+        to_python(before[name].tree) != to_python(one.tree)
+        for name, one in after.items()
+        if name != experiment.name
+    )
+    written_as = after.get(experiment.name, experiment)
+    if others_differ or edits(written_as, changed) or edits(changed, written_as):
+        text = "the change cannot be written as it was made; write it by hand"
+        raise experiment.refused((), text)
+    return new
+
+
+def with_text_changes(
+    text: str, source: Path, variant: str | None, changes: Iterable[TextChange]
+) -> str:
+    """The text with changes of what it says of a variant, or of its only experiment.
+
+    :raises ExperimentError: as `with_experiment` does.
+    """
+    for change in changes:
+        for one in _in_file(parse_tree(text, str(source)), variant, change):
+            text = with_changes(text, str(source), [one])
+    return text
+
+
+def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextChange]:
+    """What the experiment's own file would have to say otherwise, of a variant's its tree."""
+    said = to_python(experiment.tree)
+    places = {place.name: place for place in experiment.positions}
+    needed = tuple(needed)
+    if len(experiment.probes) == 1 and any(edit.steps[0] == "probes" for edit in needed):
+        # With more probes than one, what a pool offers has to name its own, too.
+        offered = (said.get("pool") or {}).get("candidates") or ()
+        for k, one in enumerate(offered):
+            for i, group in enumerate(one.get("readings", [one])):
+                if "probes" not in group:
+                    inner = ("readings", i) if "readings" in one else ()
+                    yield TextChange(
+                        ("pool", "candidates", k, *inner, "probes"), [*experiment.probes]
+                    )
+    for edit in needed:
+        if edit.steps[0] == "positions" and not edit.is_new:
+            name = str(edit.steps[1])
+            at = next(i for i, one in enumerate(said["positions"]) if str(one["name"]) == name)
+            settings = position_settings(experiment, places[name])
+            steps: Steps = ("positions", at)
+            if lacks_probes(said["positions"][at]):
+                for group in settings.get("readings", [settings]):
+                    group.pop("probes", None)
+            yield from _of_position(steps, said["positions"][at], settings, edit.value)
+        else:
+            yield TextChange(edit.steps, edit.value, "append" if edit.is_new else "set")
+
+
+def _of_position(
+    steps: Steps, said: Mapping[str, Any], before: dict[str, Any], after: dict[str, Any]
+) -> Iterator[TextChange]:
+    """Changes of what a file says of a position, whose settings were `before`, however it says
+    them.
+    """
+    for group in (PLACEMENT, READINGS):
+        if {key: before.get(key) for key in group} == {key: after.get(key) for key in group}:
+            continue
+        for key in group:
+            if key in said and key not in after:
+                yield TextChange((*steps, key), kind="remove")
+        for key in group:
+            if key in after:
+                yield from _of_value((*steps, key), said.get(key), before.get(key), after[key])
+
+
+def _of_value(steps: Steps, said: Any, before: Any, after: Any) -> Iterator[TextChange]:
+    """The smallest changes of a value that lead from `before` to `after`."""
+    if said is not None and before == after:
+        return
+    forms = (said, before, after)
+    if all(isinstance(one, dict) for one in forms) and said.keys() == before.keys() == after.keys():
+        for key, value in after.items():
+            yield from _of_value((*steps, key), said[key], before[key], value)
+        return
+    if all(isinstance(one, list | tuple) for one in forms) and len(said) == len(before):
+        if len(after) == len(before):
+            for i, value in enumerate(after):
+                yield from _of_value((*steps, i), said[i], before[i], value)
+            return
+        if after[: len(before)] == before:
+            yield from (TextChange(steps, value, "append") for value in after[len(before) :])
+            return
+    yield TextChange(steps, after)
+
+
+def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[TextChange]:
+    """The change where the file has to be changed for one variant, whose new values have paths.
+
+    :raises ExperimentError: the variant has a value for a part of the place already.
+    """
+    if variant is None:
+        yield change
+        return
+    overrides = written(root, "variants", variant)
+    assert isinstance(root, MappingNode) and isinstance(overrides, MappingNode)
+    place = tuple(map(str, change.steps))
+    # A new value is one for a whole entry, and cannot take one away.
+    whole = change.steps[: -1 if change.kind == "remove" else 3]
+    for path in overrides.items:
+        own = place_of(root, path)
+        if place[: len(own)] == own:
+            steps = ("variants", variant, path, *change.steps[len(own) :])
+            yield TextChange(steps, change.value, change.kind)
+            return
+        if own[: len(whole)] == tuple(map(str, whole)):
+            mark = mark_of(root, ("variants", variant, path), of_key=True)
+            place_text = format_path(whole)
+            text = f"the repair changes {place_text}, which includes this; write it by hand"
+            raise mark.refused(text, format_path(("variants", variant)))
+    said: Any = changed_data(to_python(root), change)
+    for step in whole:
+        said = said[step]
+    yield TextChange(("variants", variant, _path_of(root, whole)), said)
+
+
+def _path_of(root: Node, steps: Steps) -> str:
+    """The path of a place for a variant, of a position by its name where that is clear."""
+    if len(steps) > 1 and isinstance(steps[1], int):
+        name = written(root, steps[0], steps[1], "name")
+        named = f"{steps[0]}[{getattr(name, 'value', '')}]"
+        path = named + "".join(f".{step}" for step in steps[2:])
+        try:
+            if place_of(root, path) == tuple(map(str, steps)):
+                return path
+        except ValueError:
+            pass
+    return format_path(steps)

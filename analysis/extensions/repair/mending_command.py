@@ -1,0 +1,141 @@
+"""Repairs that `ballplate check` writes into files, or shows as a difference."""
+
+from __future__ import annotations
+
+import difflib
+from argparse import Namespace
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from ballplate.cli.outputs import check_overwritten, write_outputs
+from ballplate.cli.telling import note
+from ballplate.planning.checked_files import (
+    CheckedDesign,
+    CheckedFile,
+    Wanted,
+    advised,
+    check_files,
+)
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
+from ballplate.simulator.inputs.yamltree import read_text
+
+from .mending import mended, to_write
+from .repair_tables import changes_in_words
+
+MARK = "\ufeff"
+BAD_FILE = 3
+
+
+def with_repairs(
+    checked: CheckedFile, wanted: Wanted, options: Namespace
+) -> tuple[CheckedFile, int]:
+    """A checked file after the cheapest repair of each of its designs was written into it; with
+    `options.diff` it is as before, and the difference is printed.
+
+    Designs that could not be repaired are as they were, with what is suggested. The number is the
+    exit status that this demands at least.
+    """
+    path = Path(checked.file)
+    repaired: set[str | None] = set()
+    messages: list[Message] = []
+    told: list[str] = []
+    status = 0
+    try:
+        mark, text = _text(path) if checked.designs else ("", "")
+        new = text
+        for design in checked.designs:
+            repair = to_write(design.repairs, design.prediction.verdict, wanted.nothing_weak)
+            name = f"{path}: {design.prediction.label}"
+            if repair is None:
+                if not design.prediction.verdict.deficiency:
+                    told.append(f"{name}: nothing to repair")
+                continue
+            try:
+                new = mended(new, path, design.variant, repair, wanted.trust(path))
+            except ExperimentError as error:
+                messages += error.messages
+                continue
+            repaired.add(design.variant)
+            told.append(f"{name}: {'would be ' * options.diff}repaired: {changes_in_words(repair)}")
+        if options.diff:
+            print("".join(difference(mark + text, mark + new, str(path))), end="", flush=True)
+            status, repaired = int(bool(repaired)), set()
+        elif repaired:
+            status = _write(path, mark, text, new, options)
+    except ExperimentError as error:
+        status = BAD_FILE
+        messages += error.messages
+    for line in told if status != BAD_FILE else ():
+        note(options, line)
+    after: dict[str | None, CheckedDesign] = {}
+    if repaired and not status:
+        names = [name for name in repaired if name is not None]
+        (again,) = check_files([path], names, replace(wanted, repairs=options.suggest))
+        after = {design.variant: advised(design, with_repairs=True) for design in again.designs}
+        messages += again.messages
+    designs = tuple(
+        after.get(one.variant, _as_asked(one, options.suggest)) for one in checked.designs
+    )
+    return replace(checked, designs=designs, messages=(*checked.messages, *messages)), status
+
+
+def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
+    """Without suggestions where nothing is undetermined, unless these were asked for."""
+    if with_suggestions or design.prediction.verdict.deficiency:
+        return design
+    return advised(replace(design, repairs=None, certificate=None), with_repairs=True)
+
+
+def _text(path: Path) -> tuple[str, str]:
+    """The byte order mark of a file, or nothing, and its text.
+
+    :raises ExperimentError: it is not a file that can be changed.
+    """
+    if not path.is_file():
+        raise refused(path, "is not a file that can be changed")
+    text = read_text(path)
+    return MARK if path.read_bytes().startswith(MARK.encode()) else "", text
+
+
+def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> int:
+    """Put a new text in the place of a file that has still the old one; the exit status.
+
+    :raises ExperimentError: it has not, or cannot be written.
+    """
+    with options.interruption.held():
+        check_overwritten(path)
+    if _text(path) != (mark, text):
+        changed = "the file has changed meanwhile; nothing was written, start again"
+        raise refused(path, changed)
+    content = (mark + new).encode()
+    is_written = write_outputs(
+        {path: lambda place: place.write_bytes(content)}, True, options.interruption.held
+    )
+    return 0 if is_written else BAD_FILE
+
+
+def difference(text: str, new: str, file: str) -> Iterator[str]:
+    r"""Lines of a unified difference, with their ends; nothing where there is none.
+
+    >>> print(*difference("a: 1\nb: 2", "a: 3\nb: 2", "f.yaml"), sep="", end="")
+    --- f.yaml
+    +++ f.yaml
+    @@ -1,2 +1,2 @@
+    -a: 1
+    +a: 3
+     b: 2
+    \ No newline at end of file
+    """
+    before, after = ([*_lines(one)] for one in (text, new))
+    for line in difflib.unified_diff(before, after, file, file):
+        yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+
+
+def _lines(text: str) -> Iterator[str]:
+    """Lines as other programs have them, which end nowhere but at a line feed."""
+    start = 0
+    while start < len(text):
+        end = text.find("\n", start) + 1 or len(text)
+        yield text[start:end]
+        start = end

@@ -1,0 +1,446 @@
+"""Search for the cheapest repairs of a deficient design.
+
+Every set of changes that is reported has been applied to the experiment, and the rank of the
+resulting design computed in full; none of its members can be left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from ballplate.rank.verdict import independent_mixture
+from ballplate.results.prediction import Prediction
+from ballplate.results.study import predict
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.experiment.pools import seconds_of
+from ballplate.simulator.machines.protocol import Array
+from ballplate.uncertainty.pairs import PairSummary
+from ballplate.uncertainty.scale import OFFSET_TRIAL, lengths_with_offsets
+
+from .changes import EFFORT, Change, ChangeKind, apply_all, go_together, is_inside
+from .covering import covering_pairs, covering_set, different
+from .judging import Examined, Judged, examine, judge, removed, work
+from .offers import allowed, offers
+from .scale import scale_certificate
+from .screening import rank_of, seen_by, weakest_of
+from .written import Edit, edits
+
+# Repairs told, of different kinds.
+MOST_TOLD = 3
+# Repairs of single directions told.
+MOST_PARTIAL = 4
+# Equally cheap repairs of a kind whose U6 with uncertain offsets is compared.
+MOST_COMPARED = 12
+# Changes in a set: as many as directions are open, within bounds.
+FEWEST_TOGETHER, MOST_TOGETHER = 3, 6
+# Judgements of a kind: as many as this amount of work allows, within bounds.
+WORK, FEWEST, MOST = 5e6, 12, 80
+# A smallest singular value below this fraction of what it was is a repair in name only.
+FAINT = 0.01
+# Sets of candidates that are verified before others are looked for.
+MOST_VERIFIED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Repair:
+    """Changes that leave nothing undetermined, with the prediction of the changed design.
+
+    They take `readings` and `seconds` more. `loosened` are the lengths, U6, where probe offsets
+    that the file holds exact have a standard uncertainty of `OFFSET_TRIAL`, None where these are
+    undetermined. `removes` are the numbers, from 0, of the undetermined directions that are gone.
+    `weak` counts directions still weakly determined, of which `worst` is what one standard
+    deviation along the weakest adds to corrected points, in metres. `smallest` is the smallest
+    singular value, and `is_faint` says that it is far below those of the design before. `edits` is
+    what the file is to say.
+    """
+
+    changes: tuple[Change, ...]
+    deficiency: int
+    removes: tuple[int, ...]
+    weak: int
+    worst: float
+    smallest: float
+    is_faint: bool
+    prediction: Prediction | None
+    edits: tuple[Edit, ...]
+    readings: int
+    seconds: float
+    loosened: PairSummary | None
+
+    @property
+    def rests_on_offsets(self) -> bool:
+        """Whether scale then rests on probe offsets that are held exact."""
+        scale = None if self.prediction is None else self.prediction.scale
+        return scale is not None and scale.rests_on_offsets
+
+    @property
+    def order(self) -> tuple[bool, bool, float, float]:
+        """The better, the smaller: what repairs in more than name and asks for no less, then by U6
+        with uncertain offsets, then by the time that it takes.
+        """
+        u6 = inf if self.loosened is None else self.loosened.total / self.loosened.count
+        asks_for_less = any(change.kind == ChangeKind.MODEL for change in self.changes)
+        return bool(self.weak) or self.is_faint, asks_for_less, float(comparable(u6)), self.seconds
+
+
+@dataclass(frozen=True)
+class Repairs:
+    """What was found: `complete` repairs, `partial` ones of single directions, and how much was
+    tried.
+
+    `tried` counts by kind the changes that were judged, and `sets` sets of several.
+    """
+
+    complete: tuple[Repair, ...]
+    partial: tuple[Repair, ...]
+    tried: Mapping[ChangeKind, int]
+    sets: int
+
+
+@single_threaded
+def repairs(
+    experiment: Experiment, most: int = MOST_TOLD, report: Report = unreported
+) -> Repairs | None:
+    """Repairs of an experiment's design, `most` at most; None where nothing is undetermined or
+    weakly determined.
+    """
+    base = examine(experiment)
+    if base.judged.is_cured:
+        return None
+    return _Search(base, most).run(report)
+
+
+def effort(change: Change) -> float:
+    """The cost of a change, comparable among additions of all kinds."""
+    return EFFORT.get(change.kind, 1.0) * max(change.cost, 1e-9)
+
+
+class _Search:
+    """One search: what was judged, and how often."""
+
+    def __init__(self, base: Examined, most: int) -> None:
+        self.most = most
+        self.base = base
+        self.before = base.judged
+        self.tried: dict[ChangeKind, set[Change]] = {}
+        self.sets = 0
+        self.judged: dict[frozenset[Change], Judged | None] = {}
+        self.seen: dict[Change, Array] = {}
+        self.ranks: dict[Change, int] = {}
+        self.together = int(np.clip(self.before.deficiency, FEWEST_TOGETHER, MOST_TOGETHER))
+        self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
+
+    def run(self, report: Report) -> Repairs:
+        found = offers(self.base.experiment, self.before.deficiency > 0)
+        self.seen = seen_by(self.base, [one for changes in found.values() for one in changes])
+        self.ranks = {one: rank_of([said]) for one, said in self.seen.items()}
+        best: dict[ChangeKind, tuple[Change, ...]] = {}
+        singles: list[Change] = []
+        steps = counted(found.items(), "kinds of changes", len(found), report)
+        for kind, changes in steps:
+            sound = sum(self.is_sound(self.judge(one)) for one in best.values())
+            if sound >= self.most or (kind == ChangeKind.MODEL and sound > 1):
+                # To ask for less is the last resort.
+                break
+            whole, part = self.singles(kind, changes)
+            singles += [*whole, *part]
+            possible: list[tuple[Change, ...]] = [
+                (one,) for one in whole if not self.judge((one,)).deficiency
+            ]
+            together = self.set_of_additions(changes) if self.is_worth_more(possible) else ()
+            possible += [together] if together else []
+            if possible:
+                best[kind] = self.best_of(possible)
+        for together in self.mixed(found, best):
+            best[max(one.kind for one in together)] = together
+        order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
+        told = [self.told(best[kind]) for kind in order if self.helps(best[kind])]
+        complete = self.ranked(told)
+        is_single = any(
+            len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete
+        )
+        partial = () if is_single else self.of_single_directions(singles)
+        return Repairs(
+            complete,
+            partial,
+            {kind: len(self.tried[kind]) for kind in sorted(self.tried)},
+            self.sets,
+        )
+
+    def ranked(self, told: Sequence[Repair]) -> tuple[Repair, ...]:
+        """The best repairs first; where even scale of the best rests on probe offsets, that with a
+        calibrated distance besides comes before it.
+        """
+        order = sorted(told, key=lambda one: one.order)
+        if order and order[0].rests_on_offsets and self.base.experiment.pool is None:
+            assert order[0].prediction is not None
+            changed = apply_all(order[0].changes, self.base.experiment)
+            certificate = scale_certificate(changed, order[0].prediction.scale)
+            if certificate is not None and certificate.change is not None:
+                with_length = self.told((*order[0].changes, certificate.change))
+                order = sorted([with_length, *order], key=lambda one: one.order)
+        return tuple(order[: self.most])
+
+    def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
+        """Whether several changes of a kind may be better than the best one."""
+        cheapest = min(map(self.preference, possible), default=None)
+        return cheapest is None or cheapest[0] or cheapest[1] > 1.0
+
+    def mixed(
+        self,
+        found: Mapping[ChangeKind, Sequence[Change]],
+        best: Mapping[ChangeKind, tuple[Change, ...]],
+    ) -> Iterator[tuple[Change, ...]]:
+        """Sets of changes where no sound repair is known but to ask for less: additions first, then
+        moves as well.
+        """
+
+        def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
+            return any(self.is_sound(self.judge(one)) for one in some)
+
+        if is_enough(one for kind, one in best.items() if kind < ChangeKind.ARTEFACT):
+            return
+        additions = [one for changes in found.values() for one in changes]
+        together = self.set_of_additions(additions)
+        if together:
+            yield together
+            if is_enough([together]):
+                return
+        for kind in (
+            ChangeKind.MOVE,
+            *(() if is_enough(best.values()) else (ChangeKind.ARTEFACT, ChangeKind.MODEL)),
+        ):
+            changes = [
+                one
+                for other in found
+                if other <= kind
+                for one in self.thinned(self.useful(found[other]))
+            ]
+            together = self.greedy(
+                found.get(ChangeKind.MOVE, []) if kind == ChangeKind.MOVE else changes
+            )
+            together = together or (self.greedy(changes) if kind == ChangeKind.MOVE else ())
+            if together:
+                yield together
+                return
+
+    def useful(self, changes: Sequence[Change]) -> list[Change]:
+        """Changes less those that add nothing that is missing."""
+        return [one for one in changes if one not in self.seen or self.ranks[one]]
+
+    def is_faint(self, after: Judged) -> bool:
+        """Whether what was undetermined is so little determined now that nobody would call it
+        known.
+        """
+        return self.before.deficiency > 0 and after.smallest < FAINT * self.before.smallest
+
+    def is_sound(self, after: Judged) -> bool:
+        """Whether changes repair the design in more than name."""
+        return after.is_cured and not self.is_faint(after)
+
+    def helps(self, changes: tuple[Change, ...]) -> bool:
+        """Whether changes are worth reporting: full rank, or fewer weak directions."""
+        after = self.judge(changes)
+        return after.deficiency < self.before.deficiency or after.weak < self.before.weak
+
+    def judge(self, changes: Sequence[Change]) -> Judged:
+        """What changes lead to, remembered; as before where they are impossible."""
+        key = frozenset(changes)
+        if key not in self.judged:
+            self.judged[key] = judge(self.base.experiment, changes)
+            if len(changes) == 1:
+                self.tried.setdefault(changes[0].kind, set()).add(changes[0])
+            else:
+                self.sets += 1
+        return self.judged[key] or self.before
+
+    def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
+        """A repair that leaves nothing weak first, then the cheapest, then the one that leaves
+        least uncertain.
+        """
+        after = self.judge(changes)
+        return (
+            not self.is_sound(after),
+            sum(one.cost for one in changes),
+            len(changes),
+            float(comparable(after.spread)),
+        )
+
+    def best_of(self, possible: Sequence[tuple[Change, ...]]) -> tuple[Change, ...]:
+        """Of the cheapest repairs of a kind that with the smallest U6 with uncertain offsets."""
+        order = sorted(possible, key=self.preference)
+        equal = [one for one in order if self.preference(one)[:3] == self.preference(order[0])[:3]]
+        return min(equal[:MOST_COMPARED], key=self.loosened) if len(equal) > 1 else order[0]
+
+    def loosened(self, changes: tuple[Change, ...]) -> float:
+        """Average U6 of changes where exact offsets are uncertain."""
+        lengths = _loosened(apply_all(changes, self.base.experiment))
+        return inf if lengths is None else float(comparable(lengths.total / lengths.count))
+
+    def thinned(self, changes: Sequence[Change]) -> list[Change]:
+        """No more of them than can be judged, evenly from all."""
+        if len(changes) <= self.at_most:
+            return list(changes)
+        return [changes[k] for k in np.linspace(0, len(changes) - 1, self.at_most).astype(int)]
+
+    def singles(
+        self, kind: ChangeKind, changes: Sequence[Change]
+    ) -> tuple[list[Change], list[Change]]:
+        """Changes that may suffice, judged one at a time, and additions that remove some of the
+        null directions.
+        """
+        useful = self.useful(changes)
+        self.tried.setdefault(kind, set()).update(one for one in changes if one in self.seen)
+        k = self.before.deficiency
+        whole = [one for one in useful if one not in self.seen or self.ranks[one] == k]
+        part = [one for one in useful if one in self.seen and self.ranks[one] < k]
+        judged = self.cheapest(whole) if kind == ChangeKind.POOL else self.thinned(whole)
+        for one in judged:
+            self.judge((one,))
+        return judged, part
+
+    def cheapest(self, changes: Sequence[Change]) -> list[Change]:
+        """The first of a list in order of cost up to one that cures, and none beyond."""
+        found = []
+        for change in changes[: self.at_most]:
+            found.append(change)
+            if self.is_sound(self.judge((change,))):
+                break
+        return found
+
+    def set_of_additions(self, changes: Sequence[Change]) -> tuple[Change, ...]:
+        """Several additions that together leave nothing undetermined; empty if there are none."""
+        additions = [one for one in changes if one in self.seen and self.ranks[one]]
+        nominal: tuple[Change, ...] = ()
+        for together in self.cheapest_sets(additions):
+            after = self.judge(together)
+            if self.is_sound(after):
+                return together
+            nominal = nominal or (together if not after.deficiency else ())
+        return nominal
+
+    def cheapest_sets(self, additions: Sequence[Change]) -> list[tuple[Change, ...]]:
+        """Sets of additions that remove all null directions, the cheapest pairs first, then one
+        that is built up.
+        """
+        few = different(additions, self.seen)
+        found: list[tuple[Change, ...]] = [
+            (few[i], few[k])
+            for i, k in covering_pairs([self.seen[one] for one in few])
+            if self.may_be((few[i], few[k]))
+        ]
+        weakest = comparable([weakest_of([self.seen[one] for one in pair]) for pair in found])
+        order = sorted(range(len(found)), key=lambda k: (sum(map(effort, found[k])), -weakest[k]))
+        found = [found[k] for k in order]
+        built = covering_set(additions, self.seen, effort, self.may_be)
+        return [*found[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
+
+    def may_be(self, changes: Sequence[Change]) -> bool:
+        """Whether changes go together, in the pool's limits and within the volume."""
+        experiment = self.base.experiment
+        pool = experiment.pool
+        chosen = tuple(one.candidate for one in changes if one.candidate >= 0)
+        if not go_together(changes) or pool is not None and not allowed(pool, chosen):
+            return False
+        # Each alone stays inside; a further probe may not where the position is moved as well.
+        if not {ChangeKind.MOVE, ChangeKind.READ_MORE} <= {one.kind for one in changes}:
+            return True
+        changed, volume = apply_all(changes, experiment), experiment.machine.volume
+        return all(
+            is_inside(one, changed.layouts[one.artefact], volume, changed.probes)
+            for one in changed.positions
+        )
+
+    def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:
+        """A set that is built up of the change that helps most each time, less what can be left out
+        of it.
+        """
+        built: tuple[Change, ...] = ()
+        after = self.before
+        while not after.is_cured and len(built) < self.together:
+            possible = [(*built, one) for one in changes if self.may_be((*built, one))]
+            best = min(possible, key=lambda one: self.judge(one).order, default=())
+            if not best or self.judge(best).order >= after.order:
+                break
+            gain = after.deficiency - self.judge(best).deficiency
+            built, after = best, self.judge(best)
+            if after.deficiency > gain * (self.together - len(built)):
+                # Later changes help less than the first.
+                break
+        if after.deficiency or not self.helps(built):
+            return ()
+        for one in built:
+            without = tuple(other for other in built if other is not one)
+            left = self.judge(without) if without else self.before
+            if (left.deficiency, left.weak) <= (after.deficiency, after.weak):
+                built, after = without, left
+        return built
+
+    def of_single_directions(self, singles: Sequence[Change]) -> tuple[Repair, ...]:
+        """For each null direction the cheapest single change after which it is no part of what is
+        open.
+        """
+        if not self.before.deficiency:
+            return ()
+        told = self.open_errors()
+        order = self.thinned(sorted(singles, key=lambda one: (one.kind, one.cost)))
+        found: dict[Change, tuple[int, ...]] = {}
+        for k in range(self.before.deficiency):
+            for one in order:
+                after = self.judge((one,))
+                if one.kind < ChangeKind.MODEL and 0 < after.deficiency < self.before.deficiency:
+                    gone = removed(told, after.open_errors)
+                    if k in gone:
+                        found[one] = gone
+                        break
+        return tuple(self.told((one,), gone) for one, gone in list(found.items())[:MOST_PARTIAL])
+
+    def open_errors(self) -> Array:
+        """What the null directions do to the machine, in the form in which they are reported."""
+        return self.before.open_errors @ independent_mixture(self.base.at)
+
+    def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
+        """A repair with the prediction of the changed design."""
+        experiment = self.base.experiment
+        changed = apply_all(changes, experiment)
+        after = self.judge(changes)
+        planned = predict(placed_only(changed), with_scale=True) if removes is None else None
+        if planned is not None and planned.verdict.deficiency != after.deficiency:
+            raise AssertionError("two computations of one design's rank differ")
+        gone = tuple(range(self.before.deficiency)) if removes is None else removes
+        return Repair(
+            changes,
+            after.deficiency,
+            gone,
+            after.weak,
+            after.worst,
+            after.smallest,
+            self.is_faint(after),
+            planned,
+            edits(experiment, changed),
+            sum(one.count for one in changed.positions)
+            - sum(one.count for one in experiment.positions),
+            _seconds_more(experiment, changes),
+            _loosened(changed) if removes is None else None,
+        )
+
+
+def _loosened(experiment: Experiment) -> PairSummary | None:
+    return lengths_with_offsets(placed_only(experiment), OFFSET_TRIAL)
+
+
+def _seconds_more(experiment: Experiment, changes: Sequence[Change]) -> float:
+    """Time that changes take, in seconds: what the pool states, else as long as usual."""
+    seconds = sum(one.cost for one in changes if one.kind == ChangeKind.POOL)
+    rest = [one for one in changes if one.kind != ChangeKind.POOL]
+    before = {place.name: seconds_of(place) for place in experiment.positions}
+    for place in apply_all(rest, experiment).positions:
+        seconds += seconds_of(place) - before.get(place.name, 0.0)
+    return seconds

@@ -1,0 +1,201 @@
+"""Repairs as lines of text and as plain data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ballplate.presentation.formatting import finite, number
+from ballplate.rank.proposed_bars import listed
+from ballplate.rank.verdict import Direction, Verdict, length
+from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
+
+from .changes import KINDS
+from .offers import duration
+
+if TYPE_CHECKING:
+    from .repair_search import Repair, Repairs
+    from .scale import ScaleCertificate
+
+# Names of errors that a line has room for.
+MOST_NAMES = 8
+
+
+def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
+    """What was found, one repair after the other, each with what the file is to say; nothing where
+    all is well.
+    """
+    if repairs is None:
+        return []
+    lines = []
+    for k, one in enumerate(repairs.complete, start=1):
+        lines.append(f"repair {k}: {changes_in_words(one)}: {_worth(one, judged)}")
+        lines += [f"repair {k}, in the file: {edit}" for edit in one.edits]
+    if not repairs.complete:
+        tried = _tried(repairs)
+        lines.append(f"repair: no changes were found that determine everything; {tried}")
+    for one in repairs.partial:
+        lines.append(
+            f"repair of {_directions(one, judged)} alone: {changes_in_words(one)}: leaves"
+            f" {_rank(one.deficiency)}"
+        )
+        lines += [f"repair of {_numbers(one)} alone, in the file: {edit}" for edit in one.edits]
+    return lines
+
+
+def changes_in_words(repair: Repair) -> str:
+    """What a repair changes, as imperative sentences."""
+    return "; and ".join(change.words for change in repair.changes)
+
+
+def _rank(deficiency: int) -> str:
+    return f"rank deficiency {deficiency}" if deficiency else "full rank"
+
+
+def _worth(repair: Repair, judged: Verdict) -> str:
+    words = _rank(repair.deficiency)
+    if repair.weak:
+        count = "1 direction is" if repair.weak == 1 else f"{repair.weak} directions are"
+        words += (
+            f", but {count} weakly determined, the weakest known only to {length(repair.worst)} in"
+            " corrected points"
+        )
+    elif repair.is_faint:
+        words += ", but only just: see the smallest singular value"
+    else:
+        words += ", and nothing is weakly determined"
+    u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
+    words += caveat(repair)
+    if u6 is not None:
+        words += f"; average U6 {number(1e6 * u6.average)} µm{_with_offsets(repair)}"
+    minutes = f"{duration(repair.seconds)} more" if repair.seconds else "no time more"
+    words += f"; {repair.readings:+d} readings, {minutes}" if repair.readings else ""
+    if repair.removes:
+        words += f"; removes {_directions(repair, judged)}"
+    return f"{words}; smallest singular value {repair.smallest:.3g}"
+
+
+def caveat(repair: Repair) -> str:
+    """That scale rests on offsets taken as exact after a repair; empty where it does not."""
+    return "; scale rests on probe offsets taken as exact" if repair.rests_on_offsets else ""
+
+
+def _with_offsets(repair: Repair) -> str:
+    """What becomes of U6 where exact offsets are uncertain, if that is another."""
+    if repair.prediction is None or repair.prediction.experiment is None:
+        return ""
+    if not exact_offsets(repair.prediction.experiment):
+        return ""
+    loose, trial = repair.loosened, f"with {1e6 * OFFSET_TRIAL:g} µm on the exact probe offsets"
+    if loose is None:
+        return f", undetermined {trial}"
+    return f", {number(1e6 * loose.total / loose.count)} µm {trial}"
+
+
+def _directions(repair: Repair, judged: Verdict) -> str:
+    names = list(
+        dict.fromkeys(name for k in repair.removes for name in changed_names(judged.null[k]))
+    )
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"{_numbers(repair)} ({', '.join(names[:MOST_NAMES])}{more})"
+
+
+def _numbers(repair: Repair) -> str:
+    numbers = [k + 1 for k in repair.removes]
+    if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[-1] + 1)):
+        return f"undetermined {numbers[0]} to {numbers[-1]}"
+    return f"undetermined {listed(list(map(str, numbers)))}"
+
+
+def changed_names(direction: Direction) -> list[str]:
+    """Errors that a direction changes, or else what it changes instead."""
+    if direction.functions:
+        return [part.name for part in direction.functions]
+    artefacts, lengths = (
+        [part.name for part in direction.artefacts],
+        [part.name for part in direction.lengths],
+    )
+    return [
+        *artefacts,
+        *lengths,
+        *(part.name for part in (*direction.probes, *direction.positions)),
+    ]
+
+
+def _tried(repairs: Repairs) -> str:
+    if not repairs.tried:
+        return "nothing can be changed"
+    counts = ", ".join(f"{count} {KINDS[kind]}" for kind, count in repairs.tried.items())
+    return (
+        f"tried: {counts}, and {repairs.sets} sets of several"
+        if repairs.sets
+        else f"tried: {counts}"
+    )
+
+
+def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
+    """The certificate that carries scale, with what the file is to say; nothing where none is
+    needed.
+    """
+    if certificate is None:
+        return []
+    if certificate.change is None:
+        return ["scale: no single calibrated distance that was tried can replace the probe offsets"]
+    u, average = f"{1e6 * certificate.offset_uncertainty:g}", number(1e6 * certificate.average)
+    words = (
+        f"scale: {certificate.change.words}: average U6 {average} µm with {u} µm on the probe"
+        " offsets"
+    )
+    return [words, *(f"scale, in the file: {edit}" for edit in certificate.edits)]
+
+
+def certificate_data(certificate: ScaleCertificate | None) -> dict[str, Any] | None:
+    """The same as plain data in metres; None where none is needed, and without a text where none
+    was found.
+    """
+    if certificate is None:
+        return None
+    return {
+        "text": None if certificate.change is None else certificate.change.words,
+        "offset_uncertainty": certificate.offset_uncertainty,
+        "average_U6": finite(certificate.average),
+        "edits": [
+            {"path": edit.path, "adds": edit.is_new, "value": edit.value}
+            for edit in certificate.edits
+        ],
+    }
+
+
+def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
+    """Repairs as plain data in metres at full precision; None where nothing is to be repaired."""
+    if repairs is None:
+        return None
+    return {
+        "complete": [_data(one) for one in repairs.complete],
+        "partial": [_data(one) for one in repairs.partial],
+        "tried": {KINDS[kind]: count for kind, count in repairs.tried.items()},
+        "sets_tried": repairs.sets,
+    }
+
+
+def _data(repair: Repair) -> dict[str, Any]:
+    u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
+    loose = repair.loosened
+    return {
+        "changes": [
+            {"kind": KINDS[change.kind], "text": change.words} for change in repair.changes
+        ],
+        "rank_deficiency": repair.deficiency,
+        "removes": [k + 1 for k in repair.removes],
+        "weakly_determined": repair.weak,
+        "weakest": repair.worst,
+        "smallest_singular_value": repair.smallest,
+        "average_U6": None if u6 is None else finite(u6.average),
+        "average_U6_with_uncertain_offsets": None if loose is None else loose.total / loose.count,
+        "offset_uncertainty": OFFSET_TRIAL,
+        "rests_on_exact_offsets": repair.rests_on_offsets,
+        "readings": repair.readings,
+        "seconds": repair.seconds,
+        "edits": [
+            {"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in repair.edits
+        ],
+    }

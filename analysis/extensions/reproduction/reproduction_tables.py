@@ -1,0 +1,611 @@
+"""A reproduction as text for people, as Markdown for documents, and as plain data for programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ballplate.presentation.formatting import aligned, as_data, number, picked
+from ballplate.simulator.inputs.settings import number_of
+
+from .compare import (
+    ComparedColumn,
+    ComparedErratum,
+    ComparedFigure,
+    ComparedProgress,
+    ComparedRemark,
+    PlacedFigure,
+    ProgressLine,
+    Reproduction,
+    Section,
+    Side,
+)
+from .published import (
+    REPEATABILITY,
+    SUM_OF_SQUARES,
+    SYMBOLS,
+    Document,
+    Remark,
+    Reservation,
+    case_of,
+)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading; level 1 is that of the whole."""
+
+    level: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A sentence or more."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table: its head, its rows, and which columns stand to the right."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    right: tuple[bool, ...]
+
+
+Block = Heading | Paragraph | Grid
+
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
+
+
+def reproduction_lines(reproduction: Reproduction) -> list[str]:
+    """A reproduction as lines of text, tables being no wider than 80 characters."""
+    lines: list[str] = []
+    for block in _blocks(reproduction):
+        if isinstance(block, Heading):
+            lines += [*([""] if lines else []), block.text]
+        elif isinstance(block, Paragraph):
+            lines.append(block.text)
+        else:
+            lines += ["", *aligned([block.head, *block.rows], block.right), ""]
+    # Of two empty lines one is enough, and none at the end.
+    return [line for k, line in enumerate(lines) if line or any(lines[k + 1 : k + 2])]
+
+
+def reproduction_markdown(reproduction: Reproduction) -> str:
+    """A reproduction as Markdown, with the assumptions that each figure rests on."""
+    parts = []
+    for block in _blocks(reproduction, with_assumptions=True):
+        if isinstance(block, Heading):
+            parts.append(f"{'#' * block.level} {block.text}")
+        elif isinstance(block, Paragraph):
+            parts.append(block.text)
+        else:
+            marks = ["---:" if right else "---" for right in block.right]
+            cells = [block.head, marks, *block.rows]
+            parts.append(
+                "\n".join(
+                    f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |"
+                    for row in cells
+                )
+            )
+    return "\n\n".join(parts)
+
+
+def _blocks(reproduction: Reproduction, with_assumptions: bool = False) -> list[Block]:
+    stated = reproduction.document.statements
+    shown = {assumption for section in reproduction.sections for assumption in section.rests_on}
+    blocks: list[Block] = [
+        Heading(
+            1, f"{stated.title}: published figures and those computed from the shipped designs"
+        ),
+        Paragraph(
+            "Ratios are published over ours. Agreement means that they are within"
+            f" {100 * stated.limits.figure:g} % after the common factor of their column, and that"
+            f" factor within {100 * stated.limits.factor:g} % of 1, unless a numbered exception"
+            " states other limits."
+        ),
+        Heading(2, "Assumptions"),
+    ]
+    blocks += [
+        Paragraph(f"{one.key}: {one.text}.") for one in stated.assumptions if one.key in shown
+    ]
+    for section in reproduction.sections:
+        blocks += _section_blocks(reproduction.document, section, with_assumptions)
+    return blocks + _exception_blocks(reproduction) + _summary(reproduction)
+
+
+def _section_blocks(document: Document, section: Section, with_assumptions: bool) -> list[Block]:
+    blocks: list[Block] = [
+        Heading(2, f"Section {section.name}: {section.title}"),
+        Paragraph(f"Rests on {_resting(document, section)}."),
+    ]
+    if section.ranks:
+        rows = [
+            (case_of(one.design), _rank(one.published), _rank(one.ours), yes(one.agrees))
+            for one in section.ranks
+        ]
+        blocks.append(_grid(("rank of", "published", "ours", "agrees"), rows, 1))
+    if section.columns:
+        blocks.append(
+            Paragraph("Columns of tables, their common factor, and how far figures are from it:")
+        )
+        blocks.append(_factors(section.columns))
+        text = (
+            "Published and computed U in µm and µrad; the ratio as it is, and after the common"
+            " factor. Notes refer to the exceptions and open differences at the end."
+        )
+        blocks.append(Paragraph(text))
+        blocks.append(_figures(section.columns, with_assumptions))
+    blocks += [Paragraph(_remark(one)) for one in section.remarks]
+    for erratum in section.errata:
+        blocks += _erratum(erratum)
+    for progress in section.progress:
+        blocks += _progress(progress)
+    if section.differences:
+        blocks += _differences(section)
+    if section.skipped:
+        blocks.append(Paragraph(f"Left out: {section.skipped}."))
+    for block in section.illegible:
+        blocks.append(
+            Paragraph(
+                f"Not legible in the copy at hand: Table {block.table}, {block.what}"
+                + ("; ours, in µm and µrad, for whoever has it:" if block.told else ".")
+            )
+        )
+    if section.told:
+        blocks.append(_told(section))
+    return blocks
+
+
+def _grid(head: Sequence[str], rows: Iterable[Sequence[str]], left: int) -> Grid:
+    """A table whose first `left` columns stand to the left, and the last one too unless it is a
+    number.
+    """
+    right = [False] * left + [True] * (len(head) - left)
+    right[-1] = head[-1] not in ("agrees", "note", "rests on")
+    if head[-1] == "rests on":
+        right[-2] = False
+    return Grid(tuple(head), tuple(tuple(row) for row in rows), tuple(right))
+
+
+def yes(agrees: bool) -> str:
+    """Whether something agrees, so that what does not is seen."""
+    return "yes" if agrees else "NO"
+
+
+def _rank(deficiency: int | str) -> str:
+    if deficiency == "some":
+        return "deficient"
+    return f"deficient by {deficiency}" if deficiency else "full rank"
+
+
+def _resting(document: Document, section: Section) -> str:
+    """Keys of the assumptions of a section, those of single quantities apart."""
+    chosen = [one for one in document.statements.assumptions if one.key in section.rests_on]
+    general = [one for one in chosen if not one.quantities]
+    special = [one for one in chosen if one.quantities]
+    text = f"assumptions {', '.join(one.key for one in general)}"
+    return "; ".join([text, *(f"{' and '.join(one.quantities)} on {one.key}" for one in special)])
+
+
+def _factors(columns: Sequence[ComparedColumn]) -> Grid:
+    rows = []
+    for one in columns:
+        compared = [f for f in one.figures if f.exception is None]
+        deviation = max(abs(f.adjusted - 1.0) for f in compared)
+        rows.append(
+            (
+                one.column.table,
+                one.column.statistic,
+                one.column.case,
+                f"{one.factor:.3f}",
+                str(len(compared)),
+                f"{100 * deviation:.1f}",
+                yes(one.agrees),
+            )
+        )
+    head = ("table", "statistic", "case", "factor", "figures", "off by at most, %", "agrees")
+    return _grid(head, rows, 3)
+
+
+def _figures(columns: Sequence[ComparedColumn], with_assumptions: bool) -> Grid:
+    rows = []
+    for one in columns:
+        for figure in one.figures:
+            row = [
+                one.column.table,
+                figure.quantity,
+                one.column.statistic,
+                one.column.case,
+                number(1e6 * figure.published, 5),
+                number(1e6 * figure.ours, 5),
+                f"{figure.ratio:.3f}",
+                f"{figure.adjusted:.3f}",
+                _note(figure),
+            ]
+            rows.append(row + ([", ".join(figure.rests_on)] if with_assumptions else []))
+    head = ["table", "", "statistic", "case", "published", "ours", "ratio", "/ factor", "note"]
+    return _grid(head + (["rests on"] if with_assumptions else []), rows, 4)
+
+
+def _note(figure: ComparedFigure) -> str:
+    words = [] if figure.agrees else ["DIFFERS"]
+    if figure.exception is not None:
+        words.append(f"{'open' if figure.exception.open else 'see'} {figure.exception.key}")
+    return ", ".join(words)
+
+
+def _remark(compared: ComparedRemark) -> str:
+    ratios = f"{number(compared.least, 3)} to {number(compared.largest, 3)}"
+    if number(compared.least, 3) == number(compared.largest, 3):
+        ratios = number(compared.least, 3)
+    names = ", ".join(compared.remark.quantities)
+    against = " over the repeatability" if _over_repeatability(compared.remark) else ""
+    verdict = "agrees" if compared.agrees else "DIFFERS"
+    what = "" if compared.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
+    return (
+        f"Said: {compared.remark.text}. Ratio of {what}{names}{against}: {ratios},"
+        f" {_wanted(compared.remark)}; {verdict}."
+    )
+
+
+def _over_repeatability(remark: Remark) -> bool:
+    return all(other == REPEATABILITY for _, other in remark.pairs)
+
+
+def _wanted(remark: Remark) -> str:
+    words = []
+    if remark.at_least is not None:
+        words.append(f"at least {remark.at_least:g}")
+    if remark.at_most is not None:
+        words.append(f"at most {remark.at_most:g}")
+    return "has to be " + " and ".join(words)
+
+
+def _erratum(compared: ComparedErratum) -> list[Block]:
+    verdict = "confirmed" if compared.agrees else "NOT confirmed"
+    blocks: list[Block] = [
+        Paragraph(f"Erratum in Table {compared.erratum.table}: {compared.erratum.text}; {verdict}.")
+    ]
+    for statistic in compared.erratum.statistics:
+        rows = []
+        for line in compared.lines:
+            if line.statistic != statistic:
+                continue
+            for words, design, ratios, deviation in (
+                ("headed", line.headed, line.ratios_as_headed, line.deviation_as_headed),
+                ("meant", line.meant, line.ratios_as_meant, line.deviation_as_meant),
+            ):
+                shown = (f"{ratios[symbol]:.3f}" if symbol in ratios else "-" for symbol in SYMBOLS)
+                rows.append((words, design, *shown, f"{100 * deviation:.0f}"))
+        blocks.append(_grid((statistic, "ratio to ours of", *SYMBOLS, "off, %"), rows, 2))
+    return blocks
+
+
+def _progress(compared: ComparedProgress) -> list[Block]:
+    progress = compared.progress
+    text = f"Table {progress.table}, {case_of(progress.design)}: "
+    if progress.settles is None:
+        text += f"published with {len(progress.steps)} iterations"
+    else:
+        text += f"published as {'settling' if progress.settles else 'not settling'}"
+        text += f" within {len(progress.steps)} iterations" if progress.steps else ""
+    text += (
+        f", ours {'settles' if compared.settled else 'does not'} ({compared.iterations} in all);"
+        f" {_verdict(compared)}."
+    )
+    if progress.reason:
+        text += f" Figures without a limit: {progress.reason}."
+    rows = [
+        (
+            line.quantity,
+            _figure(line.published),
+            _figure(line.ours),
+            _wanted_of(line),
+            yes(line.agrees),
+        )
+        for line in compared.lines
+    ]
+    return [
+        Paragraph(text),
+        _grid(("iteration", "published", "ours", "ours has to be", "agrees"), rows, 1),
+    ]
+
+
+def _figure(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3e}"
+
+
+def _verdict(compared: ComparedProgress) -> str:
+    return "agrees" if compared.agrees else "DIFFERS"
+
+
+def _wanted_of(line: ProgressLine) -> str:
+    if line.rule == "shown":
+        return "anything"
+    return (
+        f"at most {line.limit:g} times"
+        if line.rule == "most"
+        else f"within a factor {line.limit:g}"
+    )
+
+
+def _differences(section: Section) -> list[Block]:
+    blocks: list[Block] = []
+    rows = []
+    for one in section.differences:
+        if one.comparison.failed:
+            blocks.append(
+                Paragraph(
+                    f"{one.difference.design}: {len(one.comparison.failed)} data sets did not"
+                    " converge."
+                )
+            )
+        rows += [
+            (
+                case_of(one.difference.design),
+                {"rms": "rms", "maximum": "largest"}[part.quantity],
+                number(1e6 * part.published),
+                *(number(1e6 * value, 3) for _, value in _quantiles(part)),
+                f"{100 * part.below:.0f} %",
+                yes(part.agrees),
+            )
+            for part in one.parts
+        ]
+    first = section.differences[0].comparison
+    text = (
+        "Corrected distances by an estimator of distances alone, less those by the full one, in"
+        f" µm: the figure of the one published data set, and the quantiles of {first.trials} data"
+        " sets of ours, into whose range it has to fall, and within a factor"
+        f" {section.differences[0].limit:g} of whose median."
+    )
+    quantiles = ("least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest")
+    head = ("case", "", "published", *quantiles, "below", "agrees")
+    return [*blocks, Paragraph(text), _grid(head, rows, 2)]
+
+
+def _told(section: Section) -> Grid:
+    rows = [
+        (
+            case_of(one.design),
+            statistic,
+            *(number(1e6 * getattr(one.quantities[symbol], statistic)) for symbol in SYMBOLS),
+        )
+        for one in section.told
+        for statistic in ("maximum", "average")
+    ]
+    return _grid(("case", "statistic", *SYMBOLS), rows, 2)
+
+
+def _excepted(reproduction: Reproduction) -> list[tuple[Reservation, list[ComparedFigure]]]:
+    """Exceptions that figures of the sections fall under, open ones first, each with its
+    figures.
+    """
+    figures = [
+        f for section in reproduction.sections for column in section.columns for f in column.figures
+    ]
+    pairs = [
+        (one, [f for f in figures if f.exception == one])
+        for one in sorted(reproduction.document.statements.exceptions, key=lambda one: not one.open)
+    ]
+    return [(one, under) for one, under in pairs if under]
+
+
+def _exception_blocks(reproduction: Reproduction) -> list[Block]:
+    blocks: list[Block] = []
+    excepted = _excepted(reproduction)
+    for title, is_open in (("Open differences", True), ("Exceptions with a reason", False)):
+        chosen = [(one, under) for one, under in excepted if one.open == is_open]
+        sides = reproduction.sides if is_open else ()
+        if chosen or sides:
+            blocks.append(Heading(2, title))
+        blocks += [Paragraph(_side(one)) for one in sides]
+        for one, under in chosen:
+            ratios = [f.adjusted for f in under]
+            many = f"{len(under)} figures" if len(under) > 1 else "1 figure"
+            between = " to ".join(
+                dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios)))
+            )
+            blocks.append(
+                Paragraph(
+                    f"{one.key}: {' and '.join(one.quantities)} in {_tables(one)}, {many}: after"
+                    f" the common factor {between} times ours, held to {one.within[0]:g} to"
+                    f" {one.within[1]:g}. {_sentence(one.reason)}"
+                )
+            )
+    return blocks
+
+
+def _side(side: Side) -> str:
+    """A sentence on figures that lie on one side of ours."""
+    stated, count = side.stated, len(side.ratios)
+    where = f"{'all ' if side.above == count else f'{side.above} of '}{number_of(count, 'column')}"
+    return (
+        f"The printed {stated.statistic} {stated.quantity} is above ours in {where}:"
+        f" after the common factor {min(side.ratios):.3f} to {max(side.ratios):.3f} times ours."
+        f" {_sentence(stated.reason)}"
+    )
+
+
+def _tables(reservation: Reservation) -> str:
+    *others, last = reservation.tables
+    return f"Tables {', '.join(others)} and {last}" if others else f"Table {last}"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _summary(reproduction: Reproduction) -> list[Block]:
+    def every(part: str) -> list[Any]:
+        return [one for section in reproduction.sections for one in getattr(section, part)]
+
+    columns = every("columns")
+    figures = [figure for column in columns for figure in column.figures]
+    regular = [f for f in figures if f.exception is None]
+    counted: dict[str, list[bool]] = {
+        "figures of tables within the common limit": [f.agrees for f in regular],
+        "exceptions within their own": [f.agrees for f in figures if f.exception is not None],
+        "common factors": [column.factor_agrees for column in columns],
+        "statements on rank": [one.agrees for one in every("ranks")],
+        "remarks": [one.agrees for one in every("remarks")],
+        "errata confirmed": [one.agrees for one in every("errata")],
+        "fits of exact readings": [one.agrees for one in every("progress")],
+        "differences of estimators": [p.agrees for one in every("differences") for p in one.parts],
+    }
+    parts = [(words, f"{sum(are)} of {len(are)}") for words, are in counted.items() if are]
+    unexplained = sum(len(under) for one, under in _excepted(reproduction) if one.open)
+    if unexplained:
+        parts.append(("open differences, unexplained", f"{unexplained} figures"))
+    parts += [
+        (
+            f"{one.stated.statistic} {one.stated.quantity} above ours, unexplained",
+            f"{one.above} of {len(one.ratios)}",
+        )
+        for one in reproduction.sides
+    ]
+    text = (
+        "Everything compared agrees within what is stated."
+        if reproduction.agrees
+        else "NOT everything compared agrees."
+    )
+    blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), Paragraph(text)]
+    if regular:
+        deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
+        factors = [column.factor for column in columns]
+        text = (
+            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are"
+            f" no exceptions are off by {100 * float(np.median(deviations)):.1f} % (median) and"
+            f" {100 * deviations.max():.1f} % at most."
+        )
+        blocks.append(Paragraph(text))
+    return blocks
+
+
+def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
+    """A reproduction as plain data in metres and radians; what is undetermined is None."""
+    stated = reproduction.document.statements
+    shown = {key for section in reproduction.sections for key in section.rests_on}
+    data = {
+        "document": stated.title,
+        "agrees": reproduction.agrees,
+        "limits": stated.limits.model_dump(),
+        "assumptions": {one.key: one.text for one in stated.assumptions if one.key in shown},
+        "exceptions": {
+            one.key: {**picked(one, "reason", "open", "within"), "figures": len(under)}
+            for one, under in _excepted(reproduction)
+        },
+        "one_sided": [
+            {
+                **picked(one.stated, "quantity", "statistic", "reason"),
+                **{"columns": len(one.ratios), "above": one.above},
+                **{"least_ratio": min(one.ratios), "largest_ratio": max(one.ratios)},
+            }
+            for one in reproduction.sides
+        ],
+        "sections": [_section_data(section) for section in reproduction.sections],
+    }
+    plain_data: dict[str, Any] = as_data(data)
+    return plain_data
+
+
+# In one piece: one mapping, in the form in which the JSON has it.
+def _section_data(section: Section) -> dict[str, Any]:
+    return {
+        "section": section.name,
+        **picked(section, "title", "agrees"),
+        "rests_on": list(section.rests_on),
+        "ranks": [
+            picked(one, "design", "published", "ours", "gap", "agrees") for one in section.ranks
+        ],
+        "factors": [
+            {
+                **picked(one.column, "table", "design", "statistic"),
+                **picked(one, "factor", "within"),
+                "agrees": one.factor_agrees,
+            }
+            for one in section.columns
+        ],
+        "figures": [_figure_data(one, figure) for one in section.columns for figure in one.figures],
+        "remarks": [
+            {
+                **picked(one.remark, "text", "quantities", "at_least", "at_most"),
+                "least_ratio": one.least,
+                "largest_ratio": one.largest,
+                "agrees": one.agrees,
+            }
+            for one in section.remarks
+        ],
+        "errata": [
+            {
+                **picked(one.erratum, "table", "text"),
+                "confirmed": one.agrees,
+                "columns": one.lines,
+            }
+            for one in section.errata
+        ],
+        "convergence": [
+            {
+                **picked(one.progress, "table", "design"),
+                "published_settles": one.progress.settles,
+                "ours_settles": one.settled,
+                **picked(one, "iterations", "agrees"),
+                "figures": [
+                    picked(line, "quantity", "published", "ours", "rule", "limit", "agrees")
+                    for line in one.lines
+                ],
+            }
+            for one in section.progress
+        ],
+        "differences": [
+            {
+                "design": one.difference.design,
+                "trials": one.comparison.trials,
+                "not_converged": one.comparison.failed,
+                **{part.quantity: _placed_data(part) for part in one.parts},
+                "agrees": one.agrees,
+            }
+            for one in section.differences
+        ],
+        "computed_only": [
+            {
+                "design": one.design,
+                "quantities": {
+                    symbol: picked(one.quantities[symbol], "maximum", "average", "unit")
+                    for symbol in SYMBOLS
+                },
+            }
+            for one in section.told
+        ],
+        "illegible": [picked(block, "table", "what") for block in section.illegible],
+        "left_out": section.skipped or None,
+    }
+
+
+def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> dict[str, Any]:
+    return {
+        **picked(column.column, "table", "statistic", "case", "design"),
+        **picked(figure, "quantity", "unit", "published", "ours", "ratio", "within", "agrees"),
+        "ratio_after_factor": figure.adjusted,
+        "exception": figure.exception.key if figure.exception else None,
+        "rests_on": list(figure.rests_on),
+    }
+
+
+def _placed_data(part: PlacedFigure) -> dict[str, Any]:
+    return {
+        **picked(part, "published", "median", "agrees"),
+        "quantiles": {str(q): v for q, v in _quantiles(part)},
+        "share_below_published": part.below,
+    }
+
+
+def _quantiles(part: PlacedFigure) -> Iterator[tuple[float, float]]:
+    """Some shares with the quantiles of the values."""
+    return zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)

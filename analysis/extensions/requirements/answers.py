@@ -1,0 +1,170 @@
+"""Answers of the search for what a goal needs, as text and data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from ballplate.presentation.formatting import aligned
+from ballplate.presentation.panels import TriedValues, draw_tried
+from ballplate.presentation.result import Result
+
+from .goals import Goal, Judgement
+from .unknowns import UnknownName
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an unknown must be for the goal to be met, the others as they are.
+
+    `status`: a value was `found` beside which the next, `beside`, is not enough; `any` value that
+    was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
+    unknown cannot be `varied`. `words` and `value`, in metres, the
+    `unit` of an uncertainty that is no length, or a number, are the value needed, or
+    without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
+    gives. `remarks` tell of the range. `tried` are the values that were looked at, with how far
+    from the goal each is and whether it meets it.
+    """
+
+    name: UnknownName
+    title: str
+    status: Literal["found", "any", "none", "undetermined", "varied"]
+    present: str = ""
+    grows: bool = False
+    words: str = ""
+    value: float | None = None
+    outcome: str = ""
+    beside: str = ""
+    remarks: tuple[str, ...] = ()
+    tried: tuple[tuple[float, float, bool], ...] = field(default=(), repr=False)
+    unit: str = "m"
+
+    @property
+    def is_met(self) -> bool:
+        return self.status in ("found", "any")
+
+
+@dataclass(frozen=True, repr=False)
+class Reach(Result):
+    """A goal, whether the design as drawn meets it, and the necessary value of each unknown."""
+
+    label: str
+    title: str
+    goal: Goal
+    present: Judgement
+    deficiency: int
+    answers: tuple[Answer, ...]
+
+    def headline(self) -> str:
+        return self.present.words
+
+    def lines(self) -> list[str]:
+        """The goal, whether the design meets it, and a row for each unknown."""
+        now = "met" if self.present.is_met else "not met"
+        lines = [
+            f"{self.label}: {self.title}",
+            f"goal: {self.goal}",
+            f"as drawn: {now}; {self.present.words}",
+        ]
+        if self.present.undetermined:
+            lines.append(
+                f"rank deficiency {self.deficiency}: repair the design first; ballplate check shows"
+                " what is undetermined"
+            )
+        rows = [["changed alone", "as drawn", "needed", "result"]]
+        for one in self.answers:
+            rows.append([one.title, one.present, _needed(one), _outcome(one)])
+        lines += ["", *aligned(rows, [False] * 4)]
+        notes = []
+        for one in self.answers:
+            notes += [f"{one.name}: {one.beside}"] if one.beside else []
+            notes += [f"{one.name}: {remark}" for remark in one.remarks]
+        return lines + ["", *notes] if notes else lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain data, values in metres or as numbers."""
+        goal = self.goal
+        told: dict[str, Any] = {"kind": goal.kind}
+        if goal.kind == "lengths":
+            told["share"] = goal.share
+        if goal.kind == "quantity":
+            told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "goal": told,
+            "is_met": self.present.is_met,
+            "as_drawn": self.present.words,
+            "rank_deficiency": self.deficiency,
+            "undetermined": self.present.undetermined,
+            "answers": {
+                one.name: {
+                    "status": {"varied": "cannot be varied"}.get(one.status, one.status),
+                    "as_drawn": one.present or None,
+                    "needed": one.words if one.is_met else None,
+                    "needed_value": one.value if one.is_met else None,
+                    "limit": one.words if one.status == "none" else None,
+                    "outcome": one.outcome or None,
+                    "next": one.beside or None,
+                    "remarks": list(one.remarks),
+                }
+                for one in self.answers
+            },
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each unknown."""
+        return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """How far from the goal the values are that were tried of each unknown.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else, or there is nothing to be drawn.
+        """
+        panels = [_panel(one) for one in self.answers if one.tried]
+        if not panels:
+            raise ValueError("no value was tried of any unknown, so that there is nothing to draw")
+        goal, limit = self.goal, 1.0
+        axis = "largest of targets" if goal.kind == "tasks" else f"{goal.symbol} over the goal"
+        if goal.kind == "lengths":
+            axis, limit = "share not within", 1.0 - goal.share
+        return draw_tried(panels, axis, limit, f"{self.title}: values tried for {goal}", path)
+
+
+def _panel(answer: Answer) -> TriedValues:
+    """What was tried of an unknown: uncertainties in millionths of their unit, sizes of plates in
+    millimetres.
+    """
+    unit, factor = {
+        "repeatability": ("µm", 1e6),
+        "certificate": (f"µ{answer.unit}", 1e6),
+        "size": ("mm", 1e3),
+    }.get(answer.name, ("", 1.0))
+    values, distances, is_met = (np.array(column) for column in zip(*answer.tried, strict=True))
+    return TriedValues(answer.title, unit, factor * values, distances, is_met)
+
+
+def _needed(answer: Answer) -> str:
+    if answer.status == "found":
+        return f"at {'least' if answer.grows else 'most'} {answer.words}"
+    if answer.status == "any":
+        return f"any, even {answer.words}"
+    return "cannot be varied" if answer.status == "varied" else "no value does"
+
+
+def _outcome(answer: Answer) -> str:
+    if answer.status == "none":
+        return (
+            f"even {answer.words}: {answer.outcome}"
+            if answer.name != "size"
+            else f"best of those tried, {answer.words}: {answer.outcome}"
+        )
+    return answer.outcome

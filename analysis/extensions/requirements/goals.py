@@ -1,0 +1,193 @@
+"""Goals of a design, and whether they are met."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from ballplate.presentation.formatting import number, percent, shown_unit, uncertainty_words
+from ballplate.results.prediction import Prediction
+from ballplate.results.study import PlannedUncertainty
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.inputs.quantities import (
+    QuantityError,
+    parse_positive_angle,
+    parse_positive_length,
+)
+from ballplate.simulator.inputs.settings import listing
+from ballplate.uncertainty.quantities import DESCRIPTIONS, QUANTITIES
+from ballplate.uncertainty.summaries import Quantity
+
+FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
+# Wholes that have values of several units.
+MIXED = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.parts)
+RATIOS = tuple(
+    f"{symbol} {kind.parts['1'][0]}" for symbol, kind in QUANTITIES.items() if "1" in kind.parts
+)
+SYMBOLS = tuple(symbol for symbol in DESCRIPTIONS if symbol not in (*MIXED, *RATIOS))
+PATTERN = re.compile(r"\s*(.+?)\s+(maximum|average)\s+(.+?)\s*", re.DOTALL)
+
+
+class GoalError(ValueError):
+    """A text is no goal, or not one that the experiment can have; the message says what would be
+    right.
+    """
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is to be reached.
+
+    `lengths`: at least the `share` of the distances between corrected points (U6) within the target
+    accuracy of the file. `tasks`: every task within its target. `quantity`: a `statistic` of the
+    quantity `symbol` at most `limit`, in metres or radians.
+    """
+
+    kind: Literal["lengths", "tasks", "quantity"] = "lengths"
+    share: float = 1.0
+    symbol: str = "U6"
+    statistic: Literal["maximum", "average"] = "average"
+    limit: float = 0.0
+
+    def __str__(self) -> str:
+        if self.kind == "lengths":
+            share = "all" if self.share == 1.0 else f"{percent(self.share)} of"
+            return f"{share} lengths (U6) within the target uncertainty"
+        if self.kind == "tasks":
+            return "every task within its target"
+        unit = "µrad" if self.symbol.endswith("angles") else "µm"
+        return f"{self.statistic} {self.symbol} at most {1e6 * self.limit:.9g} {unit}"
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Whether a design meets a goal, how far it is from it (smaller is better), and in words.
+
+    `undetermined` counts what the goal asks about and the observations leave open.
+    """
+
+    is_met: bool
+    distance: float
+    words: str
+    undetermined: int
+
+
+def parse_goal(text: str, share: float | None = None) -> Goal:
+    """Read a goal.
+
+    :raises GoalError: it is none.
+
+    >>> str(parse_goal("U6 average 0.3 um"))
+    'average U6 at most 0.3 µm'
+    >>> str(parse_goal("lengths", 0.95))
+    '95 % of lengths (U6) within the target uncertainty'
+    """
+    if text in ("lengths", "tasks"):
+        if share is not None and text == "tasks":
+            raise GoalError("a share goes with the goal lengths; leave it out")
+        return Goal(text, 1.0 if share is None else share)  # type: ignore[arg-type]
+    found = PATTERN.fullmatch(text)
+    if found is None:
+        raise GoalError(f'"{text}" is not a goal; write {FORMS}')
+    symbol, statistic, limit = found.groups()
+    if symbol not in SYMBOLS:
+        advice = (
+            f"give {symbol} lengths or {symbol} angles"
+            if symbol in MIXED
+            else f"known: {listing(SYMBOLS, 20)}"
+        )
+        raise GoalError(f'"{symbol}" is not a quantity with a limit; {advice}')
+    if share is not None:
+        raise GoalError("a share goes with the goal lengths; leave it out")
+    try:
+        value = (parse_positive_angle if symbol.endswith("angles") else parse_positive_length)(
+            limit
+        )
+    except QuantityError as error:
+        raise GoalError(str(error)) from None
+    return Goal("quantity", 1.0, symbol, statistic, value)  # type: ignore[arg-type]
+
+
+def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
+    """Refuse a goal about what a design does not have.
+
+    :raises GoalError: no target, no tasks, or no such quantity.
+    """
+    if goal.kind == "lengths" and (
+        "U6" not in prediction.quantities or prediction.quantities["U6"].within_target is None
+    ):
+        raise GoalError(
+            'the file states no target_uncertainty; add it, such as "0.5 um + L/1000000", or give'
+            " --target or --goal"
+        )
+    if goal.kind == "tasks":
+        if not prediction.tasks:
+            raise GoalError("the file has no tasks; add evaluation.tasks, or give another goal")
+        without = [task.name for task in prediction.tasks if task.target is None]
+        if without:
+            raise GoalError(
+                f"no target for {listing(without)}; give target_uncertainty to tasks, or to the"
+                " file"
+            )
+    if goal.kind == "quantity" and goal.symbol not in prediction.quantities:
+        raise GoalError(
+            f"the design has no {goal.symbol}; it has {listing(prediction.quantities, 20)}"
+        )
+
+
+def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
+    """Whether a design meets a goal that `check_goal` lets pass."""
+    if goal.kind == "tasks":
+        return _judge_tasks(prediction)
+    if goal.kind == "quantity":
+        found = prediction.quantities[goal.symbol]
+        value = getattr(found, goal.statistic)
+        is_met = not found.undetermined and value <= goal.limit
+        words = f"{goal.statistic} {goal.symbol} {number(1e6 * value)} {shown_unit(found.unit)}"
+        # A file whose targets are of expanded uncertainties may make one think that this is one.
+        words += "" if found.coverage_factor == 1.0 else " (standard uncertainty)"
+        distance = math.inf if math.isnan(value) else value / goal.limit
+        return Judgement(
+            is_met, distance + found.undetermined, words + _open(found), found.undetermined
+        )
+    found = prediction.quantities["U6"]
+    share = found.within_target or 0.0
+    average = "" if math.isnan(found.average) else f", average U6 {number(1e6 * found.average)} µm"
+    # An exact count: the share is a ratio of two whole numbers.
+    missing = found.count - round(share * found.count)
+    is_met = missing <= (1.0 - goal.share) * found.count * (1.0 + 1e-12)
+    by = uncertainty_words(found.coverage_factor)
+    share_words = "all" if not missing else f"{percent(share)} of"
+    words = f"{share_words} lengths within the target by the {by}{average}{_open(found)}"
+    return Judgement(is_met, 1.0 - share, words, found.undetermined)
+
+
+def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:
+    ratios = [
+        task.coverage_factor * task.standard_uncertainty / task.target
+        for task in prediction.tasks
+        if task.target is not None
+    ]
+    undetermined = sum(map(math.isnan, ratios))
+    within = sum(ratio <= 1.0 for ratio in ratios)
+    words = f"{within} of {len(ratios)} tasks within their targets by the "
+    words += uncertainty_words(prediction.tasks[0].coverage_factor)
+    if undetermined:
+        words += f", {undetermined} undetermined"
+        return Judgement(False, math.inf, words, undetermined)
+    worst = int(comparable(ratios).argmax())
+    words += (
+        f"; the largest share of its target has {prediction.tasks[worst].name},"
+        f" {number(100 * ratios[worst])} %"
+    )
+    return Judgement(within == len(ratios), ratios[worst], words, 0)
+
+
+def _open(quantity: Quantity) -> str:
+    return (
+        f", {quantity.undetermined} of {quantity.count} undetermined"
+        if quantity.undetermined
+        else ""
+    )

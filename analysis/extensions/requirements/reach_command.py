@@ -1,0 +1,84 @@
+"""`ballplate reach`: what one unknown of a design must be for a goal to be met."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from ballplate.cli.common import add_file, add_goal, add_json, show, single, whole
+from ballplate.cli.outputs import UsageError
+
+UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
+
+
+HELP = "find the repeatability, certificate, repeats, balls or size that meets a target"
+DESCRIPTION = (
+    "Solve for one unknown of a design at a time, with the others as in the file: the"
+    " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"
+    " balls or smallest plate that meets a goal. Each answer is a value of three digits,"
+    " or a whole number, for which the design was computed and meets the goal; the next"
+    " value fails. The exit status is 0 if every unknown asked for has such a value"
+    " (without --by: one of them), otherwise 1; with --fail it is 0 if the design in the"
+    " file meets the goal, otherwise 1."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_file(parser)
+    parser.add_argument(
+        "--by",
+        choices=UNKNOWNS,
+        action="append",
+        help="solve for this unknown only; may be repeated",
+    )
+    add_goal(parser, '"U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average 0.1 um"')
+    parser.add_argument(
+        "--artefact",
+        metavar="NAME",
+        help="artefact to vary: its balls, size, calibrations and repeats",
+    )
+    parser.add_argument(
+        "--calibration",
+        metavar="N",
+        type=whole,
+        help="index of the calibration entry to vary, from 0; default: all by the same factor",
+    )
+    parser.add_argument(
+        "--fail",
+        action="store_true",
+        help="end with exit status 1 unless the design in the file meets the goal",
+    )
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
+    """Solve for what was asked; 1 if no value does."""
+    from ballplate.cli.progress import progress
+    from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
+
+    from .goals import GoalError, parse_goal
+    from .root_search import reach
+    from .unknowns import NotVariableError
+
+    try:
+        goal = parse_goal(options.goal, options.share)
+        if options.target is not None:
+            parse_length_function(options.target)
+        names = tuple(dict.fromkeys(options.by or UNKNOWNS))
+        experiment = single(options)
+        with progress(options) as shown:
+            found = reach(
+                experiment,
+                goal,
+                names,
+                options.artefact,
+                options.calibration,
+                options.target,
+                shown.show,
+            )
+    except (GoalError, NotVariableError, QuantityError) as error:
+        raise UsageError(error) from None
+    show(options, found)
+    if options.fail:
+        return 0 if found.present.is_met else 1
+    met = [one.is_met for one in found.answers]
+    return 0 if (all if options.by else any)(met) else 1

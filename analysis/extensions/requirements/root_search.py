@@ -1,0 +1,344 @@
+"""Searches for the value of an unknown that just meets a goal; the value found is judged by a
+prediction of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from ballplate.results.study import PlannedUncertainty, planned_uncertainty, predict
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import override
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar
+
+from .answers import Answer, Reach
+from .goals import Goal, Judgement, check_goal, judge
+from .steps import PER_DECADE
+from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
+
+# Evaluation points, the distances between which are gone through for each value tried.
+MOST_POINTS = 10_000
+
+# Columns of balls up to which every number is tried, and the ratio beyond; values of a size that
+# are tried first, and about the best of them if none does.
+EVERY, RATIO, SIZES, REFINED = 12, 1.25, 16, 12
+# Change of the goal's figure from ten times the extreme to it, up to which it is as good as exact.
+CONVERGED = 1e-3
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Result of a value: how the goal is met and the rank deficiency, or why the file is invalid
+    with it.
+    """
+
+    words: str
+    judgement: Judgement | None
+    deficiency: int
+    refusal: str
+
+    @property
+    def is_met(self) -> bool:
+        return self.judgement is not None and self.judgement.is_met
+
+
+@single_threaded
+def reach(
+    experiment: Experiment,
+    goal: Goal,
+    names: tuple[UnknownName, ...] = NAMES,
+    artefact: str | None = None,
+    calibration: int | None = None,
+    target: str | None = None,
+    report: Report = unreported,
+) -> Reach:
+    """Solve for each of some unknowns, the others staying as they are.
+
+    `artefact` and `calibration`, an index, choose what varies where there are several; `target`
+    replaces the target uncertainty of the file, and `report` receives the number of unknowns done.
+
+    :raises GoalError: the experiment does not have what the goal is about.
+    :raises NotVariableError: a single unknown is asked for that the experiment does not have.
+    :raises ExperimentError: the target is wrong, or there are more than 10,000 evaluation points.
+    """
+    count = len(experiment.evaluation.points)
+    if count > MOST_POINTS:
+        text = (
+            f"{count} points make {count * (count - 1) // 2} distances, which reach computes for"
+            " every value that "
+        )
+        text += (
+            f"it tries, some dozens, which takes too long; give at most {MOST_POINTS}, better some"
+            " hundred"
+        )
+        raise refused(experiment.source, text, "evaluation.points")
+    root = experiment.tree
+    # Planning is at zero machine error, and true machines take time to check.
+    zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
+    root = override(root, "true_machine", zero, root.mark)
+    if target is not None:
+        root = override(root, "target_uncertainty", Scalar(root.mark, target), root.mark)
+    searched = _Searched(root, experiment.builder, goal)
+    present = searched.uncertainty(root)
+    check_goal(goal, present)
+    judged = judge(goal, present)
+    answers = []
+    for name in counted(names, "unknowns", len(names), report):
+        try:
+            one = unknown(name, experiment, root, artefact, calibration)
+        except NotVariableError as error:
+            if len(names) == 1:
+                raise
+            answers.append(Answer(name, name, "varied", remarks=(str(error),)))
+            continue
+        answers.append(_answer(one, searched, judged, present.deficiency))
+    return Reach(
+        experiment.label, experiment.title, goal, judged, present.deficiency, tuple(answers)
+    )
+
+
+@dataclass(frozen=True)
+class _Searched:
+    """The file of which values are tried, and what makes the experiment of a tree."""
+
+    root: Node
+    built: Callable[[Node], Experiment]
+    goal: Goal
+
+    def uncertainty(self, tree: Node) -> PlannedUncertainty:
+        """Uncertainties of a tree's design.
+
+        :raises ExperimentError: the file is wrong so.
+        """
+        return planned_uncertainty(self.built(tree))
+
+
+class _Trials:
+    """Values of an unknown that were tried, each once."""
+
+    def __init__(self, unknown: Unknown, searched: _Searched) -> None:
+        self.one, self.searched = unknown, searched
+        self.known: dict[int, Tried] = {}
+
+    def at(self, step: int) -> Tried:
+        if step not in self.known:
+            self.known[step] = self._tried(step)
+        return self.known[step]
+
+    def _tried(self, step: int) -> Tried:
+        words = self.one.words(step)
+        try:
+            found = self.searched.uncertainty(self.one.tree(step))
+        except ExperimentError as error:
+            first = error.messages[0]
+            return Tried(words, None, 0, f"{first.path}: {first.text}")
+        return Tried(words, judge(self.searched.goal, found), found.deficiency, "")
+
+    @property
+    def tried(self) -> tuple[tuple[float, float, bool], ...]:
+        """Values that have one, in ascending order, with how far from the goal each is and whether
+        it meets it.
+        """
+        judged = ((self.one.value(step), tried.judgement) for step, tried in self.known.items())
+        return tuple(
+            sorted(
+                (value, found.distance, found.is_met)
+                for value, found in judged
+                if value is not None and found is not None and np.isfinite(found.distance)
+            )
+        )
+
+    def judgement(self, step: int) -> Judgement:
+        """How the goal is met with a value with which the file is right."""
+        found = self.at(step).judgement
+        assert found is not None
+        return found
+
+    def nearest(self, steps: list[int]) -> int:
+        """Which of some values with which the file is right comes nearest to the goal."""
+        return steps[int(comparable([self.judgement(step).distance for step in steps]).argmin())]
+
+    def verified(self, step: int) -> Judgement:
+        """A value judged by a prediction of its own."""
+        return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
+
+    def is_right(self, step: int) -> bool:
+        """Whether the file is right with a value, which is quicker to find out than the
+        result.
+        """
+        if step not in self.known:
+            try:
+                self.searched.built(self.one.tree(step))
+            except ExperimentError:
+                return False
+            return True
+        return not self.known[step].refusal
+
+
+def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
+    if unknown.is_monotone and present.undetermined:
+        reason = (
+            f"rank deficiency {deficiency} leaves {present.undetermined} undetermined, whatever"
+            " the value"
+        )
+        return _without_value(unknown, "undetermined", reason)
+    trials = _Trials(unknown, searched)
+    found = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
+    return replace(found, tried=trials.tried, unit=unknown.unit)
+
+
+def _without_value(one: Unknown, status: Literal["undetermined", "varied"], remark: str) -> Answer:
+    return Answer(one.name, one.title, status, one.present, one.grows, remarks=(remark,))
+
+
+def _told(
+    trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]
+) -> Answer:
+    one, found = trials.one, trials.verified(step)
+    assert found.is_met is (status != "none")
+    needed = one.words(step), one.value(step), found.words, "", tuple(remarks)
+    return Answer(one.name, one.title, status, one.present, one.grows, *needed)
+
+
+def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:
+    """The border between a value that does and one that does not, anywhere between these two."""
+    while abs(met - failed) > 1:
+        middle = (met + failed) // 2
+        met, failed = (middle, failed) if trials.at(middle).is_met else (met, middle)
+    beside = trials.at(failed)
+    words = f"{beside.words} is not enough: " + (
+        beside.judgement.words if beside.judgement else beside.refusal
+    )
+    return replace(_told(trials, "found", met, remarks), beside=words)
+
+
+def _monotone(trials: _Trials, deficiency: int) -> Answer:
+    """The largest uncertainty, or the smallest number, that does."""
+    one = trials.one
+    best, worst = (one.last, one.first) if one.grows else (one.first, one.last)
+    remarks = []
+    if not one.grows and not trials.is_right(worst):
+        # An uncertainty that grows with length has an end where no file may state it.
+        worst = _border(trials, one.drawn, worst)
+        remarks.append(
+            f"more than {one.words(worst)} is not possible: {trials.at(worst + 1).refusal}"
+        )
+    if trials.at(worst).is_met:
+        return _told(trials, "any", worst, remarks)
+    remarks = []
+    if one.grows and not trials.is_right(best):
+        best = _border(trials, one.first, best)
+        remarks.append(
+            f"more than {one.words(best)} are not possible: {trials.at(best + 1).refusal}"
+        )
+    # Where an extreme drowns everything else in rounding, it tells nothing.
+    while (
+        not one.grows and trials.at(best).deficiency > deficiency and best + PER_DECADE < one.last
+    ):
+        best += PER_DECADE
+    if not trials.at(best).is_met:
+        remarks += [] if one.grows else _convergence(trials, best)
+        return _told(trials, "none", best, remarks)
+    return _found(trials, best, worst, [])
+
+
+def _border(trials: _Trials, right: int, wrong: int) -> int:
+    """The last value with which the file is right; it is with `right`, and is not with `wrong`."""
+    while wrong - right > 1:
+        middle = (right + wrong) // 2
+        right, wrong = (middle, wrong) if trials.is_right(middle) else (right, middle)
+    return right
+
+
+def _convergence(trials: _Trials, extreme: int) -> list[str]:
+    """Whether an extreme is as good as exact."""
+    found, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
+    if found is None or before is None:
+        return []
+    if abs(before.distance - found.distance) <= CONVERGED * found.distance:
+        return ["an exact one would not be better: ten times that gives the same result"]
+    return ["a smaller one would still change the figure"]
+
+
+def _scanned(trials: _Trials) -> Answer:
+    """The smallest value that does, where larger ones need not be better."""
+    one = trials.one
+    probes = _probes(trials)
+    if one.name == "balls":
+        # More balls than do cost time, and need not be looked at.
+        probes = probes[: _first_met(trials, probes, len(probes) - 1) + 1]
+    usable = [step for step in probes if not trials.at(step).refusal]
+    if not usable:
+        refusal = trials.at(one.drawn).refusal or trials.at(probes[0]).refusal
+        return _without_value(one, "varied", refusal)
+    remarks = []
+    if one.name == "size" and probes[-1] < one.last:
+        beyond = trials.at(probes[-1] + 1)
+        remarks.append(f"from {beyond.words} on, the file is invalid: {beyond.refusal}")
+    refused = [trials.at(step) for step in probes if step not in usable]
+    if refused:
+        remarks.append(
+            f"the file is invalid with {listing([one.words for one in refused], 3)}:"
+            f" {refused[0].refusal}"
+        )
+    if one.name == "size" and not any(trials.at(step).is_met for step in usable):
+        # What just does may lie beside the best of them.
+        best = probes.index(trials.nearest(usable))
+        ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
+        probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
+        usable = [step for step in probes if not trials.at(step).refusal]
+    good = _first_met(trials, probes, -1)
+    if good < 0:
+        if one.name == "balls":
+            remarks.append(f"more than {one.words(one.last)} were not tried")
+        best = trials.nearest(usable)
+        if trials.judgement(best).undetermined:
+            told = (
+                f"something stays undetermined with every value from {one.words(usable[0])} to"
+                f" {one.words(usable[-1])}"
+            )
+            return _without_value(one, "undetermined", told)
+        return _told(trials, "none", best, remarks)
+    if one.name == "size":
+        again = next(
+            (trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None
+        )
+        remarks += (
+            [] if again is None else [f"not every larger one is enough: {again.words} is not"]
+        )
+    if good == 0:
+        return _told(trials, "any", probes[0], remarks)
+    return _found(trials, probes[good], probes[good - 1], remarks)
+
+
+def _first_met(trials: _Trials, probes: list[int], otherwise: int) -> int:
+    """Place of the first value with which the goal is met."""
+    return next((k for k, step in enumerate(probes) if trials.at(step).is_met), otherwise)
+
+
+def _probes(trials: _Trials) -> list[int]:
+    """Values that are tried first, in order, within the range in which the file is right."""
+    one = trials.one
+    if one.name == "balls":
+        every = range(one.first, one.last + 1)
+        found = [step for step in every if one.value(step) <= max(EVERY, one.value(one.first))]
+        while found[-1] < one.last:
+            least = RATIO * one.value(found[-1])
+            found.append(
+                next(
+                    (step for step in every[found[-1] + 1 :] if one.value(step) >= least), one.last
+                )
+            )
+        return found
+    if not trials.is_right(one.drawn):
+        return []
+    last = one.last if trials.is_right(one.last) else _border(trials, one.drawn, one.last)
+    return sorted({int(step) for step in np.linspace(one.first, last, SIZES).round()})

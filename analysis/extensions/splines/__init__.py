@@ -1,0 +1,1 @@
+"""Constrained splines of a machine's error curves."""

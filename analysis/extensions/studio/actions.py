@@ -1,0 +1,279 @@
+"""Actions on a design: what a person does in the studio, as changes of the file's text.
+
+An action is a mapping with its name under `do` and what it needs besides. A new one is a function
+and its line in `ACTIONS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from ballplate.extensions.repair.changes import with_pose, with_position
+from ballplate.extensions.repair.mending import (
+    changes_of,
+    with_experiment,
+    with_text_changes,
+)
+from ballplate.extensions.repair.placing import middle_of
+from ballplate.extensions.repair.positions import with_added
+from ballplate.extensions.repair.written import Edit, position_settings
+from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
+from ballplate.simulator.geometry.positions import (
+    QUARTER_TURNS,
+    Pose,
+    plane_rotation,
+)
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.yamltext import TextChange
+from ballplate.simulator.inputs.yamltree import parse_tree, to_python
+from ballplate.simulator.machines.protocol import Array
+
+from .document import DesignDocument, changed, experiment_of
+
+Arguments = Mapping[str, Any]
+
+# Places are written to this many metres, a hundredth of a millimetre.
+STEP = 1e-5
+
+
+class ActionError(ValueError):
+    """An action is unknown, or lacks something; the text says what it needs."""
+
+
+def done(document: DesignDocument, action: Arguments) -> DesignDocument:
+    """The document after an action.
+
+    :raises ActionError: the action is unknown or incomplete.
+    :raises ExperimentError: the text is wrong, or cannot be changed in this way.
+    """
+    name = action.get("do")
+    if not isinstance(name, str) or name not in ACTIONS:
+        raise ActionError(f"no action {name!r}; there are {', '.join(ACTIONS)}")
+    try:
+        text = ACTIONS[name](document, action)
+    except KeyError as error:
+        raise ActionError(f"{name} needs {error}") from None
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ActionError(f"{error.object[error.start]!r} is no character of a file") from None
+    return changed(document, text)
+
+
+def _moved(document: DesignDocument, action: Arguments) -> str:
+    """A position by so many metres along each axis."""
+    by = _vector(action["by"])
+
+    def move(experiment: Experiment, place: Position) -> Pose:
+        if len(by) != experiment.dimension:
+            raise ActionError(f"by has {len(by)} co-ordinates in {experiment.dimension} dimensions")
+        return Pose(place.pose.rotation, place.pose.origin + by)
+
+    return _posed(document, str(action["position"]), move)
+
+
+def _turned(document: DesignDocument, action: Arguments) -> str:
+    """A position by quarter-turns about the middle of its balls, in their own plane."""
+    turns = int(action.get("quarter_turns", 1)) % 4
+
+    def turn(experiment: Experiment, place: Position) -> Pose:
+        by = np.eye(experiment.dimension)
+        by[:2, :2] = QUARTER_TURNS[turns]
+        return _about_middle(experiment, place, place.pose.rotation @ by)
+
+    return _posed(document, str(action["position"]), turn)
+
+
+def _stood(document: DesignDocument, action: Arguments) -> str:
+    """A position across another axis, its middle where it was."""
+    axis = str(action["across"])
+    if axis not in ("x", "y", "z"):
+        raise ActionError(f"across is x, y or z, not {axis}")
+
+    def stand(experiment: Experiment, place: Position) -> Pose:
+        if experiment.dimension == 2:
+            raise ActionError("a plane machine has no axis to stand across")
+        return _about_middle(experiment, place, plane_rotation(axis, 0))
+
+    return _posed(document, str(action["position"]), stand)
+
+
+def _posed(
+    document: DesignDocument, name: str, pose: Callable[[Experiment, Position], Pose]
+) -> str:
+    experiment = experiment_of(document, planning=True)
+    place = _position(experiment, name)
+    found = pose(experiment, place)
+    origin = np.round(found.origin / STEP) * STEP
+    new = with_pose(experiment, name, Pose(found.rotation, np.round(origin, 9) + 0.0))
+    return with_experiment(document.text, document.path, experiment, new)
+
+
+def _about_middle(experiment: Experiment, place: Position, rotation: Array) -> Pose:
+    middle = middle_of(experiment.layouts[place.artefact])[: experiment.dimension]
+    centre = place.pose.rotation @ middle + place.pose.origin
+    rotation = rotation + 0.0
+    return Pose(rotation, centre - rotation @ middle)
+
+
+def _copied(document: DesignDocument, action: Arguments) -> str:
+    """A position once more, where it stands."""
+    experiment = experiment_of(document, planning=True)
+    new = with_added(experiment, _position(experiment, str(action["position"])))
+    return with_experiment(document.text, document.path, experiment, new)
+
+
+def _added(document: DesignDocument, action: Arguments) -> str:
+    """A position as a file states it, such as a suggestion or one that was switched off."""
+    settings = _plain(action["settings"])
+    return _with(document, [TextChange(("positions",), settings, "append")])
+
+
+def _repaired(document: DesignDocument, action: Arguments) -> str:
+    """A suggested repair, as the edits of the file that it was told with."""
+    text = document.text
+    experiment = experiment_of(document, planning=True)
+    needed = [
+        Edit(_steps(one["path"]), _plain(one["value"]), bool(one["is_new"]))
+        for one in action["edits"]
+    ]
+    changes = changes_of(experiment, needed)
+    return with_text_changes(text, document.path, document.variant, changes)
+
+
+def _removed(document: DesignDocument, action: Arguments) -> str:
+    """The design without a position."""
+    steps = _place_of(document, str(action["position"]))
+    return _with(document, [TextChange(steps, kind="remove")])
+
+
+def _read_with(document: DesignDocument, action: Arguments) -> str:
+    """Everything of a position read with other probes."""
+    probes = tuple(str(one) for one in action["probes"])
+    return _with_groups(document, action, lambda group: replace(group, probes=probes))
+
+
+def _read_balls(document: DesignDocument, action: Arguments) -> str:
+    """Other balls of a position read, all with the same probes."""
+    names = tuple(str(one) for one in action["balls"])
+    experiment = experiment_of(document, planning=True)
+    place = _position(experiment, str(action["position"]))
+    every = experiment.layouts[place.artefact].names
+    unknown = [name for name in names if name not in every]
+    if unknown or not names:
+        raise ActionError(f"no ball {unknown[0]}" if unknown else "a position reads some ball")
+    index = np.array(sorted(every.index(name) for name in set(names)), np.intp)
+    balls = tuple(every[k] for k in index)
+    return _with_groups(
+        document, action, lambda group: replace(group, balls=balls, ball_indices=index)
+    )
+
+
+def _with_groups(
+    document: DesignDocument, action: Arguments, change: Callable[[ReadingGroup], ReadingGroup]
+) -> str:
+    experiment = experiment_of(document, planning=True)
+    place = _position(experiment, str(action["position"]))
+    if len(place.readings) > 1:
+        text = f'position "{place.name}" has several groups of readings; change them in the text'
+        raise ActionError(text)
+    groups = tuple(map(change, place.readings))
+    new = with_position(experiment, replace(place, readings=groups))
+    return with_experiment(document.text, document.path, experiment, new)
+
+
+def _set(document: DesignDocument, action: Arguments) -> str:
+    """A value at a path, as a file states it; nothing takes it away."""
+    steps = _steps(action["path"])
+    said = str(action["value"])
+    if not said.strip():
+        return _with(document, [TextChange(steps, kind="remove")])
+    return _with(document, [TextChange(steps, value_of(said))])
+
+
+def value_of(said: str) -> Any:
+    """A value as a person types it in a form, in one line, as a file would state it.
+
+    :raises ActionError: it is no value.
+
+    >>> value_of("[1 m, 2]"), value_of("0.2 um")
+    (['1 m', 2], '0.2 um')
+    """
+    try:
+        return _plain(to_python(parse_tree(f"value: {said}\n", "value"))["value"])
+    except (ExperimentError, TypeError, KeyError):
+        raise ActionError(f"{said} is no value of a file") from None
+
+
+def _written(document: DesignDocument, action: Arguments) -> str:
+    """Another text."""
+    return str(action["text"])
+
+
+def _with(document: DesignDocument, changes: Sequence[TextChange]) -> str:
+    return with_text_changes(document.text, document.path, document.variant, changes)
+
+
+def _position(experiment: Experiment, name: str) -> Position:
+    for place in experiment.positions:
+        if place.name == name:
+            return place
+    raise ActionError(f'no position "{name}"')
+
+
+def _place_of(document: DesignDocument, name: str) -> Steps:
+    said = to_python(experiment_of(document, planning=True).tree)
+    for i, one in enumerate(said["positions"]):
+        if str(one["name"]) == name:
+            return ("positions", i)
+    raise ActionError(f'no position "{name}"')
+
+
+def settings_of(document: DesignDocument, name: str) -> dict[str, Any]:
+    """What a file would say of a position.
+
+    :raises ActionError: there is no such position.
+    """
+    experiment = experiment_of(document, planning=True)
+    return position_settings(experiment, _position(experiment, name))
+
+
+def _vector(value: Any) -> Array:
+    try:
+        found = np.array(value, float)
+    except (TypeError, ValueError):
+        raise ActionError(f"{value!r} is no vector") from None
+    if found.ndim != 1 or not np.isfinite(found).all():
+        raise ActionError(f"{value!r} is no vector")
+    return found
+
+
+def _steps(value: Any) -> Steps:
+    if not isinstance(value, list) or not value:
+        raise ActionError("a path is a list of keys and indices")
+    return tuple(one if isinstance(one, int) else str(one) for one in value)
+
+
+def _plain(value: Any) -> Any:
+    """Plain data with lists for tuples."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+ACTIONS: Mapping[str, Callable[[DesignDocument, Arguments], str]] = {
+    "move": _moved,
+    "turn": _turned,
+    "stand": _stood,
+    "copy": _copied,
+    "add": _added,
+    "repair": _repaired,
+    "remove": _removed,
+    "probes": _read_with,
+    "balls": _read_balls,
+    "set": _set,
+    "text": _written,
+}

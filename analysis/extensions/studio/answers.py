@@ -1,0 +1,180 @@
+"""What the studio shows of a design: where everything stands, how uncertain it will be, how what is
+undetermined moves.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from ballplate.extensions.repair.written import plane_of
+from ballplate.presentation.formatting import finite
+from ballplate.rank.motions import moved_balls, moved_points, null_motions, weak_motions
+from ballplate.rank.verdict import Verdict, verdict
+from ballplate.results.parts import scale_lines, scale_warnings, target_lines
+from ballplate.results.prediction import length_headline, rank_words
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import locations
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.uncertainty.error_map import point_map
+from ballplate.uncertainty.scale import scale_of
+from ballplate.uncertainty.summaries import Quantity, uncertainties
+
+# Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
+NODES = 9
+
+# Nodes of the map along each axis: few enough to answer while a plate is dragged.
+MAP_NODES = 11
+
+
+@single_threaded
+def answer(experiment: Experiment) -> dict[str, Any]:
+    """What a page shows of a design at once, as plain data in metres, with the seconds that the
+    engine took.
+    """
+    start = perf_counter()
+    design, target = lay_out(experiment), experiment.target_uncertainty
+    at = linearise(design)
+    judged = verdict(at, experiment.expected_rank_deficiency, target)
+    quantities = uncertainties(at, target=target)
+    found_map = _map(at)
+    engine = perf_counter() - start
+    lengths = quantities.get("U6")
+    return {
+        "title": experiment.title,
+        "label": experiment.label,
+        "scene": _scene(experiment),
+        "rank": {
+            "words": rank_words(judged),
+            "deficiency": judged.deficiency,
+            "expected": judged.expected,
+            "parameters": judged.parameters,
+            "observations": judged.observations,
+            "reasons": list(judged.reasons),
+        },
+        "quantities": [_row(one) for one in quantities.values()],
+        "headline": length_headline(quantities),
+        "target": [] if target is None else target_lines(lengths),
+        "within": None if lengths is None else lengths.within_target,
+        "motions": _motions(at, judged, target),
+        "map": found_map,
+        "doubts": list(experiment.doubts),
+        "engine": engine,
+        "seconds": perf_counter() - start,
+    }
+
+
+@single_threaded
+def scale_answer(experiment: Experiment) -> list[str]:
+    """What carries the scale of a design, in words: it is told after the rest, since the design is
+    evaluated once more without each of those that may.
+    """
+    scale = scale_of(experiment, linearise(lay_out(experiment)))
+    return [*scale_lines(scale), *scale_warnings(scale)]
+
+
+def _row(quantity: Quantity) -> dict[str, Any]:
+    return {
+        "symbol": quantity.symbol,
+        "description": quantity.description,
+        "maximum": finite(quantity.maximum),
+        "average": finite(quantity.average),
+        "unit": quantity.unit,
+        "count": quantity.count,
+        "undetermined": quantity.undetermined,
+        "largest": quantity.largest,
+    }
+
+
+def _scene(experiment: Experiment) -> dict[str, Any]:
+    volume = experiment.machine.volume
+    return {
+        "dimension": experiment.dimension,
+        "lower": volume.lower.tolist(),
+        "upper": volume.upper.tolist(),
+        "probes": {name: one.offset.tolist() for name, one in experiment.probes.items()},
+        "artefacts": {name: list(one.names) for name, one in experiment.layouts.items()},
+        "positions": [place_data(experiment, place) for place in experiment.positions],
+    }
+
+
+def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
+    """Where a position stands, as plain data in metres."""
+    layout = experiment.layouts[place.artefact]
+    plane = plane_of(place.pose.rotation)
+    read = np.zeros(len(layout.names), bool)
+    read[place.balls] = True
+    return {
+        "name": place.name,
+        "artefact": place.artefact,
+        "probes": list(place.probes),
+        "groups": len(place.readings),
+        "readings": place.count,
+        "plane": None if plane is None else plane[0],
+        "quarter_turns": None if plane is None else plane[1],
+        "origin": place.pose.origin.tolist(),
+        "rotation": place.pose.rotation.tolist(),
+        "balls": ball_coordinates(place.pose, layout).tolist(),
+        "read": read.tolist(),
+    }
+
+
+def _motions(at: Linearisation, judged: Verdict, target: Target | None) -> dict[str, Any]:
+    """How each undetermined and each weak direction moves a lattice through the volume, nodes of x
+    running slowest, and the balls that are read, per unit of the largest displacement.
+
+    Their common rigid motion, which no distance shows, is taken out.
+    """
+    design = at.design
+    volume, read, offsets = design.machine.volume, design.readings, design.probes.offsets
+    nodes = even_grid(volume.lower, volume.upper, [NODES] * len(volume.lower))
+    of_nodes = np.full(len(nodes), design.evaluation.probe)
+    of_plates = read.select(design.plate_readings)
+    places = np.concatenate([nodes + offsets[of_nodes], locations(design, at.state, of_plates)])
+    told = (*judged.null, *judged.weak)
+    found = []
+    for k, motion in enumerate((*null_motions(at), *weak_motions(at, target))):
+        by = [moved_points(at, motion, nodes, of_nodes), moved_balls(at, motion, of_plates)]
+        moved = without_rigid_motion(places, np.concatenate(by)[:, :, None])[:, :, 0]
+        largest = float(np.linalg.norm(moved, axis=1).max())
+        rounded = np.round(moved / (largest or 1.0), 4).tolist()
+        found.append(
+            {
+                "words": str(told[k]),
+                "weak": k >= len(judged.null),
+                "nodes": rounded[: len(nodes)],
+                "readings": rounded[len(nodes) :],
+            }
+        )
+    first = np.array([design.balls.of(int(one)).min() for one in design.balls.artefact])
+    numbers = np.arange(len(first)) - first
+    return {
+        "nodes": NODES,
+        "position": of_plates.position.tolist(),
+        "ball": numbers[of_plates.ball].tolist(),
+        "directions": found,
+    }
+
+
+def _map(at: Linearisation) -> dict[str, Any]:
+    """Standard uncertainty of corrected points through the volume, None where undetermined."""
+    found = point_map(at, MAP_NODES)
+    return {
+        "x": found.x.tolist(),
+        "y": found.y.tolist(),
+        "slices": [
+            {
+                "name": one.name,
+                "level": one.level,
+                "values": [[finite(v) for v in row] for row in one.values.tolist()],
+            }
+            for one in found.slices
+        ],
+    }

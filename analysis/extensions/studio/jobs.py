@@ -1,0 +1,225 @@
+"""Long computations beside the studio: each in a process of its own, which can be stopped."""
+
+from __future__ import annotations
+
+import base64
+import multiprocessing
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.computing.processes import begin_worker, interruptions_blocked
+from ballplate.simulator.computing.steps import ProgressStep, Report
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.inputs.messages import ExperimentError
+
+from .document import DesignDocument, experiment_of
+
+Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
+
+# Most computations beside one another.
+MOST_RUNNING = 2
+
+# Seconds for a process that is asked to end.
+PATIENCE = 2.0
+
+# Data sets of Monte Carlo unless another number is asked for.
+TRIALS = 256
+
+
+def _suggest(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from .suggestions import suggested_repairs
+
+    return suggested_repairs(document, report)
+
+
+def _next(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from .suggestions import next_positions
+
+    return next_positions(document, report)
+
+
+def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from ballplate.montecarlo.experiments import trials
+    from ballplate.results.study import predict
+
+    experiment = experiment_of(document)
+    found = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
+    return {"lines": replace(predict(experiment), monte_carlo=found).lines()}
+
+
+def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from ballplate.planning.campaign import Request, campaign
+
+    experiment = experiment_of(document, planning=True)
+    return {"lines": campaign(experiment, Request(), report=report).lines()}
+
+
+def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    from .sweeping import swept
+
+    return swept(document, settings.get("axes"), report)
+
+
+def _ensure_sweep(document: DesignDocument, settings: Mapping[str, Any]) -> None:
+    from .sweeping import ensure_possible
+
+    ensure_possible(document, settings.get("axes"))
+
+
+def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
+    """The fit of readings that were dropped on the page, with their residuals at the balls."""
+    from ballplate.results.residuals import reading_residuals
+    from ballplate.results.study import fit
+    from ballplate.simulator.readings.reading_files import read_readings
+
+    experiment = experiment_of(document)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / (Path(str(settings["name"])).name or "readings.csv")
+        file.write_bytes(base64.b64decode(str(settings["content"])))
+        observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
+    found = fit(experiment, observed)
+    data: dict[str, Any] = {"lines": found.lines(), "notes": list(found.notes)}
+    if found.converged:
+        design = found.design
+        readings, residuals, standardised = reading_residuals(
+            design, found.solution, found.observed.x
+        )
+        data["residuals"] = {
+            "position": [design.positions.names[k] for k in readings.position],
+            "place": found.observed.x[design.plate_readings].tolist(),
+            "value": residuals.tolist(),
+            "standardised": np.abs(standardised).max(axis=1).tolist(),
+        }
+    return data
+
+
+JOBS: Mapping[str, Work] = {
+    "suggest": _suggest,
+    "next": _next,
+    "monte carlo": _monte_carlo,
+    "plan": _plan,
+    "sweep": _sweep,
+    "fit": _fit,
+}
+"""What can run beside the studio; another is a function and its line here."""
+
+CHECKS: Mapping[str, Callable[[DesignDocument, Mapping[str, Any]], None]] = {"sweep": _ensure_sweep}
+"""What refuses the settings of a computation before it begins."""
+
+
+@dataclass
+class Job:
+    """A computation in a process of its own, of the design with a `fingerprint`: `state` is
+    running, done or failed, `step` how far it has come, `result` what came of it, or why nothing
+    did, and `page` one that it has made. Its temporary files are in a `folder` that ends with it,
+    since a process that is stopped takes nothing away.
+    """
+
+    name: str
+    fingerprint: str
+    process: BaseProcess
+    connection: Connection
+    folder: str
+    state: str = "running"
+    step: str = ""
+    result: Any = None
+    page: str = ""
+
+    def look(self) -> None:
+        """Take what the process has told since."""
+        try:
+            while self.state == "running" and self.connection.poll():
+                kind, said = self.connection.recv()
+                if kind == "step":
+                    self.step = said
+                elif kind == "page":
+                    self.page = said
+                else:
+                    self.state, self.result = kind, said
+        except (EOFError, OSError):
+            self.state, self.result = "failed", "the computation ended without a result"
+
+    def stop(self) -> None:
+        """End the process, which may be one that does not listen."""
+        self.process.terminate()
+        self.process.join(PATIENCE)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+        self.connection.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def to_dict(self, number: int) -> dict[str, Any]:
+        return {
+            "id": number,
+            "job": self.name,
+            "fingerprint": self.fingerprint,
+            "state": self.state,
+            "step": self.step,
+            "result": self.result,
+            "page": bool(self.page),
+        }
+
+
+def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) -> Job:
+    """Start a computation with the document as it is now.
+
+    :raises KeyError: there is no such job.
+    :raises ActionError: its settings are wrong.
+    :raises ExperimentError: the text is wrong, where this is found before the start.
+    """
+    JOBS[name]
+    if name in CHECKS:
+        CHECKS[name](document, settings)
+    # A new interpreter: a copy of this process would have its threads' locks without the threads.
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    folder = tempfile.mkdtemp(prefix="ballplate-studio-")
+    arguments = (folder, sender, name, document, dict(settings))
+    process = context.Process(target=_work_in, args=arguments, daemon=True)
+    with interruptions_blocked():
+        process.start()
+    sender.close()
+    return Job(name, document.fingerprint, process, receiver, folder)
+
+
+def _work_in(
+    folder: str,
+    connection: Connection,
+    name: str,
+    document: DesignDocument,
+    settings: Mapping[str, Any],
+) -> None:
+    """Work in a process of its own, with its temporary files in a folder."""
+    begin_worker(os.getppid())
+    tempfile.tempdir = folder
+    _work(connection, name, document, settings)
+
+
+def _work(
+    connection: Connection, name: str, document: DesignDocument, settings: Mapping[str, Any]
+) -> None:
+    def report(step: ProgressStep) -> None:
+        connection.send(("step", str(step)))
+
+    try:
+        result = JOBS[name](document, settings, report)
+        if isinstance(result, dict) and (page := result.pop("page", "")):
+            connection.send(("page", page))
+    except ExperimentError as error:
+        connection.send(("failed", "\n".join(map(str, error.messages))))
+    except Exception as error:
+        # Whatever it is, a person who waits is told of it.
+        connection.send(("failed", str(error) or type(error).__name__))
+    else:
+        connection.send(("done", result))
+    finally:
+        connection.close()

@@ -1,0 +1,89 @@
+"""`ballplate studio`: a design in the browser, moved and changed, with its uncertainties."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from ballplate.cli.common import add_file, whole
+from ballplate.cli.outputs import Needed, UsageError
+from ballplate.cli.telling import note
+
+if TYPE_CHECKING:
+    from .session import Session
+
+STUDIO = Needed("the studio needs", ("starlette", "uvicorn"), "studio")
+
+HELP = "open a design in the browser, to move and change it and see its uncertainties"
+DESCRIPTION = (
+    "Serve a page, to this machine only, on which the positions of a design are dragged, turned,"
+    " added and switched off, and its settings changed, with rank, uncertainties and map after"
+    " every move. A file that is not there yet begins as init writes it. The page is served until"
+    " Ctrl-C; the file is written when Save is pressed."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_file(parser)
+    parser.add_argument(
+        "--port", metavar="N", type=_port, default=0, help="port; default: any that is free"
+    )
+    parser.add_argument(
+        "--no-browser", action="store_true", help="print the address, and open no browser"
+    )
+
+
+def _port(text: str) -> int:
+    found = whole(text)
+    if not found < 2**16:
+        raise ArgumentTypeError(f"a port is at most 65535, not {found}")
+    return found
+
+
+def unsaved(session: Session) -> str:
+    """What is to be said when the studio ends."""
+    from .recovery import kept_in
+
+    if session.is_saved:
+        return "nothing is left to be saved"
+    kept = session.kept()
+    if kept == kept_in(session.path):
+        return (
+            f"changes are not saved, and are in {kept.name}: the same command takes them up again"
+        )
+    if kept is not None:
+        return f"changes are not saved, and are in {kept.name}: another studio has the file"
+    return "changes are not saved, and could not be kept in the folder of the file"
+
+
+def run(options: Namespace) -> int:
+    """Serve the page until the command is interrupted."""
+    if STUDIO.is_missing:
+        raise UsageError(STUDIO.told)
+    if len(options.variant) > 1:
+        raise UsageError("the studio shows one variant at a time; name one")
+    from .serving import serve
+    from .session import Session
+
+    (path,) = options.files
+    template = files(__package__).joinpath("template.yaml").read_text(encoding="utf-8")
+    session = Session(path, options.variant[0] if options.variant else None, template)
+    if not path.exists():
+        note(options, f"{path} is new: it begins as ballplate init writes it")
+
+    def tell(address: str) -> None:
+        print(address, flush=True)
+        note(options, "the studio runs until Ctrl-C")
+        if not options.no_browser:
+            from webbrowser import open_new_tab
+
+            open_new_tab(address)
+
+    options.interruption.kept = lambda: unsaved(session)
+    try:
+        serve(session, options.port, tell)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise UsageError(f"port {options.port} cannot be had: {reason}; name another") from None
+    return 0

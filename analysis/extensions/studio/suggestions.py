@@ -1,0 +1,111 @@
+"""Suggestions: repairs of what is undetermined, and positions more that lower the uncertainty
+most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ballplate.extensions.repair.changes import ChangeKind, apply_all
+from ballplate.extensions.repair.offers import offers
+from ballplate.extensions.repair.repair_search import Repair, repairs
+from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
+from ballplate.extensions.repair.written import Edit, position_settings
+from ballplate.results.study import planned_uncertainty
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.inputs.messages import ExperimentError
+
+from .answers import place_data
+from .document import DesignDocument, experiment_of
+
+# Positions more that are told.
+MOST_TOLD = 5
+
+
+def suggested_repairs(
+    document: DesignDocument, report: Report = unreported
+) -> list[dict[str, Any]]:
+    """Changes that leave nothing undetermined, in words, with the positions that they add or move,
+    as plain data.
+
+    :raises ExperimentError: the text is wrong.
+    """
+    experiment = experiment_of(document, planning=True)
+    found = repairs(experiment, report=report)
+    told = () if found is None else found.complete
+    return [_repair_data(experiment, one) for one in told]
+
+
+def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
+    after = apply_all(repair.changes, experiment)
+    before = {one.name: one for one in experiment.positions}
+    places = [one for one in after.positions if before.get(one.name) is not one]
+    lengths = None if repair.prediction is None else repair.prediction.lengths
+    return {
+        "words": changes_in_words(repair) + caveat(repair),
+        "faint": repair.is_faint,
+        "weak": repair.weak,
+        "average": None if lengths is None else lengths.average,
+        "maximum": None if lengths is None else lengths.maximum,
+        "places": [place_data(after, one) for one in places],
+        "edits": [_edit_data(one) for one in (*repair.edits, *_expectation(experiment))],
+    }
+
+
+def _expectation(experiment: Experiment) -> tuple[Edit, ...]:
+    """That nothing is undetermined any more, where the file expects otherwise."""
+    stated = experiment.expected_rank_deficiency
+    return (Edit(("expected_rank_deficiency",), 0),) if stated else ()
+
+
+def _edit_data(edit: Edit) -> dict[str, Any]:
+    return {"path": list(edit.steps), "value": edit.value, "is_new": edit.is_new}
+
+
+def next_positions(document: DesignDocument, report: Report = unreported) -> list[dict[str, Any]]:
+    """Positions more, of the pool where there is one, with U6 if each is added; the best first.
+
+    A position that leaves U6 undetermined comes after those that determine it.
+
+    :raises ExperimentError: the text is wrong.
+    """
+    experiment = experiment_of(document, planning=True)
+    changes = [
+        one
+        for kind in (ChangeKind.POOL, ChangeKind.ADD_POSITION)
+        for one in _offered(experiment, kind)
+    ]
+    found = []
+    for change in counted(changes, "positions", len(changes), report):
+        assert isinstance(change.adds, Position)
+        try:
+            planned = planned_uncertainty(change.apply(experiment))
+        except ExperimentError:
+            continue
+        lengths = planned.quantities.get("U6")
+        if lengths is None:
+            continue
+        undetermined = lengths.average != lengths.average
+        order = (planned.deficiency, undetermined, lengths.average if not undetermined else 0.0)
+        found.append((order, change, lengths))
+    found.sort(key=lambda one: one[0])
+    return [
+        {
+            "words": change.words,
+            "deficiency": order[0],
+            "average": None if order[1] else lengths.average,
+            "maximum": None if order[1] else lengths.maximum,
+            "place": place_data(experiment, change.adds),
+            "settings": position_settings(experiment, change.adds),
+        }
+        for order, change, lengths in found[:MOST_TOLD]
+        if isinstance(change.adds, Position)
+    ]
+
+
+def _offered(experiment: Experiment, kind: ChangeKind) -> Iterator[Any]:
+    for change in offers(experiment, False).get(kind, ()):
+        if isinstance(change.adds, Position):
+            yield change

@@ -1,0 +1,114 @@
+"""`ballplate export`: a sweep's results as one table for other programs."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.outputs import PARQUET, UsageError, add_force, add_output, write
+from ballplate.cli.telling import complain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from .stored import StoredResults
+
+
+BAD_FILE = 3
+
+
+HELP = "write a sweep's results as CSV or Parquet"
+DESCRIPTION = (
+    "Write a row for each cell of a store and a column for each figure, in metres and"
+    " radians, with the unit in the column's name. From a damaged store, the cells that"
+    " can be read are written, and the exit status is 3."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_store(parser)
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        required=True,
+        takes_screen=True,
+        needed=lambda path: PARQUET if path.suffix.lower() == ".parquet" else None,
+        help="table, .csv or .parquet; - for CSV on the screen",
+    )
+    add_force(parser)
+
+
+def add_store(parser: ArgumentParser) -> None:
+    """Add the store and the choice of a sweep in it."""
+    parser.add_argument(
+        "store", metavar="STORE", type=Path, help="store written by ballplate sweep"
+    )
+    parser.add_argument(
+        "--sweep",
+        metavar="N",
+        type=int,
+        help="number of the sweep in the store; default: the newest",
+    )
+
+
+def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
+    """Tell of rows that this version would compute by another method."""
+    from .store import of_other_methods
+
+    for text in of_other_methods(keys):
+        complain(f"{path}: {text}; run ballplate sweep again to compute them anew")
+
+
+def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
+    """Tell what of a store could not be read; whether there is anything."""
+    from .store import unread
+    from .store_file import GO_ON
+
+    go_on = GO_ON if results.damage else "ballplate sweep computes anew what is missing"
+    text = unread(path, results.unreadable, results.strays, count, results.damage, go_on)
+    if text:
+        complain(text)
+    return bool(text)
+
+
+def run(options: Namespace) -> int:
+    """Write the table."""
+    from ballplate.simulator.inputs.spreadsheets import cell_of_text
+
+    from .frame import frame_of
+    from .store import StoreError, chosen_sweep, definition_of, open_store, results
+
+    suffix = options.output.suffix.lower()
+    if suffix not in (".csv", ".parquet") and str(options.output) != "-":
+        raise UsageError(f"{options.output} should end in .csv or .parquet")
+    with closing(open_store(options.store)) as store:
+        number = chosen_sweep(store, options.sweep)
+        defined, cells = None, None
+        try:
+            defined = definition_of(store, number)
+            cells = len(defined["cells"])
+        except StoreError as error:
+            complain(error)
+        found = results(store, number, cells)
+        if cells is None:
+            cells = len(found.rows) + len(found.unreadable)
+        is_damaged = warn_of_damage(store.path, found, cells) or defined is None
+        table = frame_of(found, defined)
+        warn_of_other_methods(store.path, found.keys)
+    if suffix != ".parquet":
+        # A label or a reason may begin like a formula.
+        table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)
+        table.columns = [cell_of_text(name) for name in table.columns]
+    if str(options.output) == "-":
+        table.to_csv(sys.stdout, index=False, lineterminator="\n")
+    else:
+        to_csv = partial(table.to_csv, lineterminator="\n")
+        to_file = table.to_parquet if suffix == ".parquet" else to_csv
+        write(options, {options.output: lambda path: to_file(path, index=False)})
+    return BAD_FILE if is_damaged else 0

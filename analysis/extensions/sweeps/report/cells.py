@@ -1,0 +1,63 @@
+"""Experiments of cells, made anew from the files in a store."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.trust import Trust
+
+from ..bundle import Bundle, unpack
+from ..load import experiment_of, load_sweep
+from ..store import Store, StoreError, files
+from .results import ReportedSweep
+
+
+class NoExperimentError(Exception):
+    """A cell's experiment cannot be had; the text says why."""
+
+
+def experiments(
+    store: Store, results: ReportedSweep, cells: Sequence[int], run_modules: bool = False
+) -> list[Experiment]:
+    """Experiments of cells.
+
+    What a store from elsewhere names is not trusted: code in Python runs only with `run_modules`,
+    and files outside the store are not read.
+
+    :raises NoExperimentError: the files are not there, have changed their meaning, name others, or
+        would run code.
+    """
+    try:
+        kept = files(store, results.number)
+    except StoreError as error:
+        raise NoExperimentError(str(error).removeprefix(f"{store.path}: ")) from None
+    bundle = Bundle(results.definition["source"], results.definition["base"], kept)
+    names = [name for name, _ in bundle.files]
+    if bundle.source not in names or bundle.base not in names:
+        raise NoExperimentError("the store does not hold the sweep's files")
+    with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
+        try:
+            source = unpack(bundle, Path(folder))
+        except ValueError as error:
+            raise NoExperimentError(f"the store cannot be trusted: {error}") from None
+        except OSError as error:
+            raise NoExperimentError(
+                f"the store's files cannot be unpacked ({error.strerror})"
+            ) from None
+        try:
+            # The stored file, whichever the sweep file names.
+            base = Path(folder) / PurePosixPath(bundle.base)
+            trust = Trust(run_modules, Path(folder), "add --run-modules if you trust the store")
+            sweep = load_sweep(source, base, (Path(folder),), trust)
+            if len(sweep.cells) != len(results.cells):
+                raise NoExperimentError("the stored files make other cells than those stored")
+            return [experiment_of(sweep, cell) for cell in cells]
+        except ExperimentError as error:
+            first = error.messages[0]
+            text = ": ".join(part for part in (first.path, first.text) if part)
+            raise NoExperimentError(text.replace(f"{folder}{os.sep}", "")) from None

@@ -1,0 +1,61 @@
+"""What the page of a design is made of: the results of all commands that judge a design."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ballplate.extensions.campaign.sheet import sheet_of
+from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.pages.design_page import DesignContents, design_page
+from ballplate.extensions.pages.page_facts import assumptions, target_in_words, unjudged
+from ballplate.gross_errors.redundancy import reliability_of
+from ballplate.planning.checked_files import Wanted, checked_design
+from ballplate.rank.motions import null_motions, weak_motions
+from ballplate.results.prediction import Prediction
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.load import with_pool
+from ballplate.simulator.experiment.model import Experiment
+
+# Points along each axis of the map of lengths, in two and in three dimensions.
+GRID = {2: (7,), 3: (5,)}
+# What lengths are compared with where the file states nothing; no page tells it.
+NO_TARGET = "1 um"
+
+
+def page_of_design(
+    experiment: Experiment, prediction: Prediction, report: Report = unreported
+) -> str:
+    """The page of an experiment's design with its `prediction`; `report` is told of the search for
+    suggested changes and of the map of lengths.
+    """
+    design = prediction.design
+    at = linearise(design)
+    target = target_in_words(experiment)
+    data: dict[str, Any] = {"run": prediction.to_dict()}
+    settings = length_settings(experiment, target or NO_TARGET, GRID[design.dimension])
+    data["lengths"] = length_map(experiment, settings, report).to_dict()
+    judged = prediction.verdict
+    pool = with_pool(experiment) if judged.null or judged.weak else None
+    checked = checked_design(experiment, pool, Wanted(repairs=pool is not None), report)
+    data["check"] = checked.prediction.to_dict()
+    reason = unjudged(design)
+    if not reason:
+        is_estimated = experiment.sigma == "estimated"
+        judged_biases = reliability_of(
+            design, sigma_is_estimated=is_estimated, experiment=experiment, report=report
+        )
+        data["reliability"] = judged_biases.to_dict()
+    data["sheet"] = sheet_of(experiment).to_dict()
+    contents = DesignContents(
+        experiment.title,
+        data,
+        at,
+        null_motions(at),
+        weak_motions(at, experiment.target_uncertainty),
+        target,
+        reason,
+        experiment.source.name if experiment.name is None else experiment.label,
+        assumptions(experiment, len(design.model.parameters)),
+    )
+    return design_page(contents)

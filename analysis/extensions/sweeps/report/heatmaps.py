@@ -1,0 +1,134 @@
+"""The average that cells are judged by over each pair of axes: tables whose entries are shaded by
+their size, each of them a single cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from ballplate.presentation.formatting import number
+from ballplate.presentation.table import Entry
+from numpy.typing import NDArray
+
+from .measures import Measure, uncertainty_measures
+from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
+from .series import evenly, setting_words
+from .tables import DIGITS, NOT_DONE, STAR
+
+# Values of an axis that are shown, shades that can be told apart, and pairs of axes.
+MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
+
+# In place of a shade: of what is undetermined in part at least, and of cells without a figure.
+DEFICIENT, BLANK = -2, -1
+
+
+@dataclass(frozen=True)
+class Heat:
+    """A measure over two axes; `shades` from 0, the smallest, to SHADES - 1, DEFICIENT or BLANK."""
+
+    rows: ReportAxis
+    columns: ReportAxis
+    measure: Measure
+    row_labels: tuple[str, ...]
+    column_labels: tuple[str, ...]
+    entries: tuple[tuple[Entry, ...], ...]
+    shades: tuple[tuple[int, ...], ...]
+    note: str
+
+
+def heat_maps(results: ReportedSweep) -> list[Heat]:
+    """A map of the averages that cells are judged by, for each pair of axes of which several
+    values were combined.
+    """
+    judged, best = criterion(results), ranked(results)
+    measures = [
+        m for m in uncertainty_measures(results) if judged is not None and m.figure == judged[0]
+    ]
+    if not measures or not len(best):
+        return []
+    found: list[Heat] = []
+    for i, j in combinations(range(len(results.axes)), 2):
+        if min(len(results.axes[k].labels) for k in (i, j)) > 1 and len(found) < MOST_PAIRS:
+            heat = _heat(results, i, j, measures[0], int(best[0]))
+            found += [] if heat is None else [heat]
+    return found
+
+
+def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -> Heat | None:
+    """The map where all further axes are as in a cell; None where hardly any are combined there."""
+    rows, columns = results.axes[i], results.axes[j]
+    further = [k for k in range(len(results.axes)) if k not in (i, j)]
+    own = results.chosen[best, further]
+    here = np.flatnonzero((results.chosen[:, further] == own).all(axis=1))
+    planned = results.cells[(results.cells[:, further] == own).all(axis=1)]
+    places = {
+        (int(a), int(b)): int(row)
+        for a, b, row in zip(results.chosen[here, i], results.chosen[here, j], here, strict=True)
+    }
+    wanted = {(int(a), int(b)) for a, b in planned[:, [i, j]]}
+    row_values, column_values = evenly(rows, MOST_VALUES), evenly(columns, MOST_VALUES)
+    grid = [[(a, b) for b in column_values] for a in row_values]
+    if sum(place in places for line in grid for place in line) < 4:
+        return None
+    open_ = partly_open(results, measure.symbol) | (results.figure("rank_deficiency") > 0)
+    values = np.full((len(row_values), len(column_values)), np.nan)
+    is_open = np.zeros(values.shape, bool)
+    entries = []
+    for r, line in enumerate(grid):
+        told = []
+        for c, place in enumerate(line):
+            row = places.get(place)
+            if row is None:
+                told.append(Entry(NOT_DONE if place in wanted else ""))
+                continue
+            entry, is_open[r, c] = _entry(results, row, measure, bool(open_[row]))
+            told.append(entry)
+            if entry.value is not None and not is_open[r, c]:
+                values[r, c] = entry.value
+        entries.append(tuple(told))
+    shades = np.where(is_open, DEFICIENT, _shades(values.ravel()).reshape(values.shape))
+    notes = []
+    if further:
+        notes.append(f"All with {setting_words(results, further, own)}, as in the best cell.")
+    notes += [
+        f"{len(shown)} of {len(axis.labels)} values of {axis.name}."
+        for axis, shown in ((rows, row_values), (columns, column_values))
+        if len(shown) < len(axis.labels)
+    ]
+    notes += [f"Hatched, and marked {STAR}: something is undetermined."] if is_open.any() else []
+    return Heat(
+        rows,
+        columns,
+        measure,
+        tuple(rows.short_labels[k] for k in row_values),
+        tuple(columns.short_labels[k] for k in column_values),
+        tuple(entries),
+        tuple(tuple(line) for line in shades.tolist()),
+        " ".join(notes),
+    )
+
+
+def _entry(results: ReportedSweep, row: int, measure: Measure, is_open: bool) -> tuple[Entry, bool]:
+    """A cell's place, and whether it leaves something open."""
+    cell = int(results.frame["cell"].to_numpy()[row])
+    if not results.done[row]:
+        return Entry(results.statuses[row], None, cell, measure.figure), False
+    figure = results.value(measure.figure, row)
+    text = number(measure.factor * figure, DIGITS) + (STAR if is_open else "")
+    return Entry(text, figure, cell, measure.figure), is_open
+
+
+def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Shades by size, on a logarithmic scale where all are above zero."""
+    finite = np.isfinite(values)
+    found = np.full(len(values), BLANK)
+    if not finite.any():
+        return found
+    scaled = np.log(values[finite]) if values[finite].min() > 0 else values[finite]
+    low, size = scaled.min(), np.ptp(scaled)
+    # Equal values but for rounding have no order to show.
+    share = (scaled - low) / size if size > 1e-9 else np.zeros(len(scaled))
+    found[finite] = np.minimum((SHADES * (share + 1e-9)).astype(int), SHADES - 1)
+    return found

@@ -1,0 +1,320 @@
+"""A sweep's results as one page that needs nothing else: no network, no script, no file beside
+it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from importlib import resources
+from itertools import groupby
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+from ballplate.extensions.pages.document import style
+from ballplate.presentation.formatting import micro, number, percent, uncertainty_words
+from ballplate.presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
+from ballplate.presentation.scene import MOST_BALLS, Scene, scene
+from ballplate.presentation.table import Block, Entry, Row, Table
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.settings import listing
+from ballplate.uncertainty.error_map import error_map
+from ballplate.uncertainty.quantities import DESCRIPTIONS
+
+from ..columns import symbol_column
+from ..store import Store
+from .answer import answer
+from .cells import NoExperimentError, experiments
+from .heatmaps import heat_maps
+from .plots import plot_svg
+from .results import ReportedSweep, best_and_worst, cell_list, criterion
+from .series import Plot, plots
+from .store_comparison import StoreComparison
+from .tables import report_tables
+from .verdicts import failures, flags, ranks, weak
+
+# Values of an axis that are listed.
+LISTED = 12
+
+# The name of the sweep file that the studio makes, for as long as it computes.
+MADE_IN_STUDIO = ".ballplate-sweep.yaml"
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing with what stands below it."""
+
+    svg: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class DrawnDesign:
+    """A cell's design: the drawing, its probes, and the positions as a table."""
+
+    cell: int
+    heading: str
+    scene: str
+    probes: str
+    caption: str
+    positions: Table
+
+
+@dataclass(frozen=True)
+class DrawnMap:
+    """The error map's uncertainty in slices."""
+
+    words: str
+    figures: tuple[Drawing, ...]
+
+
+def page(
+    store: Store,
+    results: ReportedSweep,
+    run_modules: bool = False,
+    report: Report = unreported,
+    comparison: StoreComparison | None = None,
+) -> str:
+    """The page. Experiments with code of their own are drawn only with `run_modules`; `report`
+    receives what is drawn, and a `comparison` with another sweep follows the answer.
+
+    :raises ImportError: jinja2 or matplotlib is not installed.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters.update(micro=micro, full=repr)
+    package = resources.files(__package__)
+    template = environment.from_string(
+        package.joinpath("template.html").read_text(encoding="utf-8")
+    )
+    drawn = plots(results)
+    context: dict[str, Any] = {
+        "title": in_one_line(results.title),
+        "summary": _summary(results),
+        "style": style(),
+        "facts": _facts(results),
+        "answer": answer(results),
+        "comparison": comparison,
+        "failures": failures(results),
+        "tables": report_tables(results),
+        "plots": _plots(drawn, (criterion(results) or ("", ""))[1], report),
+        "has_trials": any(len(line.actual) for plot in drawn for line in plot.panels[0].lines),
+        "heats": heat_maps(results),
+        "ranks": ranks(results),
+        "weak": weak(results),
+        "flags": flags(results),
+        **_designs(store, results, run_modules, report),
+    }
+    context["sections"] = _sections(context)
+    return re.sub(r"\n{2,}", "\n", template.render(context)).lstrip() + "\n"
+
+
+def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
+    known = [
+        ("answer", "Answer", context["answer"]),
+        ("comparison", "Compared with another sweep", context["comparison"]),
+        ("swept", "What was swept", True),
+        ("plots", "Along the axes", context["plots"]),
+        ("heat", "Over two axes", context["heats"]),
+        ("uncertainties", "Uncertainties", context["tables"]),
+        ("failed", "Failed cells", context["failures"].shown),
+        ("rank", "What the readings determine", context["ranks"].shown),
+        ("designs", "Designs", context["designs"] or context["no_designs"]),
+        ("error-map", "The error map's uncertainty", context["error_map"]),
+    ]
+    return [(name, words) for name, words, is_there in known if is_there]
+
+
+def _summary(results: ReportedSweep) -> str:
+    parts = [f"{results.count('done')} of {len(results.cells)} cells done"]
+    parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
+    parts += [f"{results.left} left"] if results.left else []
+    unreadable = len(results.found.unreadable)
+    parts += [f"{unreadable} could not be read from the damaged store"] if unreadable else []
+    return ", ".join(parts) + "."
+
+
+def _source(path: str) -> tuple[str, str]:
+    """What a sweep comes from, by the path of its file as it is stored.
+
+    >>> _source("plates/sizes.yaml"), _source("plates/.ballplate-sweep.yaml")
+    (('Sweep file', 'plates/sizes.yaml'), ('Sweep', 'made in the studio'))
+    """
+    # A file that was there for the computation only has a name that nobody can look up.
+    if PurePosixPath(path).name == MADE_IN_STUDIO:
+        return "Sweep", "made in the studio"
+    return "Sweep file", in_one_line(path)
+
+
+def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
+    stored = results.definition
+    base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
+    facts = [
+        _source(stored["source"]),
+        ("Experiment", in_one_line(stored["base"]) + (f": {in_one_line(base)}" if base else "")),
+    ]
+    for axis in results.axes:
+        labels = list(axis.labels)
+        if len(labels) > LISTED:
+            labels = [*labels[: LISTED - 1], f"… {labels[-1]} ({len(labels)} values)"]
+        facts.append((f"Axis {axis.name}", ", ".join(labels)))
+    cells = f"{len(results.cells)}: {results.count('done')} done, "
+    cells += f"{results.count('failed')} failed, {results.left} left"
+    if results.found.unreadable:
+        cells += f", {len(results.found.unreadable)} could not be read: {_unreadable(results)}"
+    facts += [
+        ("Cells", cells),
+        ("Recorded", ", ".join(stored["record"])),
+        (
+            "Monte Carlo",
+            f"{stored['trials']} data sets of each cell" if stored["trials"] else "none",
+        ),
+    ]
+    facts += [("Seed", str(stored["seed"]))] if stored["trials"] else []
+    names = [name for name in results.frame.columns if name.endswith("_version")]
+    counts = Counter(zip(*(results.frame[name].tolist() for name in names), strict=True))
+    for versions, count in counts.items():
+        words = ", ".join(
+            f"{name.removesuffix('_version')} {one}"
+            for name, one in zip(names, versions, strict=True)
+        )
+        facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cells)"))
+    return facts
+
+
+def _unreadable(results: ReportedSweep) -> str:
+    """Which cells could not be read, and why the first of them."""
+    cells = sorted(results.found.unreadable)
+    return f"{cell_list(cells)} ({in_one_line(results.found.unreadable[cells[0]])})"
+
+
+def _plots(
+    drawn: list[Plot], judged: str, report: Report
+) -> list[tuple[str, list[Drawing], list[Drawing]]]:
+    """Plots of the quantity that cells are judged by against each axis, and those of others."""
+    found = []
+    number_of = 0
+    for axis, some in groupby(
+        counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name
+    ):
+        figures: tuple[list[Drawing], list[Drawing]] = [], []
+        for plot in some:
+            number_of += 1
+            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}."
+            picture = plot_svg(plot, f"plot{number_of}")
+            of_others = symbol_column(plot.symbol) != judged
+            figures[of_others].append(Drawing(picture, f"{caption} {plot.note}".strip()))
+        found.append((axis, *figures))
+    return found
+
+
+def _designs(
+    store: Store, results: ReportedSweep, run_modules: bool, report: Report
+) -> dict[str, Any]:
+    """The best and the worst cell's design, and the best one's error map."""
+    empty: dict[str, Any] = {"designs": [], "no_designs": "", "error_map": None}
+    cells, judged = best_and_worst(results), criterion(results)
+    if not cells or judged is None:
+        return empty
+    try:
+        found = experiments(store, results, cells, run_modules)
+    except NoExperimentError as error:
+        return {**empty, "no_designs": str(error)}
+    symbol = judged[1].replace("_", " ")
+    designs = []
+    for k, (cell, experiment) in enumerate(
+        counted(zip(cells, found, strict=True), "designs", len(cells), report)
+    ):
+        which = ("Smallest", "Largest")[k] if len(cells) > 1 else "The only"
+        row = int(np.flatnonzero(results.frame["cell"] == cell)[0])
+        value, open_ = (
+            results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined")
+        )
+        told = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
+        told += f", {open_:.0f} undetermined" if open_ else ""
+        heading = f"{which} average of {symbol}{told}: cell {cell}, {results.label(cell)}"
+        designs.append(_drawn_design(experiment, cell, heading, k))
+    return {
+        "designs": designs,
+        "no_designs": "",
+        "error_map": _drawn_map(found[0], results, cells[0]),
+    }
+
+
+def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> DrawnDesign:
+    design = lay_out(experiment)
+    drawn = scene(design)
+    sizes = " x ".join(f"{1000 * size:.6g}" for size in design.machine.volume.size)
+    words = f"Volume of {sizes} mm with {len(drawn.places)} positions, which the table below lists."
+    caption = (
+        "Positions in the volume: balls that are read (circles), and from one ball the styli to the"
+        " machine's "
+    )
+    caption += "reference point (squares)."
+    if not drawn.is_named:
+        caption += " Positions are numbered as in the table."
+    if any(place.read > MOST_BALLS for place in drawn.places):
+        caption += " Only some of the balls are drawn."
+    has_offsets = any(tip.any() for _, tip in drawn.tips)
+    probes = (
+        probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}")
+        if has_offsets
+        else ""
+    )
+    return DrawnDesign(
+        cell,
+        heading,
+        scene_svg(drawn, f"scene{k}", words),
+        probes,
+        caption,
+        _positions(drawn, cell),
+    )
+
+
+def _positions(drawn: Scene, cell: int) -> Table:
+    rows = [
+        Row(
+            (str(place.number), place.name, place.artefact, ", ".join(place.probes)),
+            (Entry(str(place.read)),),
+        )
+        for place in sorted(drawn.places, key=lambda place: place.number)
+    ]
+    headings = ("number", "position", "artefact", "probes")
+    caption = f"Positions of cell {cell}"
+    return Table(f"positions-{cell}", caption, headings, ("balls read",), (Block("", tuple(rows)),))
+
+
+def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> DrawnMap:
+    found = error_map(experiment)
+    words = (
+        f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the"
+        " root mean square over the co-ordinates of a point, with the probe"
+        f" {experiment.evaluation.probe}, in µm."
+    )
+    if any(np.isnan(one.values).any() for one in found.slices):
+        words += " Hatched regions are undetermined."
+    if found.within is not None:
+        words += (
+            f" Of the distances between all points of this grid {percent(found.within)} are known"
+            " to within the target uncertainty, by the"
+            f" {uncertainty_words(experiment.coverage_factor)}."
+        )
+    figures = []
+    for k, one in enumerate(found.slices):
+        told = slice_words(one)
+        caption = told[0].upper() + told[1:] + "."
+        figures.append(
+            Drawing(
+                slice_svg(found, one, f"slice{k}", f"Map of standard uncertainties, {told}"),
+                caption,
+            )
+        )
+    return DrawnMap(words, tuple(figures))

@@ -1,0 +1,224 @@
+"""Data of a report's plots: an uncertainty along a swept axis, for each setting of the other
+axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..columns import symbol_column
+from .measures import Measure, trial_symbols, uncertainty_measures
+from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
+
+Floats = NDArray[np.float64]
+
+# Lines that can be told apart, values along an axis that are drawn, pictures of one quantity for
+# settings of further axes, and cells that are drawn as points.
+MOST_LINES, MOST_PLACES, MOST_PICTURES, MOST_POINTS = 6, 200, 4, 1000
+
+# Of a line without Monte Carlo.
+NONE = np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesLine:
+    """Values along an axis, each of a single cell.
+
+    `actual` and `error` are what Monte Carlo makes of it and its standard error, empty where no
+    trials were made.
+    """
+
+    label: str
+    x: Floats
+    y: Floats
+    actual: Floats
+    error: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Lines of one measure."""
+
+    measure: Measure
+    lines: tuple[SeriesLine, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """Average and maximum of a quantity against an axis; `note` says what the lines are.
+
+    `is_scattered` where the cells are points of which no two share the other axes' values.
+    """
+
+    axis: ReportAxis
+    symbol: str
+    unit: str
+    panels: tuple[Panel, ...]
+    note: str
+    is_scattered: bool = False
+
+
+def plots(results: ReportedSweep) -> list[Plot]:
+    """Plots for each axis with numbers and each quantity of one unit: lines for values of a second
+    axis and, of what cells are judged by, a picture for each setting of the others.
+    """
+    measures = [
+        m
+        for m in uncertainty_measures(results)
+        if m.statistic in ("average", "maximum") and " or " not in m.unit
+    ]
+    judged = criterion(results)
+    found = []
+    for k, axis in enumerate(results.axes):
+        if len(axis.numbers) < 2:
+            continue
+        pictures = _pictures(results, k)
+        for symbol in sorted(
+            dict.fromkeys(m.symbol for m in measures),
+            key=lambda one: judged is None or judged[1] != symbol_column(one),
+        ):
+            mine = {m.statistic: m for m in measures if m.symbol == symbol}
+            if len(mine) < 2:
+                continue
+            is_judged = judged is not None and judged[1] == symbol_column(symbol)
+            for picture in pictures if is_judged else pictures[:1]:
+                plot = _plot(results, k, picture, symbol, [mine["average"], mine["maximum"]])
+                if any(np.isfinite(line.y).any() for panel in plot.panels for line in panel.lines):
+                    found.append(plot)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    """Lines of rows of the frame, with their labels, and what is to be said of all of them."""
+
+    lines: tuple[tuple[str, NDArray[np.int64]], ...]
+    note: str
+    is_scattered: bool = False
+
+
+def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
+    """What is drawn against axis `k`: that of the best cell first."""
+    best = ranked(results)
+    rows = np.flatnonzero(results.done)
+    others = [i for i in range(len(results.axes)) if i != k]
+    settings, which = np.unique(results.chosen[rows][:, others], axis=0, return_inverse=True)
+    which = which.ravel()
+    if len(settings) <= MOST_LINES or not len(best):
+        return [_picture(results, k, others, [rows[which == i] for i in range(len(settings))], "")]
+    if np.bincount(which).max() < 2:
+        thinned = rows[:: -(-len(rows) // MOST_POINTS)]
+        note = "Each point is a cell; the other axes differ from one to the next."
+        note += f" {len(thinned)} of {len(rows)} are drawn." if len(thinned) < len(rows) else ""
+        return [_Picture((("", thinned),), note, True)]
+    second = max(
+        others, key=lambda i: (len(results.axes[i].labels) <= MOST_LINES, _count(results, i))
+    )
+    further = [i for i in others if i != second]
+    values = evenly(results.axes[second], MOST_LINES)
+    apart, place = np.unique(results.chosen[rows][:, further], axis=0, return_inverse=True)
+    own = place.ravel()[np.flatnonzero(rows == best[0])[0]]
+    order = [int(own), *(i for i in range(len(apart)) if i != own)][:MOST_PICTURES]
+    found = []
+    for i in order:
+        here = rows[place.ravel() == i]
+        lines = [here[results.chosen[here, second] == value] for value in values]
+        note = setting_words(results, further, apart[i])
+        note = f"With {note}" if note else ""
+        if i == own and len(apart) > 1:
+            note += ", the setting of the best cell"
+        count = len(results.axes[second].labels)
+        if len(values) < count:
+            note += f"; {len(values)} of {count} values of {results.axes[second].name}"
+        if i == order[-1] and len(order) < len(apart):
+            note += f"; {len(apart) - len(order)} settings more are in the store"
+        found.append(
+            _picture(results, k, [second], lines, f"{note}.".removeprefix("; ") if note else "")
+        )
+    return found
+
+
+def _count(results: ReportedSweep, i: int) -> int:
+    return len(results.axes[i].labels)
+
+
+def evenly(axis: ReportAxis, most: int) -> list[int]:
+    """Places of values of an axis, in order and evenly spread where there are more than `most`."""
+    order = (
+        np.argsort(np.array(axis.numbers), kind="stable")
+        if axis.numbers
+        else np.arange(len(axis.labels))
+    )
+    chosen = np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round().astype(int))
+    return [int(i) for i in order[chosen]]
+
+
+def setting_words(results: ReportedSweep, axes: Sequence[int], values: NDArray[np.int64]) -> str:
+    return ", ".join(
+        f"{results.axes[i].name} {results.axes[i].labels[j]}"
+        for i, j in zip(axes, values.tolist(), strict=True)
+    )
+
+
+def _picture(
+    results: ReportedSweep,
+    k: int,
+    axes: Sequence[int],
+    lines: Sequence[NDArray[np.int64]],
+    note: str,
+) -> _Picture:
+    """Lines of rows, each ordered by what is plotted, which the file may have in any order."""
+    x = np.array(results.axes[k].numbers)[results.chosen[:, k]]
+    shown = set(evenly(results.axes[k], MOST_PLACES))
+    found = []
+    for line in lines:
+        kept = line[[one in shown for one in results.chosen[line, k].tolist()]]
+        if len(kept):
+            label = setting_words(results, axes, results.chosen[kept[0], axes])
+            found.append((label, kept[np.argsort(x[kept], kind="stable")]))
+    return _Picture(tuple(found), note)
+
+
+def _plot(
+    results: ReportedSweep, k: int, picture: _Picture, symbol: str, measures: Sequence[Measure]
+) -> Plot:
+    axis = results.axes[k]
+    x = np.array(axis.numbers)[results.chosen[:, k]]
+    left_out = partly_open(results, symbol)
+    panels = []
+    for measure in measures:
+        values = np.where(left_out, np.nan, measure.factor * results.figure(measure.figure))
+        actual, error = _actual(results, measure)
+        lines = [
+            SeriesLine(
+                label,
+                x[rows],
+                values[rows],
+                *((actual[rows], error[rows]) if len(actual) else (NONE, NONE)),
+            )
+            for label, rows in picture.lines
+        ]
+        panels.append(Panel(measure, tuple(lines)))
+    note = picture.note
+    if any(left_out[rows].any() for _, rows in picture.lines):
+        note = f"{note} Cells in which some of it is undetermined are left out.".strip()
+    return Plot(axis, symbol, measures[0].unit, tuple(panels), note, picture.is_scattered)
+
+
+def _actual(results: ReportedSweep, measure: Measure) -> tuple[Floats, Floats]:
+    """What Monte Carlo makes of an average, and its standard error; nothing where there is none.
+
+    It is the average times the ratio of actual to linearised errors: where Monte Carlo follows a
+    sample of the distances only, the average of these may differ from that of all, the ratio does
+    not.
+    """
+    name = symbol_column(measure.symbol)
+    if measure.statistic != "average" or measure.symbol not in trial_symbols(results):
+        return np.zeros(0), np.zeros(0)
+    average = measure.factor * results.figure(measure.figure)
+    ratio, error = (results.figure(f"{name}_actual_ratio{end}") for end in ("", "_standard_error"))
+    return average * ratio, average * error

@@ -1,0 +1,135 @@
+"""`ballplate report`: a sweep's results as a page for people, or as tables for a document."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.outputs import PAGE, UsageError, add_force, add_output, write
+from ballplate.cli.telling import complain
+
+from .export_command import add_store, warn_of_damage, warn_of_other_methods
+
+if TYPE_CHECKING:
+    from .report.results import ReportedSweep
+    from .report.store_comparison import StoreComparison
+
+BAD_FILE = 3
+
+SUFFIXES = {
+    ".html": "html",
+    ".htm": "html",
+    ".txt": "text",
+    ".md": "markdown",
+    ".csv": "csv",
+    ".tex": "latex",
+}
+
+
+HELP = "write a sweep's results as an HTML page, or its tables"
+DESCRIPTION = (
+    "Write the results of a sweep as one HTML page that needs no network: tables,"
+    " plots, rank, the best and the worst design; with --format text, markdown, csv or"
+    " latex, the tables alone. From a damaged store, the cells that can be read are"
+    " reported, and the exit status is 3."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add_store(parser)
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        takes_screen=True,
+        help="page or tables; default, and -: the screen",
+    )
+    add_force(parser)
+    parser.add_argument(
+        "--format",
+        choices=("html", "text", "markdown", "csv", "latex"),
+        help="default: by the ending of FILE, or html",
+    )
+    parser.add_argument(
+        "--run-modules",
+        action="store_true",
+        help="run the sweep's error models in Python, which drawings of its designs need",
+    )
+
+    parser.add_argument(
+        "--compare",
+        metavar="STORE",
+        type=Path,
+        help="a store of a sweep over the same axes, to compare with on the page",
+    )
+
+
+def run(options: Namespace) -> int:
+    """Write the report."""
+    from .report.results import read_results
+    from .store import open_store
+
+    output: Path | None = options.output
+    if str(output) == "-":
+        output = None
+    suffix = "" if output is None else output.suffix.lower()
+    if options.format is None and suffix not in ("", *SUFFIXES):
+        endings = ", ".join(SUFFIXES)
+        raise UsageError(f"{output} should end in one of {endings}; or state --format")
+    form = options.format or SUFFIXES.get(suffix, "html")
+    if form == "html" and PAGE.is_missing:
+        complain(f"ballplate report: {PAGE.told}")
+        return BAD_FILE
+    if options.compare is not None and form != "html":
+        raise UsageError("--compare is for the page; leave it out, or name a page with -o")
+    with closing(open_store(options.store)) as store:
+        results = read_results(store, options.sweep)
+        is_damaged = warn_of_damage(store.path, results.found, len(results.cells))
+        warn_of_other_methods(store.path, results.found.keys)
+        if form == "html":
+            from ballplate.cli.progress import progress
+
+            from .report.page import page
+
+            comparison = _comparison(results, options.compare)
+            with progress(options) as shown:
+                text = page(store, results, options.run_modules, shown.show, comparison)
+        else:
+            from ballplate.presentation.formats import FORMATS
+
+            from .report.tables import report_tables
+
+            text = FORMATS[form](results.title, report_tables(results))
+        if not results.count("done") and not is_damaged:
+            told = f"none of its {len(results.cells)} cells is done; ballplate sweep continues"
+            complain(f"{store.path}: {told}")
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        content = text.encode("utf-8", "replace")
+        write(options, {output: lambda path: path.write_bytes(content)})
+    return BAD_FILE if is_damaged else 0
+
+
+def _comparison(results: ReportedSweep, path: Path | None) -> StoreComparison | None:
+    """The comparison with the newest sweep of another store; None where none is asked for.
+
+    :raises UsageError: it has nothing that can be compared.
+    """
+    if path is None:
+        return None
+    from .report.results import read_results
+    from .report.store_comparison import IncomparableError, compared
+    from .store import open_store
+
+    with closing(open_store(path)) as store:
+        other = read_results(store, None)
+        warn_of_damage(store.path, other.found, len(other.cells))
+        try:
+            return compared(results, other, path.name)
+        except IncomparableError as error:
+            raise UsageError(error) from None

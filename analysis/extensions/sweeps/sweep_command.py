@@ -1,0 +1,184 @@
+"""`ballplate sweep`: a family of experiments, into a store that survives interruptions."""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import ArgumentParser, Namespace
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.common import add_workers
+from ballplate.cli.outputs import UsageError
+from ballplate.cli.telling import complain
+
+if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
+
+    from .bundle import Bundle
+    from .execute import Runner, Summary
+    from .model import Sweep
+    from .store import Store
+
+BAD_FILE = 3
+
+
+HELP = "compute a family of experiments into a store"
+DESCRIPTION = (
+    "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
+    " trials, Monte Carlo. Each finished cell is stored on disk; when started again, the"
+    " command continues where it stopped. The exit status is 0 if all cells are done, 1"
+    " if some have failed."
+)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", type=Path, help="sweep file (YAML)")
+    parser.add_argument(
+        "--store",
+        metavar="FILE",
+        type=Path,
+        help="store; default: the sweep file's name with .sqlite",
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="list the cells and estimate the time; store nothing"
+    )
+    add_workers(parser)
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="compute on the dask.distributed cluster of this scheduler instead",
+    )
+    parser.add_argument("--retry-failed", action="store_true", help="compute failed cells again")
+    parser.add_argument("--fail-fast", action="store_true", help="stop when a cell fails")
+    parser.add_argument(
+        "--beside",
+        action="store_true",
+        help="add a changed sweep beside the one in the store",
+    )
+    parser.add_argument(
+        "--folder",
+        metavar="FOLDER",
+        type=Path,
+        action="append",
+        default=[],
+        help=(
+            "further folder whose files the sweep may name, besides those of the sweep file and"
+            " of its base; the store keeps copies of these files; may be repeated"
+        ),
+    )
+
+
+def run(options: Namespace) -> int:
+    """Run a sweep; 1 if cells have failed."""
+    from .bundle import bundle_of
+    from .load import load_sweep
+    from .running import writable_store
+    from .store_file import is_same_file
+
+    sweep = load_sweep(
+        options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder)
+    )
+    if options.dry_run:
+        return _dry_run(sweep, options)
+    bundle = bundle_of(sweep)
+    path = options.store or options.file.with_suffix(".sqlite")
+    if any(is_same_file(path, file) for file in (options.file, sweep.base)):
+        raise UsageError(f"--store {path} is the sweep's own file; name another")
+    try:
+        with writable_store(path) as store:
+            return _run(sweep, bundle, store, options)
+    except OSError as error:
+        where = error.filename or path
+        complain(
+            f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
+        )
+        return BAD_FILE
+
+
+def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
+    from ballplate.cli.progress import progress
+
+    from .local import ChangedError
+    from .running import compute_sweep, enter
+
+    entered = enter(store, sweep, bundle, options.beside)
+    for remark in entered.remarks:
+        complain(remark)
+    options.interruption.kept = lambda: (
+        f"finished cells are in {store.path}, and the same command continues from there"
+    )
+    try:
+        with progress(options) as shown:
+
+            def report(step: ProgressStep) -> None:
+                options.interruption.answer()
+                shown.show(step)
+
+            runner = _runner(sweep, bundle, options)
+            summary = compute_sweep(
+                store, sweep, entered, runner, options.retry_failed, options.fail_fast, report
+            )
+        if summary.left:
+            options.interruption.answer()
+    except ChangedError:
+        text = (
+            "the files of the sweep were changed while it ran; finished cells are stored; start"
+            " it again"
+        )
+        complain(f"{options.file}: {text}")
+        return BAD_FILE
+    _tell(
+        store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary
+    )
+    return 1 if summary.failed or summary.left else 0
+
+
+def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
+    from ballplate.simulator.computing.processes import processors
+
+    from .cluster import cluster_runner
+    from .local import local_runner
+
+    if options.scheduler is not None:
+        return cluster_runner(options.scheduler, sweep, bundle)
+    return nullcontext(local_runner(sweep, bundle, options.workers or processors()))
+
+
+def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
+    from ballplate.simulator.inputs.messages import in_one_line
+    from ballplate.simulator.inputs.settings import number_of
+
+    from .running import shortcomings
+
+    before = f" ({summary.before} of them before)" if summary.before else ""
+    left = f", {summary.left} left" if summary.left else ""
+    counted = number_of(summary.cells, "cell")
+    told = (
+        f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed}"
+        f" failed{before}{left}"
+    )
+    print(in_one_line(told))
+    for text in shortcomings(store, number, summary.cells):
+        complain(text)
+
+
+def _dry_run(sweep: Sweep, options: Namespace) -> int:
+    from ballplate.cli.progress import duration
+    from ballplate.simulator.computing.processes import processors
+    from ballplate.simulator.inputs.settings import number_of
+
+    from .estimate import seconds_of
+
+    for number in range(len(sweep.cells)):
+        print(f"{number}: {sweep.label(number)}")
+    workers = options.workers or processors()
+    seconds, rows = seconds_of(sweep)
+    words = f"with {number_of(workers, 'worker')}, judged by {len(rows)} of them"
+    cells = number_of(len(sweep.cells), "cell")
+    print(f"{cells}, about {duration(seconds / workers)} {words}", file=sys.stderr)
+    failed = [row for row in rows if row.status == "failed"]
+    for row in failed:
+        print(f"cell {row.number} fails: {row.reason}", file=sys.stderr)
+    return 1 if failed else 0

@@ -1,0 +1,121 @@
+"""The keys of a sweep file: forms and ranges. What they refer to is checked where the sweep is
+loaded.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from ballplate.simulator.experiment.sections import Line, Seed
+from ballplate.simulator.geometry.ball_layouts import Name
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings
+from ballplate.uncertainty.quantities import QUANTITIES, RECORDED, RECORDED_IF_TOLD
+from pydantic import Field
+
+if TYPE_CHECKING:
+    Quantity = str
+else:
+    Quantity = Literal[tuple(symbol for symbol in QUANTITIES if " " not in symbol)]
+
+KEPT = f"{RECORDED[0]} to {RECORDED[-1]}"
+MORE = ", ".join(RECORDED_IF_TOLD)
+
+Path = Annotated[str, Field(min_length=1)]
+Scalar = str | int | float | bool
+SomeValues = NonEmpty[Any]
+Values = Forms[SomeValues, SomeValues, Annotated[dict[Name, Any], Field(min_length=1)]]
+VariantNames = NonEmpty[Name]
+
+
+# Synthetic data sets of a cell, which are done in blocks, each of which is kept.
+MOST_TRIALS = 10_000_000
+
+
+class SubsetSettings(Settings):
+    """Which entries of a list are kept, in the order of the list."""
+
+    sizes: NonEmpty[Annotated[int, Field(ge=1)]] = Field(
+        description="how many entries, those of always included"
+    )
+    always: tuple[Name, ...] = Field((), description="names of entries that every subset holds")
+    among: tuple[Name, ...] | None = Field(
+        None, description="names to choose from; default: all entries of the list"
+    )
+
+
+class AxisSettings(Settings):
+    """One axis of a sweep: what it changes, and the values it takes."""
+
+    path: Path | None = Field(
+        None, description="path of what the values replace, as in error messages"
+    )
+    paths: NonEmpty[Path] | None = Field(
+        None, description="several paths that take the same values"
+    )
+    values: Values | None = Field(None, description="list of values, or name: value")
+    start: Scalar | None = Field(
+        None, alias="from", description="first value of a range, a number or quantity"
+    )
+    to: Scalar | None = Field(None, description="last value of a range")
+    count: Annotated[int, Field(ge=2, le=100_000)] | None = Field(
+        None, description="number of values of a range"
+    )
+    step: Scalar | None = Field(
+        None, description="difference of neighbouring values of a range, instead of count"
+    )
+    spacing: Literal["linear", "logarithmic"] = Field("linear", description="of a range with count")
+    together: Annotated[dict[Path, Values], Field(min_length=1)] | None = Field(
+        None,
+        description=(
+            "path: values, for several paths that change together; lists of the same length"
+        ),
+    )
+    names: tuple[Name, ...] | None = Field(None, description="a name for each value of together")
+    subsets: SubsetSettings | None = Field(
+        None, description="subsets of the list at path, such as positions"
+    )
+    variants: Forms[Literal["all"], VariantNames, VariantNames] | None = Field(
+        None, description="variants of the base file: all, or a list of names"
+    )
+
+
+class BoundsSettings(Settings):
+    """Bounds of an axis, exclusive."""
+
+    above: Scalar | None = Field(None, description="holds for values above this")
+    below: Scalar | None = Field(None, description="holds for values below this")
+
+
+Condition = Forms[Scalar, NonEmpty[Any], BoundsSettings]
+
+
+class SweepSettings(Settings):
+    """A sweep file: an experiment, what varies in it, and what is recorded."""
+
+    title: Line = Field(description="one line that says what the sweep is about")
+    base: Annotated[str, Field(min_length=1)] = Field(
+        description="experiment file, from this file's folder"
+    )
+    variant: Name | None = Field(
+        None, description="variant of the base file; needed if it has several"
+    )
+    axes: Annotated[dict[Name, AxisSettings], Field(min_length=1)] = Field(
+        description="name: what varies; every combination of the axes' values is a cell"
+    )
+    skip: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
+        (),
+        description=(
+            "cells left out: axis: value, list of values or {above: …, below: …}, all of an entry"
+            " at once"
+        ),
+    )
+    only: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
+        (), description="cells kept, in the same form; default: all"
+    )
+    trials: Annotated[int, Field(ge=2, le=MOST_TRIALS)] | None = Field(
+        None, description="synthetic data sets of each cell; default: none"
+    )
+    seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
+    record: NonEmpty[Quantity] = Field(
+        RECORDED, description=f"quantities that are kept, {KEPT} and {MORE}; default: all of {KEPT}"
+    )
