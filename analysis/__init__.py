@@ -1,7 +1,7 @@
 """Planning and evaluation of ball-plate experiments for co-ordinate measuring machines.
 
-`import ballplate as bp` gives the functions of `ballplate.api` and `ballplate.extensions.sweeps.stores`, each
-loaded when it is first used.
+`import ballplate as bp` gives the commands as functions, the names of the kernel on which
+extensions build, and the functions of extensions, each loaded when it is first used.
 """
 
 from __future__ import annotations
@@ -9,59 +9,96 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ballplate.extensions.sweeps.running import OtherSweepError
-    from ballplate.extensions.sweeps.store_file import StoreError
-    from ballplate.extensions.sweeps.stores import stored, sweep, sweep_report
-    from ballplate.simulator.inputs.messages import ExperimentError
-
-    from .api import (
-        adjust,
-        budget,
+    from ballplate.api import (
         certificate,
         check,
         compare,
-        compensation,
-        convert,
-        correct,
-        cross_validate,
-        curves,
-        diff,
         experiment,
         fit,
-        ladder,
-        lengths,
-        load,
-        load_all,
         load_map,
-        map,
-        page,
         plan,
         quickstart,
-        reach,
-        read_compensation,
-        read_report,
         reliability,
-        repair,
-        reproduce,
         run,
-        sheet,
         simulate,
-        spline,
-        validate,
-        view,
         write_map,
     )
-    from .estimators.estimator_choice import ESTIMATORS
-    from .results.groupings import GROUPINGS
-    from .simulator.experiment.model import Experiment
+    from ballplate.arguments import load, load_all
+    from ballplate.estimators.estimator_choice import ESTIMATORS
+    from ballplate.extensions.campaign.interface import sheet
+    from ballplate.extensions.compensation.interface import compensation, read_compensation
+    from ballplate.extensions.judgement.interface import budget, cross_validate, ladder, validate
+    from ballplate.extensions.laboratory.interface import read_report
+    from ballplate.extensions.maps.interface import (
+        adjust,
+        convert,
+        correct,
+        curves,
+        diff,
+        lengths,
+        map,
+    )
+    from ballplate.extensions.pages.interface import page, view
+    from ballplate.extensions.repair.interface import repair
+    from ballplate.extensions.reproduction.interface import reproduce
+    from ballplate.extensions.requirements.interface import reach
+    from ballplate.extensions.splines.interface import spline
+    from ballplate.extensions.sweeps.running import OtherSweepError
+    from ballplate.extensions.sweeps.store_file import StoreError
+    from ballplate.extensions.sweeps.stores import stored, sweep, sweep_report
+    from ballplate.planning.criteria import Criterion
+    from ballplate.presentation.files import write_file
+    from ballplate.presentation.result import Result
+    from ballplate.presentation.table import Table
+    from ballplate.results.fit import Fit
+    from ballplate.results.groupings import GROUPINGS
+    from ballplate.results.prediction import Prediction
+    from ballplate.simulator.computing.processes import in_processes
+    from ballplate.simulator.design.arrays import Design, Observations
+    from ballplate.simulator.design.influences.protocol import Influence
+    from ballplate.simulator.estimation.functions import linear_functions
+    from ballplate.simulator.estimation.linearisation import (
+        LinearFunctions,
+        Linearisation,
+        linearise,
+    )
+    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.experiment.model import Candidate, Experiment
+    from ballplate.simulator.inputs.extensions import Extension, MissingExtensionError
+    from ballplate.simulator.inputs.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.quantities import Target, parse_length
+    from ballplate.simulator.inputs.trust import Trust
+    from ballplate.simulator.machines.protocol import ErrorModel
+    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind
 
 __all__ = [
+    "Candidate",
+    "Criterion",
+    "Design",
     "ESTIMATORS",
+    "ErrorModel",
     "Experiment",
     "ExperimentError",
+    "Extension",
+    "Fit",
+    "FittedMap",
     "GROUPINGS",
+    "Influence",
+    "LinearFunctions",
+    "Linearisation",
+    "Message",
+    "MissingExtensionError",
+    "Observations",
     "OtherSweepError",
+    "Prediction",
+    "QUANTITIES",
+    "QuantityKind",
+    "Result",
     "StoreError",
+    "Table",
+    "Target",
+    "Trust",
     "adjust",
     "budget",
     "certificate",
@@ -75,13 +112,18 @@ __all__ = [
     "diff",
     "experiment",
     "fit",
+    "in_processes",
     "ladder",
+    "lay_out",
     "lengths",
+    "linear_functions",
+    "linearise",
     "load",
     "load_all",
     "load_map",
     "map",
     "page",
+    "parse_length",
     "plan",
     "quickstart",
     "reach",
@@ -99,20 +141,55 @@ __all__ = [
     "sweep_report",
     "validate",
     "view",
+    "write_file",
     "write_map",
 ]
 
-_PLACES = {
-    "ESTIMATORS": "ballplate.estimators.estimator_choice",
-    "Experiment": "ballplate.simulator.experiment.model",
-    "ExperimentError": "ballplate.simulator.inputs.messages",
-    "GROUPINGS": "ballplate.results.groupings",
-    "OtherSweepError": "ballplate.extensions.sweeps.running",
-    "StoreError": "ballplate.extensions.sweeps.store_file",
-    "stored": "ballplate.extensions.sweeps.stores",
-    "sweep": "ballplate.extensions.sweeps.stores",
-    "sweep_report": "ballplate.extensions.sweeps.stores",
+# Names of the kernel, by the module that has them.
+_KERNEL = {
+    "ballplate.api": (
+        "check",
+        "compare",
+        "certificate",
+        "experiment",
+        "fit",
+        "load_map",
+        "plan",
+        "quickstart",
+        "reliability",
+        "run",
+        "simulate",
+        "write_map",
+    ),
+    "ballplate.arguments": ("load", "load_all"),
+    "ballplate.estimators.estimator_choice": ("ESTIMATORS",),
+    "ballplate.results.groupings": ("GROUPINGS",),
+    "ballplate.planning.criteria": ("Criterion",),
+    "ballplate.presentation.files": ("write_file",),
+    "ballplate.presentation.result": ("Result",),
+    "ballplate.presentation.table": ("Table",),
+    "ballplate.results.fit": ("Fit",),
+    "ballplate.results.prediction": ("Prediction",),
+    "ballplate.uncertainty.quantities": ("QUANTITIES", "QuantityKind"),
+    "ballplate.simulator.computing.processes": ("in_processes",),
+    "ballplate.simulator.design.arrays": ("Design", "Observations"),
+    "ballplate.simulator.design.influences.protocol": ("Influence",),
+    "ballplate.simulator.estimation.functions": ("linear_functions",),
+    "ballplate.simulator.estimation.linearisation": (
+        "LinearFunctions",
+        "Linearisation",
+        "linearise",
+    ),
+    "ballplate.simulator.experiment.layout": ("lay_out",),
+    "ballplate.simulator.experiment.model": ("Candidate", "Experiment"),
+    "ballplate.simulator.inputs.extensions": ("Extension", "MissingExtensionError"),
+    "ballplate.simulator.inputs.messages": ("ExperimentError", "Message"),
+    "ballplate.simulator.inputs.quantities": ("Target", "parse_length"),
+    "ballplate.simulator.inputs.trust": ("Trust",),
+    "ballplate.simulator.machines.protocol": ("ErrorModel",),
+    "ballplate.simulator.maps.fitted_map": ("FittedMap",),
 }
+_PLACES = {name: module for module, names in _KERNEL.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
@@ -120,13 +197,22 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("ballplate")
-    if name not in __all__:
+    if name.startswith("_"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
+    if name in _PLACES:
+        from importlib import import_module
 
-    found = getattr(import_module(_PLACES.get(name, "ballplate.api")), name)
-    globals()[name] = found
-    return found
+        value = getattr(import_module(_PLACES[name]), name)
+    else:
+        from ballplate.simulator.inputs.extensions import function
+
+        try:
+            value = function(name)
+        except KeyError:
+            message = f"module {__name__!r} has no attribute {name!r}"
+            raise AttributeError(message) from None
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:

@@ -9,7 +9,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from importlib import import_module
+from types import ModuleType
 from typing import Any, NoReturn
+
+from ballplate.simulator.inputs.extensions import MissingExtensionError
+from ballplate.simulator.inputs.unusable import UnusableError
 
 from .completion import SHELLS, PrintCompletion
 from .encoding import write_data_in_utf8, write_readably
@@ -22,15 +26,40 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *("check", "run", "budget", "studio", "plan", "sheet", "next", "reach", "lengths"),
-    *("reliability", "simulate", "import", "fit", "ladder", "validate", "certificate"),
-    *("correct", "curves", "compensation", "convert", "diff", "adjust", "compare"),
-    *("sweep", "export", "report", "map"),
-    *("spline", "reproduce", "schema", "init"),
+    *("check", "run", "plan", "simulate", "fit", "compare", "reliability"),
+    *("schema", "init"),
 )
 
 
-def parser(names: Sequence[str] = COMMANDS) -> _Parser:
+def commands_of_all() -> tuple[str, ...]:
+    """The commands of the kernel, then those of extensions."""
+    from ballplate.simulator.inputs.extensions import names
+
+    return (*COMMANDS, *names("commands", with_registered=True))
+
+
+def _module_of(name: str) -> ModuleType:
+    """The module of a command.
+
+    :raises KeyError: there is no such command.
+    :raises MissingExtensionError: the extension that has it is not installed.
+    """
+    if name in COMMANDS:
+        return import_module(f".{name}", __package__)
+    from ballplate.simulator.inputs.extensions import module_with
+
+    return module_with("commands", name)
+
+
+def _is_command(word: str) -> bool:
+    if word in COMMANDS or word.startswith("-"):
+        return word in COMMANDS
+    from ballplate.simulator.inputs.extensions import provider
+
+    return provider("commands", word) is not None
+
+
+def parser(names: Sequence[str] | None = None) -> _Parser:
     """The command line's grammar, with all commands or some of them."""
     top = _Parser(
         prog="ballplate",
@@ -53,9 +82,14 @@ def parser(names: Sequence[str] = COMMANDS) -> _Parser:
     commands = top.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    for name in names:
+    for name in commands_of_all() if names is None else names:
         # Loaded only now, so that hardly anything is when an interruption begins to be answered.
-        module = import_module(f".{name}", __package__)
+        try:
+            module = _module_of(name)
+        except MissingExtensionError:
+            if names is None:
+                continue
+            raise
         command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
         module.add_options(command)
         command.set_defaults(run=module.run)
@@ -99,8 +133,11 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
             try:
                 given = sys.argv[1:] if arguments is None else arguments
                 # The grammar of all commands is needed only where none is named.
-                named = [one for one in given[:1] if one in COMMANDS]
-                options = parser(named or COMMANDS).parse_args(given)
+                named = [one for one in given[:1] if _is_command(one)]
+                options = parser(named or None).parse_args(given)
+            except UnusableError as error:
+                print(f"ballplate {given[0]}: {error}", file=sys.stderr)
+                return USAGE
             except SystemExit:
                 # Help is data, too.
                 sys.stdout.flush()
@@ -120,7 +157,6 @@ def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
     from ballplate.simulator.computing.internal_error import InternalError
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
-    from ballplate.simulator.inputs.unusable import UnusableError
 
     try:
         check_outputs(options)

@@ -7,7 +7,9 @@ import shlex
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from ballplate.simulator.inputs.extensions import service
 
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
@@ -15,8 +17,6 @@ from .outputs import UsageError
 from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
-    from ballplate.extensions.requirements.goals import Goal
-
     from ..planning.checked_files import CheckedFile
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
@@ -123,9 +123,7 @@ def run(options: Namespace) -> int:
         for checked in check_files(paths, options.variant, wanted, shown.show):
             shown.step_aside()
             if is_repairing:
-                from ballplate.extensions.repair.mending_command import with_repairs
-
-                checked, status = with_repairs(checked, wanted, options)
+                checked, status = service("with_repairs")(checked, wanted, options)
                 statuses.append(status)
             files.append(checked)
             _print(checked, options)
@@ -154,17 +152,17 @@ def _name_suggestions(checked: CheckedFile, options: Namespace) -> None:
         note(options, f"next: {shlex.join(words)}")
 
 
-def _goals(options: Namespace) -> tuple[Goal, ...]:
+def _goals(options: Namespace) -> tuple[Any, ...]:
     if options.share is not None and "lengths" not in options.goal:
         raise UsageError("--share goes with --goal lengths; add it")
     if not options.goal:
         return ()
-    from ballplate.extensions.requirements.goals import GoalError, parse_goal
+    parse_goal, wrong_goal = service("parse_goal"), service("GoalError")
 
     with_share = {"lengths": options.share}
     try:
         return tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
-    except GoalError as error:
+    except wrong_goal as error:
         raise UsageError(str(error)) from None
 
 

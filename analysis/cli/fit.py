@@ -144,10 +144,10 @@ def _add_trials(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
-    from ballplate.extensions.maps.correction import left_out_words
     from ballplate.simulator.experiment.map_files import write_map
 
     from ..results.fit import Fit
+    from ..results.map_of_fit import left_out_words
     from .common import show
 
     _refuse_misused(options)

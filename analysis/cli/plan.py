@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.extensions.campaign.sheet_command import sheet_name
+from ballplate.simulator.inputs.extensions import service
 
 from .common import (
     add_file,
@@ -116,7 +116,7 @@ def add_options(parser: ArgumentParser) -> None:
         output,
         "--sheet",
         metavar="FILE",
-        type=sheet_name,
+        type=_sheet_name,
         help="write the run sheet: .html to print, .md, .csv or .txt",
     )
     output.add_argument(
@@ -168,6 +168,10 @@ def _hours(text: str) -> float:
     return value
 
 
+def _sheet_name(text: str) -> Path:
+    return Path(service("sheet_name")(text))
+
+
 @argument_type
 def _drift(text: str) -> str:
     from ..planning.drift_in_orders import drift_size
@@ -178,12 +182,12 @@ def _drift(text: str) -> str:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
-    from ballplate.extensions.campaign.earlier import begun
     from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
+    from ..planning.earlier import begun
     from .excerpts import print_errors
     from .progress import progress
 

@@ -97,11 +97,12 @@ def run(options: Namespace) -> int:
 
 
 def _write_page(options: Namespace, prediction: Prediction) -> None:
-    from ..api import page
+    from ballplate.simulator.inputs.extensions import function
+
     from .progress import progress
 
     with progress(options) as shown:
-        text = page(prediction, report=shown.show)
+        text = function("page")(prediction, report=shown.show)
     write(options, {options.report: text})
 
 

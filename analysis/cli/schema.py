@@ -6,6 +6,8 @@ import json
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
+from ballplate.simulator.inputs.extensions import module_with, names
+
 HELP = "print the JSON Schema of experiment, sweep, machine or map files"
 DESCRIPTION = (
     "Print the JSON Schema of experiment files, or of sweep, machine or map files, for editors"
@@ -15,25 +17,25 @@ DESCRIPTION = (
 
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files"
+        "files",
+        choices=(*SCHEMAS, *names("schemas")),
+        nargs="?",
+        default="experiment",
+        help="which files",
     )
     parser.set_defaults(prints_data=True)
 
 
 def run(options: Namespace) -> int:
     """Print the schema."""
-    print(json.dumps(SCHEMAS[options.files](), indent=2, ensure_ascii=False))
+    kind = options.files
+    schema = SCHEMAS[kind] if kind in SCHEMAS else module_with("schemas", kind).schema
+    print(json.dumps(schema(), indent=2, ensure_ascii=False))
     return 0
 
 
 def _experiment() -> dict[str, Any]:
     from ballplate.simulator.experiment.schema import schema
-
-    return schema()
-
-
-def _sweep() -> dict[str, Any]:
-    from ballplate.extensions.sweeps.sweep_schema import schema
 
     return schema()
 
@@ -50,4 +52,4 @@ def _map() -> dict[str, Any]:
     return map_schema()
 
 
-SCHEMAS = {"experiment": _experiment, "sweep": _sweep, "machine": _machine, "map": _map}
+SCHEMAS = {"experiment": _experiment, "machine": _machine, "map": _map}

@@ -7,12 +7,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
+from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
@@ -20,11 +21,6 @@ from ballplate.simulator.inputs.yamltree import Mark
 
 from ..results.prediction import Advice, Prediction
 from ..results.study import check
-
-if TYPE_CHECKING:
-    from ballplate.extensions.repair.repair_search import Repairs
-    from ballplate.extensions.repair.scale import ScaleCertificate
-    from ballplate.extensions.requirements.goals import Goal
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 
@@ -41,10 +37,10 @@ class CheckedDesign:
 
     prediction: Prediction
     place: Mark | None
-    repairs: Repairs | None = None
+    repairs: Any = None
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
-    certificate: ScaleCertificate | None = None
+    certificate: Any = None
     variant: str | None = None
 
     @property
@@ -63,7 +59,7 @@ class Wanted:
     where it is elsewhere.
     """
 
-    goals: tuple[Goal, ...] = ()
+    goals: tuple[Any, ...] = ()
     nothing_weak: bool = False
     repairs: bool = False
     with_modules: bool = True
@@ -150,11 +146,8 @@ def checked_design(
     prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
-        from ballplate.extensions.repair.repair_search import repairs
-        from ballplate.extensions.repair.scale import scale_certificate
-
-        found = repairs(with_pool, report=report)
-        certificate = scale_certificate(with_pool, prediction.scale)
+        found = service("repairs")(with_pool, report=report)
+        certificate = service("scale_certificate")(with_pool, prediction.scale)
     goals, missed = _judged(experiment, wanted.goals)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
@@ -177,26 +170,18 @@ def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
     lines = [*design.goals]
     data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
     if with_repairs:
-        from ballplate.extensions.repair.repair_tables import (
-            certificate_data,
-            certificate_lines,
-            repair_data,
-            repair_lines,
-        )
-
-        lines += certificate_lines(design.certificate)
-        lines += repair_lines(design.repairs, prediction.verdict)
-        data["repairs"] = repair_data(design.repairs)
-        data["scale_certificate"] = certificate_data(design.certificate)
+        lines += service("certificate_lines")(design.certificate)
+        lines += service("repair_lines")(design.repairs, prediction.verdict)
+        data["repairs"] = service("repair_data")(design.repairs)
+        data["scale_certificate"] = service("certificate_data")(design.certificate)
     advice = Advice(design.missed, tuple(lines), data)
     return replace(design, prediction=replace(prediction, advice=advice))
 
 
 def _judged(
-    experiment: Experiment, goals: Sequence[Goal]
+    experiment: Experiment, goals: Sequence[Any]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if not goals:
         return (), ()
-    from ballplate.extensions.requirements.judged_goals import judged_goals
-
-    return judged_goals(experiment, goals)
+    goals_met, missed = service("judged_goals")(experiment, goals)
+    return goals_met, missed

@@ -21,7 +21,7 @@ from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import read_readings
-from ballplate.simulator.readings.reading_sources import read_source
+from ballplate.simulator.readings.reading_sources import named_rows
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
@@ -69,18 +69,15 @@ def done_candidates(
     places = {c.name: k for k, c in enumerate(candidates) if isinstance(c.item, Position)}
     planned = {short: name for name, short in (names or {}).items()}
     known = {"position": tuple(places), "probe": tuple(experiment.probes)}
-    wrong: list[Message] = []
     settings, d = experiment.readings, experiment.dimension
     # Where decimals could be thousands, the whole is refused when it is read below.
     in_plane = any(one.reads == "in plane" for one in experiment.artefacts.values())
     empty = AXIS_NAMES[:d] if in_plane else ()
-    table = read_source(path, known, settings, wrong, lambda x: False, d, {}, empty)
-    if wrong:
-        raise ExperimentError(wrong)
+    rows = named_rows(path, known, settings, d, empty)
     messages: dict[str, Message] = {}
     found: dict[str, int] = {}
     name = ""
-    for row in table.rows:
+    for row in rows:
         name = row.texts[0]
         meant = _meant(name, planned)
         base = places.get(meant, places.get(base_name(meant)))

@@ -7,10 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.extensions.campaign.campaign_picture import draw_campaign
-from ballplate.extensions.campaign.sheet import Sheet
-from ballplate.extensions.campaign.sheet_forms import sheet_data, sheet_lines
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, finite, number
@@ -22,6 +20,7 @@ from .done import base_name
 from .drift_in_orders import DriftEffect, in_order_settings, in_time, is_of_plates
 from .experiment_file import experiment_text
 from .orders import ORDERS
+from .run_sheet_tables import sheet_data, sheet_lines
 from .schedule import RunSheet, run_sheet
 
 if TYPE_CHECKING:
@@ -95,9 +94,9 @@ class Campaign(Selection, Result):
         return self.to_print.text(form)
 
     @property
-    def to_print(self) -> Sheet:
+    def to_print(self) -> Any:
         """The run sheet with what it is printed with: the table to fill in, and the points."""
-        return Sheet(self.experiment, self.sheet)
+        return service("Sheet")(self.experiment, self.sheet)
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
@@ -194,7 +193,8 @@ class Campaign(Selection, Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else.
         """
-        return draw_campaign(self, path)
+        figure: Figure = service("draw_campaign")(self, path)
+        return figure
 
 
 def _order_table(campaign: Campaign) -> list[str]:

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing
 
-from ..rank.verdict import Verdict
+from ..rank.verdict import Verdict, changed_names
 from ..results.study import check
 from .information import Information
-
-if TYPE_CHECKING:
-    from ballplate.extensions.repair.repair_search import Repair
 
 # Names of errors, and cures, that are told.
 MOST_NAMES, MOST_CURES = 8, 2
@@ -48,15 +46,13 @@ class PoolGap:
 
     candidates: int
     verdict: Verdict
-    cures: tuple[Repair, ...]
-    partial: tuple[Repair, ...]
+    cures: tuple[Any, ...]
+    partial: tuple[Any, ...]
     sought: bool
 
     @property
     def words(self) -> str:
         """What stays open, by the names of the errors."""
-        from ballplate.extensions.repair.repair_tables import changed_names
-
         null = self.verdict.null
         names = dict.fromkeys(name for direction in null for name in changed_names(direction))
         count = "one direction" if len(null) == 1 else f"{len(null)} directions"
@@ -68,8 +64,6 @@ class PoolGap:
     @property
     def remedy(self) -> str:
         """What would determine it."""
-        from ballplate.extensions.repair.repair_tables import changes_in_words
-
         if self.verdict.as_expected:
             return "the file expects that"
         if not self.sought:
@@ -81,17 +75,15 @@ class PoolGap:
         if not cures:
             return "no change was found that would determine it"
         all_of_it = "it" if self.cures else "part of it"
-        told = "; or ".join(changes_in_words(one) for one in cures[:MOST_CURES])
+        told = "; or ".join(service("changes_in_words")(one) for one in cures[:MOST_CURES])
         return f"what would determine {all_of_it}, offered or done beside these: {told}"
 
     def to_dict(self) -> dict[str, Any]:
-        from ballplate.extensions.repair.repair_tables import changes_in_words
-
         return {
             "deficiency": self.verdict.deficiency,
             "undetermined": [str(one) for one in self.verdict.null],
-            "cures": [changes_in_words(one) for one in self.cures],
-            "partial_cures": [changes_in_words(one) for one in self.partial],
+            "cures": [service("changes_in_words")(one) for one in self.cures],
+            "partial_cures": [service("changes_in_words")(one) for one in self.partial],
             "cures_sought": self.sought,
         }
 
@@ -127,11 +119,10 @@ def pool_gap(
     if judged is None or judged.deficiency != told + sum(information.pose_open[k] for k in few):
         return None
     size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
-    is_sought = size <= MOST_WORK and not judged.as_expected
-    from ballplate.extensions.repair.repair_search import repairs
-
+    repairs = optional_service("repairs")
+    is_sought = size <= MOST_WORK and not judged.as_expected and repairs is not None
     try:
-        found = repairs(design, report=report) if is_sought else None
+        found = repairs(design, report=report) if is_sought and repairs is not None else None
     except UNTOLD:
         found = None
     cures, partial = ((), ()) if found is None else (found.complete, found.partial)

@@ -557,3 +557,18 @@ def _amount(value: float, unit: str) -> str:
         if "e+" in text and abs(amount) < 1e6
         else f"{text} {shown[unit]}"
     )
+
+
+def changed_names(direction: Direction) -> list[str]:
+    """Errors that a direction changes, or else what it changes instead."""
+    if direction.functions:
+        return [part.name for part in direction.functions]
+    artefacts, lengths = (
+        [part.name for part in direction.artefacts],
+        [part.name for part in direction.lengths],
+    )
+    return [
+        *artefacts,
+        *lengths,
+        *(part.name for part in (*direction.probes, *direction.positions)),
+    ]

@@ -12,6 +12,7 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
+from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
@@ -63,10 +64,6 @@ from .residuals import Residual, reading_residuals, residual_groups
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.extensions.certificates.plate_certificate import PlateCertificate
-    from ballplate.extensions.judgement.bootstrap import Bootstrap
-    from ballplate.extensions.judgement.components import VarianceComponents
-    from ballplate.extensions.pages.embedded import View
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
@@ -128,10 +125,10 @@ class Fit(FitResult):
     diagnosis: Diagnosis = Diagnosis()
     untested: str = ""
     estimated: EstimatedFunctions | None = None
-    variance_components: VarianceComponents | None = None
+    variance_components: Any = None
     is_reweighted: bool = False
     experiment: Experiment | None = None
-    bootstrap: Bootstrap | None = None
+    bootstrap: Any = None
     campaigns: CampaignSigmas | None = None
     before_reweighting: LackOfFit | None = None
 
@@ -321,43 +318,18 @@ class Fit(FitResult):
             raise ValueError(
                 "the fit does not know its experiment, which a page names; fit it anew"
             )
-        from ballplate.extensions.pages.fit_contents import fit_contents
-        from ballplate.extensions.pages.fit_page import fit_page
+        return str(service("fit_page_text")(self))
 
-        return fit_page(
-            fit_contents(
-                self.experiment,
-                self.observed,
-                self.solution,
-                self.to_dict(),
-                self.estimates,
-                not self.without_scatter,
-                self.untested,
-            )
-        )
-
-    def view(self) -> View:
+    def view(self) -> Any:
         """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
         or weak directions, which move; of a fit that has failed the positions alone.
         """
-        from ballplate.extensions.pages.embedded import View
-        from ballplate.extensions.pages.views import (
-            judged_pictures,
-            position_picture,
-            residual_pictures,
-        )
-
-        if self.estimated is None or not self.converged:
-            return View(self.label, self.title, (position_picture(self.design),))
-        target = None if self.experiment is None else self.experiment.target_uncertainty
-        # Without scatter residuals are mere rounding.
-        residuals = () if self.without_scatter else residual_pictures(self.observed, self.solution)
-        at = self.estimated.at
-        pictures = judged_pictures(at, self.verdict, target, self.sigma, residuals)
-        return View(self.label, self.title, pictures)
+        return service("fit_view")(self)
 
     def _repr_html_(self) -> str:
-        return self._written(as_html, ROWS_BESIDE_VIEW) + self.view()._repr_html_()
+        view = optional_service("fit_view")
+        picture = "" if view is None else view(self)._repr_html_()
+        return self._written(as_html, ROWS_BESIDE_VIEW) + picture
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
@@ -390,7 +362,7 @@ class Fit(FitResult):
         with np.errstate(invalid="ignore", divide="ignore"):
             return found / np.outer(spread, spread)
 
-    def components(self, by: Grouping = "axis") -> VarianceComponents:
+    def components(self, by: Grouping = "axis") -> Any:
         """How uncertain groups of observations are against what is stated of them, by restricted
         maximum likelihood; of a fit that is reweighted, against what has been estimated.
 
@@ -404,11 +376,9 @@ class Fit(FitResult):
         >>> [group.verdict for group in fit.components("calibration").groups]
         ['agrees with stated', 'agrees with stated']
         """
-        from ballplate.extensions.judgement.components import variance_components
-
         ensure_one_of(GROUPINGS, by=by)
         at = self.functions.at
-        return variance_components(self.label, self.title, at, self.observed.x, by)
+        return service("variance_components")(self.label, self.title, at, self.observed.x, by)
 
     def with_trials(
         self, trials: int, seed: int, workers: int = 1, report: Report = unreported
@@ -419,9 +389,7 @@ class Fit(FitResult):
         :raises ValueError: an estimate that has not converged, or errors so large that there are
             no readings of them.
         """
-        from ballplate.extensions.judgement.bootstrap import bootstrap
-
-        found = bootstrap(
+        found = service("bootstrap")(
             self.label,
             self.title,
             self.functions,
@@ -474,7 +442,7 @@ class Fit(FitResult):
         datum: str | Sequence[str] = (),
         coverage_factor: float | None = None,
         about: Mapping[str, str] | None = None,
-    ) -> PlateCertificate:
+    ) -> Any:
         """The co-ordinates of a plate's balls in its own axes with their full covariance, to be
         written as a page, tables, a digital calibration certificate or a GTC archive.
 
@@ -490,13 +458,12 @@ class Fit(FitResult):
         >>> fit.certificate(datum=("r1c1", "r5c1", "r1c5")).datum
         'origin: ball r1c1, y axis through ball r5c1, xy plane through ball r1c5'
         """
-        from ballplate.extensions.certificates.plate_certificate import plate_certificate
-
         names = (datum,) if isinstance(datum, str) else datum
         ensure_type(Iterable, 'names of balls, or "all"', datum=names)
         if coverage_factor is not None:
             ensure_positive("a coverage factor above 0", coverage_factor=coverage_factor)
-        return plate_certificate(self, plate, tuple(names), coverage_factor, about)
+        asked = plate, tuple(names), coverage_factor, about
+        return service("plate_certificate")(self, *asked)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
         """Residuals of a fit that has converged, for each position; in three dimensions as they are

@@ -17,12 +17,20 @@ from ballplate.simulator.design.influences.temperature import (
 from ballplate.simulator.design.objects import Probes
 from ballplate.simulator.experiment.model_files import absolute
 from ballplate.simulator.inputs.days import parse_day
+from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.fitted_map import FittedMap, LeftOut, MapData, determined_only
+from ballplate.simulator.maps.fitted_map import (
+    CONVERSION,
+    FittedMap,
+    LeftOut,
+    MapData,
+    determined_only,
+)
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.same_readings import fingerprint, position_fingerprints
 
+from ..presentation.formatting import number
 from .estimates import ParameterEstimate
 
 if TYPE_CHECKING:
@@ -190,3 +198,31 @@ def _by_position(stated: TemperaturesSettings, word: str, positions: Sequence[st
     own = stated.positions or {}
     of_positions = [getattr(own.get(name), word, None) for name in positions]
     return [measured.value if one is None else one for one in of_positions]
+
+
+def left_out_words(fitted: FittedMap) -> str:
+    """Which estimates of the fit a map does not apply, and what its conversion has changed."""
+    residual = fitted.conversion_residual
+    words = []
+    if residual is not None:
+        told = (
+            f"corrected points differ by up to {number(1e6 * residual, 3)} µm from those of the map"
+            " before, which U does not contain"
+            if residual
+            else "coefficients that the model before did not have are as it implies, and were not"
+            " estimated from readings"
+        )
+        words.append(f"the map was converted from another error model: {told}")
+    campaign = [one.name for one in fitted.left_out if one.kind != CONVERSION]
+    if campaign:
+        words.append(_of_campaign(campaign))
+    return "; ".join(words)
+
+
+def _of_campaign(estimated: Sequence[str]) -> str:
+    names, count = listing(estimated, 4), len(estimated)
+    return (
+        f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"
+        f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"
+        " correct for these beforehand where they matter"
+    )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import picked
@@ -35,7 +36,6 @@ from .parts import (
 )
 
 if TYPE_CHECKING:
-    from ballplate.extensions.pages.embedded import View
     from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
@@ -140,20 +140,15 @@ class Prediction(Result):
         names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
-    def view(self) -> View:
+    def view(self) -> Any:
         """The design in space: positions, ellipsoids of points and balls, and undetermined or weak
         directions, which move.
         """
-        from ballplate.extensions.pages.embedded import View
-        from ballplate.extensions.pages.views import judged_pictures
-        from ballplate.simulator.estimation.linearisation import linearise
-
-        target = None if self.experiment is None else self.experiment.target_uncertainty
-        pictures = judged_pictures(linearise(self.design), self.verdict, target)
-        return View(self.label, self.title, pictures)
+        return service("design_view")(self)
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + self.view()._repr_html_()
+        view = optional_service("design_view")
+        return super()._repr_html_() + ("" if view is None else view(self)._repr_html_())
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of U1 to U6; where these were not asked for, one with the rank and

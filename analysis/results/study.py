@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -11,6 +11,7 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.error_names import SquarenessError
 from ballplate.simulator.machines.kinematic import KinematicModel
@@ -28,7 +29,6 @@ from .influences import influence_uncertainties
 from .prediction import Prediction
 
 if TYPE_CHECKING:
-    from ballplate.extensions.judgement.components import VarianceComponents
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
     from .campaign_sigmas import CampaignSigmas
@@ -195,13 +195,9 @@ def _sigma(
     return sigma, estimated, freedom if campaigns is None else campaigns.degrees_of_freedom
 
 
-def _variance_components(
-    experiment: Experiment, at: Linearisation, x: Array, by: Grouping
-) -> VarianceComponents:
-    from ballplate.extensions.judgement.components import variance_components
-
+def _variance_components(experiment: Experiment, at: Linearisation, x: Array, by: Grouping) -> Any:
     try:
-        return variance_components(experiment.label, experiment.title, at, x, by)
+        return service("variance_components")(experiment.label, experiment.title, at, x, by)
     except ValueError as error:
         raise refused(experiment.source, str(error), "positions") from None
 

@@ -1,5 +1,6 @@
-"""Rows of readings from one table or several, plain CSV files or any other, with the names and the
-co-ordinates that the design has.
+"""Rows of readings from plain CSV files, one or several, with the names that the design has.
+
+Tables of any other form, reports, and names that differ are read by an extension.
 """
 
 from __future__ import annotations
@@ -8,35 +9,32 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from ballplate.extensions.laboratory.any_table import TableRows, read_any_table, text_of
-from ballplate.extensions.laboratory.clock_times import wrong_times
-from ballplate.extensions.laboratory.heading_words import heading, is_clock
-from ballplate.extensions.laboratory.headings import Vocabulary
-from ballplate.extensions.laboratory.name_matching import with_known_names
-from ballplate.extensions.laboratory.uncertainty_headings import headed_uncertainty
 
 from ..design.arrays import Design
 from ..experiment.readings_section import ReadingsSettings
 from ..geometry.motions import AXIS_NAMES
+from ..inputs.decoding import END_OF_FILE, refuse_long_lines, text_and_encoding
+from ..inputs.extensions import optional_service
 from ..inputs.messages import ExperimentError, Message, refused
-from ..inputs.quantities import format_length
-from ..inputs.settings import listing
 from ..inputs.tables import FileRow, header_names, header_texts, read_table
-from ..inputs.yamltree import GivenText
+from ..inputs.yamltree import GivenText, read_bytes
 from ..machines.protocol import Array
-from .coordinate_kinds import controller_offsets
 
 Source = Path | GivenText
 Units = Mapping[str, Mapping[str, Fraction]]
+ROLES = ("position", "ball", "probe")
 
-# A diameter is told that is further from others of its ball than so many times their usual
-# distance, and than this (m).
-TIMES_USUAL = 10.0
-LEAST_DEVIATION = 1e-6
-# Readings of a ball that its median diameter is of.
-ENOUGH = 3
+
+@dataclass(frozen=True)
+class SourceText:
+    """A table of readings as text: its file or name, what it says, and its encoding."""
+
+    source: Source
+    text: GivenText
+    encoding: str
 
 
 @dataclass(frozen=True)
@@ -53,6 +51,20 @@ class SourceRows:
     doubts: tuple[str, ...] = ()
 
 
+def source_text(source: Source, encoding: str | None = None) -> SourceText:
+    """The text of a table of readings.
+
+    :raises ExperimentError: it cannot be read, or is no text.
+    """
+    if isinstance(source, GivenText):
+        return SourceText(source, source, "")
+    text, found = text_and_encoding(read_bytes(source), source, encoding)
+    # A report in XML may be a single line.
+    if not text.lstrip().startswith("<"):
+        refuse_long_lines(text, source)
+    return SourceText(source, GivenText(str(source), text.rstrip(END_OF_FILE)), found)
+
+
 def source_rows(
     sources: Sequence[Source],
     design: Design,
@@ -62,56 +74,113 @@ def source_rows(
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
-    """Rows of tables of readings, or of reports of measuring programs, with the names of the design
-    as far as they can be matched.
+    """Rows of tables of readings: plain ones with the names of the design, or any others as far as
+    they can be matched.
 
     Messages about rows of plain tables are added to `messages`, so that more can be said at once.
 
     :raises ExperimentError: a table that cannot be read, or names that could be several.
     """
     _refuse_named_twice(sources)
+    tables = [source_text(source, settings.encoding) for source in sources]
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
         "probe": design.probes.names,
     }
-
-    def of_report(source: Source, text: GivenText) -> TableRows | None:
-        from ballplate.extensions.laboratory.report_sources import report_rows
-
-        return report_rows(source, text, design, settings, units)
-
-    d = design.dimension
-    tables = [
-        read_source(source, names, settings, messages, is_possible, d, units, empty, of_report)
-        for source in sources
-    ]
-    rows = [row for table in tables for row in table.rows]
-    if messages:
-        return SourceRows(tuple(rows), (), settings)
-    _refuse_wrong_times(sources, tables)
-    said: tuple[str, ...] = ()
-    if any(table.coordinates is not None for table in tables):
-        from ballplate.extensions.laboratory.report_sources import with_coordinates
-
-        settings, said = with_coordinates(settings, sources, tables)
-    diameters = [d for table in tables for d in table.diameters]
-
-    def places(own: Sequence[FileRow]) -> Array:
-        return _places(own, design, settings)
-
-    hints = tuple(hint for table in tables for hint in table.hints)
-    named, names_found = with_known_names(
-        rows, design, None if settings.coordinates == "part" else places
+    axes = AXIS_NAMES[: design.dimension]
+    rows: list[FileRow] = []
+    wrong: list[Message] = []
+    if all(_has_own_columns(one, settings, axes, units) for one in tables):
+        for one in tables:
+            rows += plain_rows(one, names, axes, wrong, units, empty)
+        known = [set(of_role) for of_role in names.values()]
+        if not wrong and all(row.texts[k] in known[k] for row in rows for k in range(len(known))):
+            return SourceRows(tuple(rows), (), settings)
+    return _any_rows("any_source_rows", tables, wrong)(
+        tables, design, settings, messages, is_possible, units, empty
     )
-    if names_found.asked:
-        asked = [rows[0].mark.message("", text) for text in names_found.asked]
-        raise ExperimentError([*asked, *hints])
-    told = [*(text for table in tables for text in table.told), *said]
-    if len(diameters) == len(rows):
-        told += _about_diameters(named, np.array(diameters))
-    doubts = tuple(names_found.doubted)
-    return SourceRows(named, (*told, *names_found.told), settings, hints, doubts)
+
+
+def named_rows(
+    source: Source,
+    names: Mapping[str, Sequence[str]],
+    settings: ReadingsSettings,
+    dimension: int,
+    empty: Collection[str] = (),
+) -> tuple[FileRow, ...]:
+    """Rows of one table with the names that it has.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    table, axes = source_text(source, settings.encoding), AXIS_NAMES[:dimension]
+    wrong: list[Message] = []
+    if _has_own_columns(table, settings, axes, {}):
+        rows = plain_rows(table, names, axes, wrong, {}, empty)
+        if not wrong:
+            return rows
+    messages: list[Message] = []
+    read = _any_rows("any_table_rows", [table], wrong)
+    found = read(table, names, settings, messages, lambda x: False, dimension, {}, empty)
+    if messages:
+        raise ExperimentError(messages)
+    return tuple(found.rows)
+
+
+def _any_rows(name: str, tables: Sequence[SourceText], wrong: Sequence[Message]) -> Any:
+    """The service of an extension that reads tables of any form.
+
+    :raises ExperimentError: it is not installed, and these tables need it.
+    """
+    found = optional_service(name)
+    if found is None:
+        text = (
+            "these columns or names are not those of a plain table; other tables need the extension"
+            " laboratory, which is not installed"
+        )
+        raise ExperimentError(wrong) if wrong else refused(tables[0].source, text)
+    return found
+
+
+def is_plain(table: SourceText, settings: ReadingsSettings, axes: Sequence[str]) -> bool:
+    """Whether a table may be a plain CSV file, of which nothing is stated."""
+    stated = (settings.columns, settings.separator, settings.decimal, settings.header)
+    is_read = table.encoding in ("", "UTF-8") and header_names(table.text) & set(axes)
+    return bool(is_read) and all(one is None for one in stated)
+
+
+def _has_own_columns(
+    table: SourceText, settings: ReadingsSettings, axes: Sequence[str], units: Units
+) -> bool:
+    """Whether a table has the columns of a plain CSV file and no others."""
+    lengths = {*axes, "u", *units}
+    return is_plain(table, settings, axes) and all(
+        text in ROLES or ("_" in text and text.rpartition("_")[0] in lengths)
+        for text in header_texts(table.text)
+    )
+
+
+def plain_rows(
+    table: SourceText,
+    names: Mapping[str, Sequence[str]],
+    axes: Sequence[str],
+    wrong: list[Message],
+    units: Units,
+    empty: Collection[str] = (),
+) -> tuple[FileRow, ...]:
+    """Rows of a plain CSV file; what is wrong with them is added to a list."""
+    # One probe need not be named.
+    defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
+    further = ["u", *units]
+    try:
+        return tuple(
+            read_table(
+                table.text, list(ROLES), axes, further, wrong, defaults, np.nan, units, empty
+            )
+        )
+    except ExperimentError as error:
+        wrong[:] = error.messages
+        return ()
 
 
 def _refuse_named_twice(sources: Sequence[Source]) -> None:
@@ -128,118 +197,3 @@ def _refuse_named_twice(sources: Sequence[Source]) -> None:
             known = "" if seen[place] == source else f", as {seen[place]} as well"
             raise refused(source, f"the file is named twice{known}; name it once")
         seen[place] = source
-
-
-def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:
-    """Refuse clock times that may be of several days, or beside other times.
-
-    :raises ExperimentError: there are such.
-    """
-    times = [time for table in tables for time in table.times]
-    for source, table in zip(sources, tables, strict=True):
-        if times and not table.times:
-            text = f"no clock times, which {times[0][0].file} has; write all times of one kind"
-            raise refused(source, text)
-    if messages := wrong_times(times):
-        raise ExperimentError(messages)
-
-
-def read_source(
-    source: Source,
-    names: Mapping[str, Sequence[str]],
-    settings: ReadingsSettings,
-    messages: list[Message],
-    is_possible: Callable[[Array], bool],
-    dimension: int,
-    units: Units,
-    empty: Collection[str] = (),
-    of_report: Callable[[Source, GivenText], TableRows | None] = lambda source, text: None,
-) -> TableRows:
-    """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns,
-    and cells of the columns `empty` may be so in plain files. What is no table may be a report.
-
-    :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
-        `messages`.
-    """
-    axes = AXIS_NAMES[:dimension]
-    text, encoding = text_of(source, settings.encoding)
-    stated = (settings.columns, settings.separator, settings.decimal, settings.header)
-    wrong: list[Message] = []
-    rows: tuple[FileRow, ...] = ()
-    heads = header_names(text)
-    clocks = {name for name, one in units.items() if is_clock("", one)}
-    looks_plain = encoding in ("", "UTF-8") and heads & set(axes)
-    # Plain tables have standard uncertainties only, and times in seconds or the like.
-    others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
-    others |= not clocks.isdisjoint(header_texts(text))
-    if looks_plain and not others and all(one is None for one in stated):
-        # One probe need not be named.
-        defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
-        texts = ["position", "ball", "probe"]
-        try:
-            rows = read_table(
-                text, texts, axes, ["u", *units], wrong, defaults, np.nan, units, empty
-            )
-        except ExperimentError as error:
-            wrong = list(error.messages)
-        if not wrong:
-            return TableRows(rows)
-    words = Vocabulary(
-        axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units, empty
-    )
-    try:
-        return read_any_table(text, encoding, words, settings, is_possible)
-    except ExperimentError:
-        if (report := of_report(source, text)) is not None:
-            return report
-        from ballplate.extensions.laboratory.other_files import what_it_is
-
-        # Who names columns knows what the file is.
-        if settings.columns is None and (other := what_it_is(text)):
-            raise refused(source, other, line=1) from None
-        if not wrong:
-            raise
-    if not rows:
-        raise ExperimentError(wrong)
-    messages += wrong
-    return TableRows(rows)
-
-
-def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings) -> Array:
-    """Places (m, d) of the balls of rows, as far as the probe is known."""
-    x = np.array([row.lengths[: design.dimension] for row in rows])
-    added = design.probes.offsets
-    if settings.coordinates == "ball centres":
-        added = added - controller_offsets(design, settings)
-    index = {name: k for k, name in enumerate(design.probes.names)}
-    probe = np.array([index.get(row.texts[2], -1) for row in rows])
-    return np.asarray(x + np.where((probe >= 0)[:, None], added[probe], 0.0))
-
-
-def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
-    """In words which diameters of balls as measured are odd; nothing where none is stated."""
-    known = np.flatnonzero(~np.isnan(diameters))
-    if not len(known):
-        return []
-    by_ball: dict[str, list[int]] = {}
-    for i in known.tolist():
-        by_ball.setdefault(rows[i].texts[1], []).append(i)
-    usual = float(np.median(diameters[known]))
-    off = np.zeros(len(rows))
-    for own in by_ball.values():
-        off[own] = diameters[own] - (np.median(diameters[own]) if len(own) >= ENOUGH else usual)
-    limit = max(TIMES_USUAL * 1.4826 * float(np.median(np.abs(off[known]))), LEAST_DEVIATION)
-    odd = known[np.abs(off[known]) > limit]
-    odd = odd[np.argsort(-np.abs(off[odd]), kind="stable")]
-    text = f"sphere diameters, {format_length(float(f'{usual:.6g}'))} in the middle, are not used"
-    if not len(odd):
-        return [f"{text}; none is odd"]
-    named = listing(
-        (
-            f"{rows[i].texts[1]} in {rows[i].texts[0]} (line {rows[i].mark.line}):"
-            f" {format_length(float(f'{diameters[i]:.6g}'))}"
-            for i in odd.tolist()
-        ),
-        5,
-    )
-    return [f"{text}; odd: {named}: check these readings for dirt, or for another feature"]

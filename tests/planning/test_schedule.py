@@ -9,9 +9,9 @@ from time import process_time
 
 import numpy as np
 import pytest
-from ballplate.extensions.campaign.sheet_words import summary
 from ballplate.planning.changeover import MOST_PLACES, Setup, changeover, cheapest
 from ballplate.planning.constraints import Budget, constraints
+from ballplate.planning.run_sheet_tables import summary
 from ballplate.planning.schedule import ordered, run_sheet
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup

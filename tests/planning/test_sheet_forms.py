@@ -19,7 +19,7 @@ from ballplate.extensions.campaign.sheet_forms import (
     sheet_markdown,
 )
 from ballplate.extensions.campaign.sheet_page import sheet_page
-from ballplate.extensions.campaign.sheet_words import summary
+from ballplate.planning.run_sheet_tables import summary
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.planning.run_sheet_tables import sheet_data, sheet_lines, summary
 from ballplate.planning.schedule import RunSheet, Step, ball_words, change_over, place_words
 from ballplate.presentation.result import Result
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment, Position
@@ -15,10 +16,9 @@ from ballplate.simulator.inputs.quantities import length_text
 from ballplate.simulator.inputs.yamltree import to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
-from .sheet_forms import sheet_csv, sheet_data, sheet_lines, sheet_markdown, sheet_text
+from .sheet_forms import sheet_csv, sheet_markdown, sheet_text
 from .sheet_head import offsets
 from .sheet_page import sheet_page
-from .sheet_words import summary
 
 FORMS = (".html", ".md", ".csv", ".txt")
 

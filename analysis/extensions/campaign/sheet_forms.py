@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import io
-from typing import Any
 
+from ballplate.planning.run_sheet_tables import price, sheet_lines, summary, times
 from ballplate.planning.schedule import RunSheet, Step
 from ballplate.presentation.formatting import aligned
 from ballplate.simulator.experiment.model import Experiment
@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 
 from .reading_lists import sequence
 from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows
-from .sheet_words import price, set_up_rows, summary, times
+from .sheet_words import set_up_rows
 
 COLUMNS = (
     "step",
@@ -34,24 +34,6 @@ COLUMNS = (
 
 # Where something is written in by hand.
 BLANK = "_" * 12
-
-
-def sheet_lines(sheet: RunSheet) -> list[str]:
-    """The run sheet as lines of text: the order, and how each position is set up."""
-    heads = ["position", "probes", "balls", "readings"]
-    rows = [["", *(["start", "min"] if sheet.timed else []), *heads]]
-    for number, step in enumerate(sheet.steps, 1):
-        cells = [step.name, ", ".join(step.probes), step.balls, str(step.readings)]
-        rows.append([str(number), *(times(step) if sheet.timed else ()), *cells])
-    right = [True, *([True, True] if sheet.timed else []), False, False, False, True]
-    lines = aligned(rows, right) if sheet.steps else []
-    lines += [
-        f"{number} {step.title}: {_words(step, sheet.timed)}"
-        for number, step in enumerate(sheet.steps, 1)
-        if not step.done
-    ]
-    lines += [f"calibration {one.name}: {price(one.seconds)}" for one in sheet.calibration]
-    return [in_one_line(line) for line in (*lines, summary(sheet))]
 
 
 def sheet_text(sheet: RunSheet, experiment: Experiment, title: str) -> str:
@@ -160,39 +142,6 @@ def _table(rows: list[list[str]]) -> list[str]:
     """A table in Markdown, its first row the headings."""
     lines = [f"| {' | '.join(map(_cell, row))} |" for row in rows]
     return [lines[0], "|" + "---|" * len(rows[0]), *lines[1:]]
-
-
-def sheet_data(sheet: RunSheet) -> dict[str, Any]:
-    """The run sheet as plain data, times in seconds."""
-    return {
-        "steps": [
-            {
-                "name": step.name,
-                "description": step.description or None,
-                "done": step.done,
-                "artefact": step.artefact,
-                "plane": step.plane or None,
-                "set_up": step.place,
-                "probes": list(step.probes),
-                "balls": step.balls,
-                "readings": step.readings,
-                "change": step.change or None,
-                "change_seconds": step.change_seconds if sheet.timed else None,
-                "seconds": step.seconds if sheet.timed else None,
-                "start": step.start if sheet.timed else None,
-            }
-            for step in sheet.steps
-        ],
-        "calibration": [{"name": one.name, "seconds": one.seconds} for one in sheet.calibration],
-        "seconds": sheet.seconds if sheet.timed else None,
-        "above_least_change_seconds": sheet.gap if sheet.timed else None,
-    }
-
-
-def _words(step: Step, timed: bool) -> str:
-    cost = f" ({price(step.change_seconds)})" if timed else ""
-    change = f"change {step.change}{cost}; " if step.change else ""
-    return f"{change}{step.place}"
 
 
 def _cell(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ballplate.planning.run_sheet_tables import price, summary, times
 from ballplate.planning.schedule import RunSheet, Step
 from ballplate.presentation.paper import escaped
 from ballplate.simulator.experiment.layout import lay_out
@@ -16,7 +17,7 @@ from .drawings import LONGEST_NAME, place_drawing
 from .reading_lists import sequence
 from .sheet_drawings import artefact_drawing, volume_drawing
 from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows
-from .sheet_words import price, set_up_rows, summary, times
+from .sheet_words import set_up_rows
 
 STYLE = """
 :root { color-scheme: light; }

@@ -11,11 +11,8 @@ from pathlib import Path
 import numpy as np
 from ballplate.simulator.experiment.readings_section import Coordinate, ReadingsSettings
 from ballplate.simulator.inputs.decoding import (
-    END_OF_FILE,
     LINE_END,
     refuse_controls,
-    refuse_long_lines,
-    text_and_encoding,
 )
 from ballplate.simulator.inputs.messages import (
     MORE_ERRORS,
@@ -36,7 +33,7 @@ from ballplate.simulator.inputs.quantities import (
 from ballplate.simulator.inputs.settings import listing, shorten
 from ballplate.simulator.inputs.spreadsheets import text_of_cell
 from ballplate.simulator.inputs.tables import MOST_ROWS, FileRow
-from ballplate.simulator.inputs.yamltree import GivenText, Mark, read_bytes
+from ballplate.simulator.inputs.yamltree import GivenText, Mark
 from ballplate.simulator.machines.protocol import Array
 
 from .above_headings import said_above
@@ -78,20 +75,6 @@ class TableRows:
     hints: tuple[Message, ...] = ()
     coordinates: Coordinate | None = None
     times: tuple[ReadTime, ...] = ()
-
-
-def text_of(source: Path | GivenText, encoding: str | None = None) -> tuple[GivenText, str]:
-    """The text of a table, and the encoding it is in.
-
-    :raises ExperimentError: it cannot be read, or is no text.
-    """
-    if isinstance(source, GivenText):
-        return source, ""
-    text, found = text_and_encoding(read_bytes(source), source, encoding)
-    # A report in XML may be a single line.
-    if not text.lstrip().startswith("<"):
-        refuse_long_lines(text, source)
-    return GivenText(str(source), text.rstrip(END_OF_FILE)), found
 
 
 def read_any_table(

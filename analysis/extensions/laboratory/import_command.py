@@ -80,8 +80,9 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Write the table of what the reports have."""
-    from ballplate.api import read_report
     from ballplate.cli.common import single
+
+    from .interface import read_report
 
     experiment = single(options) if options.files else None
     found = read_report(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -10,6 +10,7 @@ import numpy as np
 from ballplate.presentation.formatting import aligned, finite, number, picked, to_uncertainty
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom, freedom_words
+from ballplate.results.map_of_fit import left_out_words
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Flags, Tasks
 from ballplate.simulator.geometry.motions import AXIS_NAMES
@@ -23,7 +24,7 @@ from ballplate.simulator.maps.corrected_points import (
     tips,
 )
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
-from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap
+from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.maps.mapped_lengths import mapped_lengths
 from ballplate.simulator.readings.point_files import GivenPoints
 from ballplate.uncertainty.scale import stretches
@@ -333,34 +334,6 @@ OWN_SCALES = (
     "the error model cannot change the scale: lengths are those of the machine's own scales, and U"
     " does not contain how wrong these may be"
 )
-
-
-def left_out_words(fitted: FittedMap) -> str:
-    """Which estimates of the fit a map does not apply, and what its conversion has changed."""
-    residual = fitted.conversion_residual
-    words = []
-    if residual is not None:
-        told = (
-            f"corrected points differ by up to {number(1e6 * residual, 3)} µm from those of the map"
-            " before, which U does not contain"
-            if residual
-            else "coefficients that the model before did not have are as it implies, and were not"
-            " estimated from readings"
-        )
-        words.append(f"the map was converted from another error model: {told}")
-    campaign = [one.name for one in fitted.left_out if one.kind != CONVERSION]
-    if campaign:
-        words.append(_of_campaign(campaign))
-    return "; ".join(words)
-
-
-def _of_campaign(estimated: Sequence[str]) -> str:
-    names, count = listing(estimated, 4), len(estimated)
-    return (
-        f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"
-        f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"
-        " correct for these beforehand where they matter"
-    )
 
 
 def _cells(rows: Array) -> list[list[str | float]]:

@@ -16,12 +16,12 @@ from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.results.adjustments import few_degrees_of_freedom
+from ballplate.results.map_of_fit import left_out_words
 from ballplate.simulator.design.objects import Tasks
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from .correction import left_out_words
 from .fitted_errors import (
     FittedErrors,
     FittedLengths,

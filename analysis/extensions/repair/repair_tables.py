@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import finite, number
 from ballplate.rank.proposed_bars import listed
-from ballplate.rank.verdict import Direction, Verdict, length
+from ballplate.rank.verdict import Verdict, changed_names, length
 from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
 
 from .changes import KINDS
@@ -104,21 +104,6 @@ def _numbers(repair: Repair) -> str:
     if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[-1] + 1)):
         return f"undetermined {numbers[0]} to {numbers[-1]}"
     return f"undetermined {listed(list(map(str, numbers)))}"
-
-
-def changed_names(direction: Direction) -> list[str]:
-    """Errors that a direction changes, or else what it changes instead."""
-    if direction.functions:
-        return [part.name for part in direction.functions]
-    artefacts, lengths = (
-        [part.name for part in direction.artefacts],
-        [part.name for part in direction.lengths],
-    )
-    return [
-        *artefacts,
-        *lengths,
-        *(part.name for part in (*direction.probes, *direction.positions)),
-    ]
 
 
 def _tried(repairs: Repairs) -> str:

@@ -1,0 +1,147 @@
+"""Arguments of the Python functions: experiments, tables, readings and maps."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from ballplate.simulator.experiment.load import load as load_file
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.arguments import ensure_path, ensure_type
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.yamltree import GivenText
+
+PathLike = str | os.PathLike[str]
+
+if TYPE_CHECKING:
+    import pandas
+    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.simulator.readings.observed_readings import ObservedReadings
+
+    from .results.fit import Fit
+
+    # A table of readings, or several; None for those that the experiment names.
+    Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
+
+SIGMAS = ("estimated", "given")
+
+
+def load(path: PathLike, variant: str | None = None) -> Experiment:
+    """The experiment of a file, or one of its variants.
+
+    :raises ExperimentError: the file is wrong, or has several variants and none was chosen.
+
+    >>> load("designs/quickstart.yaml")
+    <Experiment quickstart: 5 x 5 ball plate in six positions>
+    >>> load("designs/npl/6.1.1.yaml", variant="B").label
+    '6.1.1[B]'
+    """
+    ensure_type(str, "the name of a variant", variant=variant)
+    found = load_all(path)
+    names = [str(one.name) for one in found]
+    if variant is not None:
+        if variant in names:
+            return found[names.index(variant)]
+        told = hint(variant, names) if found[0].name is not None else "the file has no variants"
+        raise refused(path, f'no variant "{variant}"; {told}', "variants")
+    if len(found) > 1:
+        text = (
+            "the file has several variants; choose one with variant=, or load_all:"
+            f" {', '.join(names)}"
+        )
+        raise refused(path, text, "variants")
+    return found[0]
+
+
+def load_all(path: PathLike) -> tuple[Experiment, ...]:
+    """The experiment of a file, or all of its variants in their order.
+
+    >>> [one.name for one in load_all("designs/npl/6.1.1.yaml")]
+    ['A', 'B', 'C', 'D']
+    """
+    ensure_path("path", path)
+    return load_file(path)
+
+
+def experiment_of(given: Any) -> Experiment:
+    if isinstance(given, Experiment):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return load(given)
+    what = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
+    kind = type(given).__name__
+    raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")
+
+
+def table_of(name: str, given: PathLike | pandas.DataFrame) -> Path | GivenText:
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    import pandas
+
+    if not isinstance(given, pandas.DataFrame):
+        raise TypeError(f"{name}={given!r}; give the path of a CSV file, or a data frame")
+    return GivenText(name, given.to_csv(index=False))
+
+
+def tables_of(given: Tables, experiment: Experiment) -> list[Path | GivenText]:
+    """Tables of readings, or those that the experiment names."""
+    if given is None:
+        named = experiment.readings.named_files
+        if not named:
+            raise ValueError("readings: the experiment names no files; give a table")
+        return [experiment.source.parent / name for name in named]
+    if not isinstance(given, list | tuple):
+        return [table_of("readings", given)]
+    if not given:
+        raise ValueError("readings: no table; give one at least")
+    return [table_of(f"readings[{k}]", one) for k, one in enumerate(given)]
+
+
+def observed_of(
+    experiment: Experiment | PathLike,
+    readings: Tables,
+    certificate: PathLike | pandas.DataFrame | None,
+) -> tuple[Experiment, ObservedReadings]:
+    """An experiment with its certificate, and what its readings are."""
+    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.readings.certificate_files import read_certificate
+    from ballplate.simulator.readings.reading_files import read_readings
+
+    chosen = experiment_of(experiment)
+    tables, stated = tables_of(readings, chosen), len(chosen.doubts)
+    if certificate is not None:
+        chosen = read_certificate(table_of("certificate", certificate), chosen)
+    observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
+    return chosen, replace(observed, of_certificate=chosen.doubts[stated:])
+
+
+def fit_map_or_path(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
+    """A map to be compared: the path of a file as such."""
+    from .results.fit import Fit
+    from .simulator.maps.fitted_map import FittedMap
+
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    if not isinstance(given, Fit | FittedMap):
+        raise TypeError(f"{name}={given!r}; give a fit, what its to_map() gives, or a path")
+    return given
+
+
+def map_or_path(name: str, given: Fit | FittedMap | PathLike) -> FittedMap | Path:
+    """The map of a fit, or of what its to_map() gives; the path of a file as such."""
+    from .results.fit import Fit
+
+    side = fit_map_or_path(name, given)
+    return side.to_map() if isinstance(side, Fit) else side
+
+
+def fitted_map_of(name: str, given: Fit | FittedMap | PathLike) -> FittedMap:
+    """The map of a fit, of what its to_map() gives, or of a file."""
+    found = map_or_path(name, given)
+    from ballplate.simulator.experiment.map_files import read_map
+
+    return read_map(found) if isinstance(found, Path) else found

@@ -1,0 +1,35 @@
+"""Run sheets from Python."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.arguments import (
+    PathLike,
+    experiment_of,
+)
+from ballplate.simulator.experiment.model import Experiment
+
+if TYPE_CHECKING:
+    from .sheet import Sheet
+
+
+def sheet(experiment: Experiment | PathLike) -> Sheet:
+    """What goes to the laboratory with an experiment: a run sheet, a table to fill in, and points
+    for a program.
+
+    `text()` is the run sheet, `template()` the CSV file of readings with empty cells, and
+    `points()` the nominal centres of the balls; that of a plan is its `to_print`.
+
+    >>> import ballplate as bp
+    >>> bp.sheet(bp.quickstart())
+    <Sheet of quickstart: 6 positions, 250 readings>
+    >>> bp.sheet(bp.quickstart()).template().splitlines()[:2]
+    ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
+    """
+    from ballplate.simulator.experiment.load import with_pool
+
+    from .sheet import sheet_of
+
+    found = experiment_of(experiment)
+    return sheet_of(found if found is experiment else with_pool(found))

@@ -1,0 +1,124 @@
+"""Judgement of a fit from Python: models, data left out, two campaigns, uncertainty budget."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from ballplate.arguments import (
+    SIGMAS,
+    PathLike,
+    experiment_of,
+    observed_of,
+)
+from ballplate.results.groupings import GROUPINGS, Grouping
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.arguments import (
+    ensure_one_of,
+    ensure_report,
+    ensure_whole,
+)
+
+if TYPE_CHECKING:
+    import pandas
+    from ballplate.arguments import Tables
+    from ballplate.results.budget import UncertaintyBudget
+    from ballplate.results.fit import Fit
+
+    from .cross_validation import CrossValidation
+    from .ladder_result import Ladder
+    from .left_out_result import Validation
+
+
+def ladder(
+    experiment: Experiment | PathLike,
+    readings: Tables = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    coefficients: int = 8,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    report: Report = unreported,
+) -> Ladder:
+    """Which error model readings call for: kinematic ones with up to so many `coefficients`,
+    and empirical ones, compared by what richer ones explain, and what each changes in lengths.
+
+    >>> import ballplate as bp
+    >>> readings = bp.simulate(bp.quickstart())
+    >>> bp.ladder(bp.quickstart(), readings, coefficients=6).recommended
+    'kinematic, 5 and 5 coefficients'
+    """
+    from .ladder import ladder as compared
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_whole(3, 12, coefficients=coefficients)
+    ensure_report(report)
+    chosen, observed = observed_of(experiment, readings, certificate)
+    return compared(chosen, observed, sigma, coefficients, report)
+
+
+def validate(
+    experiment: Experiment | PathLike,
+    readings: Tables = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    report: Report = unreported,
+) -> Validation:
+    """Positions, plates and directions left out in turn and predicted from the rest.
+
+    >>> import ballplate as bp
+    >>> bp.validate(bp.quickstart(), bp.simulate(bp.quickstart()))
+    <Validation of quickstart: 9 left out in turn, 0 predicted wrongly>
+    """
+    from .left_out import validate as predicted
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_report(report)
+    chosen, observed = observed_of(experiment, readings, certificate)
+    return predicted(chosen, observed, sigma, report)
+
+
+def cross_validate(
+    experiment: Experiment | PathLike,
+    readings: Tables,
+    against: Tables,
+    sigma: Literal["estimated", "given"] | None = None,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    common: bool = True,
+) -> CrossValidation:
+    """Readings of two campaigns by the same experiment compared throughout the volume, the rigid
+    motion between what they find taken out. Errors of certificates are in `common`, unless the
+    second campaign read another plate.
+
+    >>> import ballplate as bp
+    >>> twice = [bp.simulate(bp.quickstart(), seed) for seed in (1, 2)]
+    >>> bp.cross_validate(bp.quickstart(), *twice, common=False).complaint
+    ''
+    """
+    from .cross_validation import cross_validate as compared
+
+    ensure_one_of(SIGMAS, sigma=sigma)
+    chosen, first = observed_of(experiment, readings, certificate)
+    return compared(chosen, first, observed_of(chosen, against, None)[1], sigma, common)
+
+
+def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:
+    """What each source contributes to U4, U6, the body diagonals and the measuring tasks of the
+    design of an experiment, or of a fit.
+
+    `by` splits the readings by axis, probe, position or artefact; as they are by default, they are
+    one source. Contributions add in squares; the largest comes first.
+
+    >>> import ballplate as bp
+    >>> bp.budget(bp.quickstart())
+    <UncertaintyBudget of quickstart: readings 75 % of the variance of U6>
+    >>> bp.budget(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())), by="probe").sources[0]
+    'calibration[0]: distances of plate'
+    """
+    from ballplate.results.budget import budget as budget_of
+    from ballplate.results.fit import Fit
+
+    ensure_one_of(GROUPINGS, by=str(by))
+    if isinstance(given, Fit):
+        if given.experiment is None:
+            raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
+        return budget_of(given.experiment, given, by)
+    return budget_of(experiment_of(given), None, by)

@@ -1,0 +1,68 @@
+"""Reports of measuring programs from Python."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from ballplate.arguments import (
+    PathLike,
+    experiment_of,
+)
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.arguments import (
+    ensure_one_of,
+    ensure_path,
+    ensure_type,
+)
+
+if TYPE_CHECKING:
+    from .imported_result import ReadReport
+
+
+def read_report(
+    reports: PathLike | Sequence[PathLike],
+    experiment: Experiment | PathLike | None = None,
+    name: str | None = None,
+    form: str | None = None,
+    unit: Literal["mm", "cm", "m", "in"] | None = None,
+    circles: bool = False,
+) -> ReadReport:
+    """Readings out of reports that measuring programs write; their `to_frame()` is a table that
+    `fit` takes.
+
+    Positions, balls and probes are in the names of features, by a rule such as
+    {position}_{ball}_{probe}: that of `name`, or the one by which the names are those of the
+    `experiment`. `form` is dmis, pcdmis, calypso or qif, and is recognised if it is left out;
+    `unit` is that of reports which state none; `circles` takes centres of circles, too.
+
+    >>> import ballplate as bp
+    >>> bp.read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
+    ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
+    """
+    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.experiment.name_rules import check_rule
+    from ballplate.simulator.inputs.quantities import LENGTH_UNITS
+
+    from .formats.registered import FORMATS
+    from .imported import ImportSettings
+    from .imported_result import ReadReport
+    from .planned_and_imported import import_readings
+
+    paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
+    for path in paths:
+        ensure_path("reports", path)
+    if not paths:
+        raise ValueError("reports=[]; name at least one file")
+    ensure_type(str, "a rule such as {position}_{ball}", name=name)
+    ensure_one_of([one.name for one in FORMATS], form=form)
+    ensure_one_of(("mm", "cm", "m", "in"), unit=unit)
+    ensure_type(bool, "True or False", circles=circles)
+    design = None if experiment is None else lay_out(experiment_of(experiment))
+    rule = None if name is None else check_rule(name)
+    factor = None if unit is None else LENGTH_UNITS[unit]
+    settings = ImportSettings(design, rule, form, factor, circles)
+    found = import_readings([Path(path) for path in paths], settings)
+    return ReadReport(Path(paths[0]).stem, found)

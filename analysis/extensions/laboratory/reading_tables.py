@@ -1,0 +1,207 @@
+"""Rows of readings from one table or several, plain CSV files or any other, with the names and the
+co-ordinates that the design has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.tables import FileRow, header_names, header_texts
+from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.coordinate_kinds import controller_offsets
+from ballplate.simulator.readings.reading_sources import (
+    Source,
+    SourceRows,
+    SourceText,
+    Units,
+    is_plain,
+    plain_rows,
+)
+
+from .any_table import TableRows, read_any_table
+from .clock_times import wrong_times
+from .heading_words import heading, is_clock
+from .headings import Vocabulary
+from .name_matching import with_known_names
+from .uncertainty_headings import headed_uncertainty
+
+# A diameter is told that is further from others of its ball than so many times their usual
+# distance, and than this (m).
+TIMES_USUAL = 10.0
+LEAST_DEVIATION = 1e-6
+# Readings of a ball that its median diameter is of.
+ENOUGH = 3
+
+
+def any_source_rows(
+    tables_read: Sequence[SourceText],
+    design: Design,
+    settings: ReadingsSettings,
+    messages: list[Message],
+    is_possible: Callable[[Array], bool],
+    units: Units,
+    empty: Collection[str] = (),
+) -> SourceRows:
+    """Rows of tables of readings, or of reports of measuring programs, with the names of the design
+    as far as they can be matched.
+
+    Messages about rows of plain tables are added to `messages`, so that more can be said at once.
+
+    :raises ExperimentError: a table that cannot be read, or names that could be several.
+    """
+    sources = [one.source for one in tables_read]
+    names = {
+        "position": design.positions.names,
+        "ball": design.balls.names,
+        "probe": design.probes.names,
+    }
+
+    def of_report(source: Source, text: GivenText) -> TableRows | None:
+        from .report_sources import report_rows
+
+        return report_rows(source, text, design, settings, units)
+
+    d = design.dimension
+    tables = [
+        any_table_rows(one, names, settings, messages, is_possible, d, units, empty, of_report)
+        for one in tables_read
+    ]
+    rows = [row for table in tables for row in table.rows]
+    if messages:
+        return SourceRows(tuple(rows), (), settings)
+    _refuse_wrong_times(sources, tables)
+    said: tuple[str, ...] = ()
+    if any(table.coordinates is not None for table in tables):
+        from .report_sources import with_coordinates
+
+        settings, said = with_coordinates(settings, sources, tables)
+    diameters = [d for table in tables for d in table.diameters]
+
+    def places(own: Sequence[FileRow]) -> Array:
+        return _places(own, design, settings)
+
+    hints = tuple(hint for table in tables for hint in table.hints)
+    named, names_found = with_known_names(
+        rows, design, None if settings.coordinates == "part" else places
+    )
+    if names_found.asked:
+        asked = [rows[0].mark.message("", text) for text in names_found.asked]
+        raise ExperimentError([*asked, *hints])
+    told = [*(text for table in tables for text in table.told), *said]
+    if len(diameters) == len(rows):
+        told += _about_diameters(named, np.array(diameters))
+    doubts = tuple(names_found.doubted)
+    return SourceRows(named, (*told, *names_found.told), settings, hints, doubts)
+
+
+def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:
+    """Refuse clock times that may be of several days, or beside other times.
+
+    :raises ExperimentError: there are such.
+    """
+    times = [time for table in tables for time in table.times]
+    for source, table in zip(sources, tables, strict=True):
+        if times and not table.times:
+            text = f"no clock times, which {times[0][0].file} has; write all times of one kind"
+            raise refused(source, text)
+    if messages := wrong_times(times):
+        raise ExperimentError(messages)
+
+
+def any_table_rows(
+    table: SourceText,
+    names: Mapping[str, Sequence[str]],
+    settings: ReadingsSettings,
+    messages: list[Message],
+    is_possible: Callable[[Array], bool],
+    dimension: int,
+    units: Units,
+    empty: Collection[str] = (),
+    of_report: Callable[[Source, GivenText], TableRows | None] = lambda source, text: None,
+) -> TableRows:
+    """Rows of one table: of a plain CSV file where it is one; `units` are those of further columns,
+    and cells of the columns `empty` may be so in plain files. What is no table may be a report.
+
+    :raises ExperimentError: it cannot be read; messages about rows of a plain one are added to
+        `messages`.
+    """
+    axes = AXIS_NAMES[:dimension]
+    source, text, encoding = table.source, table.text, table.encoding
+    heads = header_names(text)
+    clocks = {name for name, one in units.items() if is_clock("", one)}
+    # Plain tables have standard uncertainties only, and times in seconds or the like.
+    others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
+    others |= not clocks.isdisjoint(header_texts(text))
+    wrong: list[Message] = []
+    rows: tuple[FileRow, ...] = ()
+    if is_plain(table, settings, axes) and not others:
+        rows = plain_rows(table, names, axes, wrong, units, empty)
+        if not wrong:
+            return TableRows(rows)
+    words = Vocabulary(
+        axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units, empty
+    )
+    try:
+        return read_any_table(text, encoding, words, settings, is_possible)
+    except ExperimentError:
+        if (report := of_report(source, text)) is not None:
+            return report
+        from .other_files import what_it_is
+
+        # Who names columns knows what the file is.
+        if settings.columns is None and (other := what_it_is(text)):
+            raise refused(source, other, line=1) from None
+        if not wrong:
+            raise
+    if not rows:
+        raise ExperimentError(wrong)
+    messages += wrong
+    return TableRows(rows)
+
+
+def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings) -> Array:
+    """Places (m, d) of the balls of rows, as far as the probe is known."""
+    x = np.array([row.lengths[: design.dimension] for row in rows])
+    added = design.probes.offsets
+    if settings.coordinates == "ball centres":
+        added = added - controller_offsets(design, settings)
+    index = {name: k for k, name in enumerate(design.probes.names)}
+    probe = np.array([index.get(row.texts[2], -1) for row in rows])
+    return np.asarray(x + np.where((probe >= 0)[:, None], added[probe], 0.0))
+
+
+def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
+    """In words which diameters of balls as measured are odd; nothing where none is stated."""
+    known = np.flatnonzero(~np.isnan(diameters))
+    if not len(known):
+        return []
+    by_ball: dict[str, list[int]] = {}
+    for i in known.tolist():
+        by_ball.setdefault(rows[i].texts[1], []).append(i)
+    usual = float(np.median(diameters[known]))
+    off = np.zeros(len(rows))
+    for own in by_ball.values():
+        off[own] = diameters[own] - (np.median(diameters[own]) if len(own) >= ENOUGH else usual)
+    limit = max(TIMES_USUAL * 1.4826 * float(np.median(np.abs(off[known]))), LEAST_DEVIATION)
+    odd = known[np.abs(off[known]) > limit]
+    odd = odd[np.argsort(-np.abs(off[odd]), kind="stable")]
+    text = f"sphere diameters, {format_length(float(f'{usual:.6g}'))} in the middle, are not used"
+    if not len(odd):
+        return [f"{text}; none is odd"]
+    named = listing(
+        (
+            f"{rows[i].texts[1]} in {rows[i].texts[0]} (line {rows[i].mark.line}):"
+            f" {format_length(float(f'{diameters[i]:.6g}'))}"
+            for i in odd.tolist()
+        ),
+        5,
+    )
+    return [f"{text}; odd: {named}: check these readings for dirt, or for another feature"]

@@ -1,0 +1,359 @@
+"""Error maps from Python: corrected points, curves, lengths, differences, adjustments."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ballplate.arguments import (
+    PathLike,
+    experiment_of,
+    fit_map_or_path,
+    fitted_map_of,
+    map_or_path,
+    table_of,
+)
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.arguments import (
+    ensure_one_of,
+    ensure_positive,
+    ensure_report,
+    ensure_type,
+    ensure_whole,
+)
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.yamltree import GivenText
+
+if TYPE_CHECKING:
+    import pandas
+    from ballplate.results.fit import Fit
+    from ballplate.simulator.machines.protocol import Array
+    from ballplate.simulator.maps.fitted_map import FittedMap
+
+    from .adjusted_machine import AdjustedMachine
+    from .converted_map import ConvertedMap
+    from .correction import Correction
+    from .error_curves_result import ErrorCurves
+    from .fitted_errors_result import FittedErrorMap
+    from .length_tables import LengthMap
+    from .map_difference import MapDifference
+    from .map_places import Line
+    from .volumetric_results import MachineErrors
+
+
+def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
+    """The map of a fit in another error model: a kind such as "empirical", settings such as "{kind:
+    kinematic, position_coefficients: 3}", or the path of an experiment file whose model is taken.
+
+    Its `map` is the new one, with its covariance.
+
+    >>> import ballplate as bp
+    >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
+    >>> bp.convert(fitted, "{kind: empirical, coefficients: 5}")
+    <ConvertedMap of map: empirical, 195 parameters, the same corrections>
+    """
+    from .any_map import map_of_source
+    from .converted_map import convert as converted
+
+    ensure_type(str, 'an error model such as "empirical"', to=to)
+    found, label = map_of_source(map_or_path("fitted", fitted))
+    return converted(found, to, label)
+
+
+def diff(
+    first: Fit | FittedMap | PathLike,
+    second: Fit | FittedMap | PathLike,
+    *,
+    points: PathLike | Sequence[Sequence[float]] | None = None,
+    grid: int = 4,
+    probe: str | None = None,
+    coverage_factor: float = 2.0,
+    shared: Literal["certificate"] | None = None,
+    stated: str | None = None,
+    dates: tuple[str | None, str | None] = (None, None),
+) -> MapDifference:
+    """What the second of two maps says less what the first does: lengths, errors at points after
+    the free motion of the frame is taken out, error functions, and balls of plates of two fits.
+
+    Each is a fit, what `to_map()` of one gives, or the path of a map file, of a machine file (an
+    expected map, with the expanded uncertainty `stated` of lengths, such as "0.5 um + L/1000000"),
+    or of an experiment file that names its readings. `points` (n, d) are in metres, or a CSV file
+    with x_mm, y_mm and z_mm; without any a `grid` of so many along each axis is taken. With
+    `shared` both fits rest on the same certificate, whose errors cancel. `dates` are days of the
+    campaigns, such as "2026-11-22".
+
+    :raises ValueError: the maps do not go together, or share no certificate.
+
+    >>> import ballplate as bp
+    >>> campaigns = [bp.fit(bp.quickstart(), bp.simulate(bp.quickstart(), seed)) for seed in (1, 2)]
+    >>> bp.diff(*campaigns)
+    <MapDifference of second less first: no change is shown (p = 0.53)>
+    """
+    import numpy as np
+    from ballplate.simulator.inputs.days import stated_day
+    from ballplate.simulator.inputs.quantities import Target, parse_length_function
+
+    from .comparison import ComparisonSettings
+    from .sources import map_difference
+
+    ensure_whole(2, 5, grid=grid)
+    ensure_positive("a number above 0, such as 2", 100.0, coverage_factor=coverage_factor)
+    ensure_one_of(("certificate",), shared=shared)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
+    if isinstance(dates, str) or len(dates) != 2:
+        raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
+    days = tuple(None if one is None else stated_day(one) for one in dates)
+    known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
+    is_file = isinstance(points, str | os.PathLike)
+    places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
+    if isinstance(places, np.ndarray) and places.ndim != 2:
+        raise ValueError("points: give a list of points, each with its co-ordinates in metres")
+    sides = [fit_map_or_path(name, one) for name, one in (("first", first), ("second", second))]
+    return map_difference(
+        (sides[0], sides[1]),
+        ComparisonSettings(coverage_factor, grid, places, probe),
+        shared is not None,
+        None if known is None else known.standard,
+        (days[0], days[1]),
+    )
+
+
+def lengths(
+    experiment: Experiment | PathLike,
+    target: str | None = None,
+    grid: int | Sequence[int] = 6,
+    probe: str | None = None,
+    coverage_factor: float | None = None,
+    with_repeatability: bool = False,
+    report: Report = unreported,
+) -> LengthMap:
+    """Uncertainties of all lengths between points of a grid over the volume, against a target.
+
+    `target` replaces that of the experiment, as a text with a unit; `grid` has the number of points
+    along every axis, or along each. With `with_repeatability` the scatter of the two readings of a
+    length counts, too.
+
+    >>> import ballplate as bp
+    >>> bp.lengths(bp.quickstart(), "1 um + L/1000000", grid=3).is_met
+    True
+    """
+    from .length_map import length_map, length_settings
+
+    ensure_type(str, 'a text with a unit, such as "0.5 um + L/1000000"', target=target)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(bool, "True or False", with_repeatability=with_repeatability)
+    ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
+    ensure_report(report)
+    counts = _several("grid", grid)
+    ensure_whole(2, **{f"grid[{k}]": count for k, count in enumerate(counts)})
+    chosen = experiment_of(experiment)
+    settings = length_settings(chosen, target, counts, probe, coverage_factor, with_repeatability)
+    return length_map(chosen, settings, report)
+
+
+def map(
+    machine: PathLike | Fit | FittedMap,
+    grid: Sequence[int] | None = None,
+    line: str | Line | None = None,
+    error: str | None = None,
+    points: int | PathLike | pandas.DataFrame | Sequence[Sequence[float]] | None = None,
+    *,
+    plane: str | Mapping[str, float] | None = None,
+    probe: str | None = None,
+    draw: int | None = None,
+    seed: int = 1,
+    budget: bool = False,
+    tasks: Experiment | PathLike | None = None,
+) -> MachineErrors | FittedErrorMap | ErrorCurves:
+    """Volumetric errors of a machine file, or of the map that a fit left behind, with expanded
+    uncertainties: on a grid over the volume, in a plane, along a line of so many points, at given
+    points, or one parametric error along its axis.
+
+    `line` is a text as in `ballplate map --line`, the places in metres of the two fixed
+    axes, or two points; `plane` the place of the axis across it. `points` is their number along a
+    line; or a table of points, as for the command; or their co-ordinates (m, d) in metres. Of a map
+    `probe` is the name of the probe, and the lengths of the measuring `tasks` of an experiment are
+    told, too. With `draw`, so many realisations of the random part, or of
+    what the covariance of a map leaves open, are drawn from a `seed`. With `budget` the result
+    shows what each parametric error contributes, which its `budget` has in any case.
+
+    >>> import ballplate as bp
+    >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
+    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
+    >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
+    >>> bp.map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
+    array([[2.2e-07, 1.9e-07, 1.7e-07]])
+    """
+    import numpy as np
+
+    from .any_map import map_errors
+    from .map_places import PlacesAsked, parse_places, parse_plane
+    from .realisations import MOST_DRAWS, Draws
+    from .volumetric_errors import MOST_POINTS
+
+    source = map_or_path("machine", machine)
+    ensure_type(str, "the name of a parametric error, such as EXX", error=error)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(bool, "True or False", budget=budget)
+    ensure_whole(1, MOST_DRAWS, draw=draw)
+    ensure_whole(0, seed=seed)
+    counts = None
+    if grid is not None:
+        counts = _several("grid", grid)
+        if len(counts) not in (2, 3):
+            raise ValueError(f"grid={grid!r}; give three numbers of points, such as (5, 5, 5)")
+        ensure_whole(2, MOST_POINTS, **{f"grid[{k}]": count for k, count in enumerate(counts)})
+        if (count := math.prod(counts)) > MOST_POINTS:
+            raise ValueError(f"{count} points are too many; at most {MOST_POINTS} are possible")
+    number: int | None = None
+    at: Path | GivenText | Array | None = None
+    if isinstance(points, int) or points is None:
+        ensure_whole(2, MOST_POINTS, points=points)
+        number = points
+    elif isinstance(points, str | os.PathLike) or hasattr(points, "to_csv"):
+        at = table_of("points", points)
+    else:
+        at = given = np.asarray(points, float)
+        if given.ndim != 2 or not np.isfinite(given).all():
+            raise ValueError(f"points of shape {given.shape}; give finite numbers in metres (m, d)")
+    asked = PlacesAsked(
+        counts,
+        parse_places(line) if isinstance(line, str) else line,
+        parse_plane(plane) if isinstance(plane, str) else plane,
+        number,
+        at,
+    )
+    draws = None if draw is None else Draws(draw, seed)
+    chosen = () if tasks is None else (experiment_of(tasks),)
+    return map_errors(source, asked, error, probe, draws, budget, chosen)
+
+
+def curves(
+    fitted: Fit | FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
+) -> ErrorCurves:
+    """The error functions of a map at so many positions along each line, or some of them, with
+    their expanded uncertainties; squareness errors as angles, and other numbers of its model.
+
+    `fitted` is a fit, what its `to_map()` gives, or the path of a map file.
+
+    >>> import ballplate as bp
+    >>> bp.curves(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map())
+    <ErrorCurves of map: 18 error functions, 3 squareness errors>
+    """
+    from .any_map import map_of_source
+    from .error_curves_result import error_curves
+
+    ensure_whole(2, 10_000, points=points)
+    names = (errors,) if isinstance(errors, str) else tuple(errors)
+    for name in names:
+        ensure_type(str, "the name of a parametric error, such as EXX", errors=name)
+    return error_curves(*map_of_source(map_or_path("fitted", fitted)), names, points)
+
+
+def adjust(
+    fitted: Fit | FittedMap | PathLike,
+    scale: str | Iterable[str] = (),
+    turn: str | Iterable[str] = (),
+    after: Fit | FittedMap | PathLike | None = None,
+    share: float = 0.0,
+) -> AdjustedMachine:
+    """What adjustments leave of a fitted machine's errors, and what a campaign `after` them says;
+    both are fits, maps, or files of maps.
+
+    Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
+    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". The standard uncertainty of each is
+    the `share` of it.
+
+    :raises ValueError: a text that is no change, or a change that the error model cannot follow.
+
+    >>> import ballplate as bp
+    >>> machine = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
+    >>> bp.adjust(machine, scale="x=20 um/m")
+    <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
+    """
+    from .adjusted_machine import adjusted_machine
+    from .machine_changes import guideway_turn, scale_change
+
+    first = fitted_map_of("fitted", fitted)
+    second = None if after is None else fitted_map_of("after", after)
+    if not 0.0 <= share <= 1.0:
+        raise ValueError(f"share={share!r}; give a part of each change, from 0 to 1")
+    changes = [scale_change(text) for text in _texts("scale", scale)]
+    changes += [guideway_turn(text) for text in _texts("turn", turn)]
+    return adjusted_machine(first.title, first, changes, second, share)
+
+
+def correct(
+    fitted: Fit | FittedMap | PathLike,
+    points: Any,
+    probe: str | Sequence[str] | None = None,
+    lengths: Sequence[Sequence[str | int]] = (),
+    coordinates: Literal["scale readings", "ball centres"] = "scale readings",
+    coverage_factor: float | None = None,
+    with_repeatability: bool = False,
+) -> Correction:
+    """Points corrected by a fit, its map, or the file of that, with their uncertainty.
+
+    `points` are an array (n, d) in metres, or a table as `ballplate correct` reads it, with a
+    `probe` for those that name none; without any it is that of the map. They are `coordinates`
+    of the scales, or of centres of balls, which have the stated offset of the probe added.
+    `lengths` are pairs of names or of indices. The coverage factor is that of the map, or the one
+    given; `with_repeatability` the scatter of the readings that are corrected counts, too.
+
+    >>> import ballplate as bp
+    >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+    >>> ends = [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]
+    >>> bp.correct(fitted, ends)
+    <Correction of quickstart: 2 points; U = 2 u = 0.4325 µm at most>
+    >>> found = bp.correct(fitted, ends, lengths=[(0, 1)])
+    >>> found.points.shape, found.blocks.shape, found.covariance().shape
+    ((2, 3), (2, 3, 3), (6, 6))
+    >>> f"{1e6 * found.lengths[0].standard_uncertainty:.3f} µm"
+    '0.080 µm'
+    """
+    import pandas
+    from ballplate.results.wanted_lengths import between_named
+    from ballplate.simulator.readings import point_files
+
+    from .correction import correction
+
+    ensure_one_of(("scale readings", "ball centres"), coordinates=coordinates)
+    ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
+    ensure_type(bool, "True or False", with_repeatability=with_repeatability)
+    chosen = fitted_map_of("fitted", fitted)
+    names = chosen.probes.names
+    offsets = chosen.drawn_offsets if coordinates == "ball centres" else None
+    if isinstance(points, str | os.PathLike | pandas.DataFrame):
+        one = chosen.probe if probe is None else probe
+        if one not in names:
+            raise ValueError(f"no probe {one!r}; {hint(str(one), names)}")
+        table = table_of("points", points)
+        given = point_files.read_points(table, names, str(one), chosen.volume, offsets)
+    else:
+        x = point_files.ensure_points(points, chosen.volume)
+        asked = chosen.probe if probe is None else probe
+        probes = point_files.probe_places(asked, names, len(x))
+        x = x if offsets is None else x - offsets[probes]
+        given = point_files.GivenPoints(x, ("",) * len(x), probes)
+    wanted = between_named(given, lengths)
+    return correction(chosen, given, wanted, coverage_factor, with_repeatability)
+
+
+def _several(name: str, given: Any) -> tuple[int, ...]:
+    if isinstance(given, Iterable) and type(given) is not str:
+        return tuple(given)
+    ensure_whole(2, None, **{name: given})
+    return (given,)
+
+
+def _texts(name: str, given: str | Iterable[str]) -> tuple[str, ...]:
+    """One text or several."""
+    found = (given,) if isinstance(given, str) else tuple(given)
+    for text in found:
+        ensure_type(str, 'a text such as "x=22 um/m"', **{name: text})
+    return found

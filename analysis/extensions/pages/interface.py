@@ -1,0 +1,106 @@
+"""Views and pages of designs and fits from Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.arguments import (
+    PathLike,
+    experiment_of,
+)
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.arguments import (
+    ensure_path,
+    ensure_report,
+    ensure_type,
+)
+
+if TYPE_CHECKING:
+    from ballplate.extensions.sweeps.running import SweepResult
+    from ballplate.results.fit import Fit
+    from ballplate.results.prediction import Prediction
+
+    from .embedded import View
+
+
+def view(given: Experiment | PathLike | Prediction | Fit) -> View:
+    """A design in space: positions of plates, balls and probes of an experiment; of a prediction or
+    a fit also ellipsoids of uncertainty, residuals, and what undetermined directions move.
+
+    A notebook shows it, to be turned by mouse, buttons or keyboard, and shows it below experiments,
+    predictions and fits by itself. `save(path)` of the result writes a page, or the picture alone.
+
+    >>> import ballplate as bp
+    >>> bp.view(bp.quickstart())
+    <View of quickstart: positions>
+    >>> bp.view(bp.run(bp.quickstart()))
+    <View of quickstart: positions, points, balls of plate>
+    """
+    from ballplate.results.fit import Fit
+    from ballplate.results.prediction import Prediction
+
+    if isinstance(given, Fit | Prediction):
+        return given.view()
+    from ballplate.simulator.experiment.layout import lay_out
+
+    from .embedded import View
+    from .views import position_picture
+
+    chosen = experiment_of(given)
+    return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
+
+
+def page(
+    given: Experiment | PathLike | Prediction | Fit | SweepResult,
+    path: PathLike | None = None,
+    run_modules: bool = False,
+    compare: PathLike | None = None,
+    report: Report = unreported,
+) -> str:
+    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and `report`
+    write: HTML that needs no other file and no network. With a path it is written as well.
+
+    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
+    drawings of designs whose error models are in Python need `run_modules`, and the store of
+    another one to `compare` with is set beside it.
+
+    :raises ValueError: a fit or a prediction that does not know its experiment; sweeps that cannot
+        be compared.
+    :raises ImportError: what pages of sweeps need is not installed.
+    :raises OSError: the file cannot be written.
+
+    >>> import ballplate as bp
+    >>> bp.page(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))).splitlines()[0]
+    '<!DOCTYPE html>'
+    """
+    from ballplate.extensions.sweeps.running import SweepResult
+    from ballplate.presentation.files import write_file
+    from ballplate.results.fit import Fit
+    from ballplate.results.prediction import Prediction
+    from ballplate.results.study import predict
+
+    ensure_type(bool, "True or False", run_modules=run_modules)
+    ensure_report(report)
+    if path is not None:
+        ensure_path("path", path)
+    if (run_modules or compare is not None) and not isinstance(given, SweepResult):
+        raise ValueError("run_modules and compare go with sweeps only; leave them out")
+    if isinstance(given, Fit):
+        text = given.page()
+    elif isinstance(given, SweepResult):
+        from ballplate.extensions.sweeps.stores import sweep_report
+
+        text = sweep_report(given.store, given.number, "html", run_modules, report, compare)
+    else:
+        from ballplate.extensions.sweeps.report.design_contents import page_of_design
+
+        predicted = given if isinstance(given, Prediction) and given.quantities else None
+        chosen = given.experiment if isinstance(given, Prediction) else experiment_of(given)
+        if chosen is None:
+            raise ValueError("the prediction does not know its experiment; predict it anew")
+        text = page_of_design(chosen, predicted or predict(chosen, with_scale=True), report)
+    if path is not None:
+        write_file(Path(path), text.encode("utf-8", "replace"))
+    return text

@@ -1,0 +1,51 @@
+"""Views and pages of predictions and fits, as the kernel asks for them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.estimation.linearisation import linearise
+
+from .embedded import View
+from .fit_contents import fit_contents
+from .fit_page import fit_page
+from .views import judged_pictures, position_picture, residual_pictures
+
+if TYPE_CHECKING:
+    from ballplate.results.fit import Fit
+    from ballplate.results.prediction import Prediction
+
+
+def design_view(prediction: Prediction) -> View:
+    """A design in space, with what its prediction knows."""
+    stated = prediction.experiment
+    target = None if stated is None else stated.target_uncertainty
+    pictures = judged_pictures(linearise(prediction.design), prediction.verdict, target)
+    return View(prediction.label, prediction.title, pictures)
+
+
+def fit_view(fit: Fit) -> View:
+    """A fit in space; of one that has failed the positions alone."""
+    if fit.estimated is None or not fit.converged:
+        return View(fit.label, fit.title, (position_picture(fit.design),))
+    target = None if fit.experiment is None else fit.experiment.target_uncertainty
+    # Without scatter residuals are mere rounding.
+    residuals = () if fit.without_scatter else residual_pictures(fit.observed, fit.solution)
+    at = fit.estimated.at
+    pictures = judged_pictures(at, fit.verdict, target, fit.sigma, residuals)
+    return View(fit.label, fit.title, pictures)
+
+
+def fit_page_text(fit: Fit) -> str:
+    """The page of a fit that knows its experiment."""
+    assert fit.experiment is not None
+    contents = fit_contents(
+        fit.experiment,
+        fit.observed,
+        fit.solution,
+        fit.to_dict(),
+        fit.estimates,
+        not fit.without_scatter,
+        fit.untested,
+    )
+    return fit_page(contents)

@@ -1,0 +1,49 @@
+"""Repairs from Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ballplate.arguments import (
+    PathLike,
+    load,
+    load_all,
+)
+from ballplate.simulator.inputs.arguments import (
+    ensure_path,
+)
+from ballplate.simulator.inputs.yamltree import read_text
+
+
+def repair(path: PathLike, variant: str | None = None) -> str:
+    """The text of an experiment file after the first changes of `check --suggest` that determine
+    everything, of one variant or of each; the rest of it is as it was, line ends included.
+
+    The text of a file that leaves nothing undetermined is returned as it is. Nothing is written.
+
+    :raises ExperimentError: the file is wrong; no changes were found, or they cannot be written
+        without changing the rest of the file.
+
+    >>> import ballplate as bp
+    >>> line = "    positions[z low].quarter_turns: 1"
+    >>> line in bp.repair("designs/npl/6.1.1.yaml", variant="B").splitlines()
+    True
+    """
+    from ballplate.results import study
+    from ballplate.simulator.experiment.load import with_pool
+
+    from .mending import mended, to_write
+    from .repair_search import repairs
+
+    ensure_path("path", path)
+    text = read_text(Path(path))
+    for one in load_all(path) if variant is None else [load(path, variant)]:
+        judged = study.check(one).verdict
+        if not judged.deficiency:
+            continue
+        found = to_write(repairs(with_pool(one)), judged)
+        if found is None:
+            words = "no changes were found that determine everything"
+            raise one.refused((), words)
+        text = mended(text, Path(path), one.name, found, one.trust)
+    return text

@@ -1,0 +1,98 @@
+"""The run sheet of a plan as lines of text and as plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.quantities import format_duration
+from ballplate.simulator.inputs.settings import number_of
+
+from ..presentation.formatting import aligned
+from .constraints import SLACK
+from .schedule import RunSheet, Step
+
+
+def sheet_lines(sheet: RunSheet) -> list[str]:
+    """The run sheet as lines of text: the order, and how each position is set up."""
+    heads = ["position", "probes", "balls", "readings"]
+    rows = [["", *(["start", "min"] if sheet.timed else []), *heads]]
+    for number, step in enumerate(sheet.steps, 1):
+        cells = [step.name, ", ".join(step.probes), step.balls, str(step.readings)]
+        rows.append([str(number), *(times(step) if sheet.timed else ()), *cells])
+    right = [True, *([True, True] if sheet.timed else []), False, False, False, True]
+    lines = aligned(rows, right) if sheet.steps else []
+    lines += [
+        f"{number} {step.title}: {_words(step, sheet.timed)}"
+        for number, step in enumerate(sheet.steps, 1)
+        if not step.done
+    ]
+    lines += [f"calibration {one.name}: {price(one.seconds)}" for one in sheet.calibration]
+    return [in_one_line(line) for line in (*lines, summary(sheet))]
+
+
+def sheet_data(sheet: RunSheet) -> dict[str, Any]:
+    """The run sheet as plain data, times in seconds."""
+    return {
+        "steps": [
+            {
+                "name": step.name,
+                "description": step.description or None,
+                "done": step.done,
+                "artefact": step.artefact,
+                "plane": step.plane or None,
+                "set_up": step.place,
+                "probes": list(step.probes),
+                "balls": step.balls,
+                "readings": step.readings,
+                "change": step.change or None,
+                "change_seconds": step.change_seconds if sheet.timed else None,
+                "seconds": step.seconds if sheet.timed else None,
+                "start": step.start if sheet.timed else None,
+            }
+            for step in sheet.steps
+        ],
+        "calibration": [{"name": one.name, "seconds": one.seconds} for one in sheet.calibration],
+        "seconds": sheet.seconds if sheet.timed else None,
+        "above_least_change_seconds": sheet.gap if sheet.timed else None,
+    }
+
+
+def summary(sheet: RunSheet) -> str:
+    """What there is to do, in a sentence."""
+    todo = [step for step in sheet.steps if not step.done]
+    done = len(sheet.steps) - len(todo)
+    words = [
+        number_of(len(todo), "position"),
+        number_of(sum(step.readings for step in todo), "reading"),
+    ]
+    words += (
+        [number_of(len(sheet.calibration), "item") + " of calibration"] if sheet.calibration else []
+    )
+    text = ", ".join(words)
+    if sheet.timed:
+        text += f": {sheet.hours:.2f} h"
+        change = sum(step.change_seconds for step in todo)
+        text += f", including change-over {change / 3600.0:.2f} h" if change else ""
+        more = f" (at most {sheet.gap / 60.0:.1f} min more than the least of any order)"
+        text += more if sheet.gap > SLACK else ""
+    return f"{text}; {number_of(done, 'position')} done before" if done else text
+
+
+def times(step: Step) -> tuple[str, str]:
+    """When a step begins, in hours and minutes, and how many minutes it takes."""
+    if step.done:
+        return "done", ""
+    hours, minutes = divmod(round(step.start / 60.0), 60)
+    return f"{hours}:{minutes:02d}", f"{(step.seconds + step.change_seconds) / 60.0:.0f}"
+
+
+def price(seconds: float) -> str:
+    """A time as a file says it."""
+    return format_duration(round(seconds, 3))
+
+
+def _words(step: Step, timed: bool) -> str:
+    cost = f" ({price(step.change_seconds)})" if timed else ""
+    change = f"change {step.change}{cost}; " if step.change else ""
+    return f"{change}{step.place}"
