@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 import ballplate as bp
-from ballplate.extensions.sweeps.report.design_contents import page_of_design
+from ballplate.extensions.pages.design_contents import page_of_design
 from PIL import Image
 
 from tests.studio import pictures as of_studio

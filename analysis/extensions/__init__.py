@@ -104,6 +104,7 @@ SHIPPED = (
             **_from("running", "OtherSweepError"),
             **_from("store_file", "StoreError"),
         },
+        services=_from("running", "SweepResult"),
         schemas={"sweep": "sweep_schema"},
     ),
     _here("studio", commands={"studio": "studio_command"}),

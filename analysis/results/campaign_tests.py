@@ -17,6 +17,14 @@ import numpy as np
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.machines.protocol import Array
 
+# Differences that are so small by no larger chance than this are doubted.
+TOO_RARE = 1e-3
+TOO_ALIKE = (
+    "two independent campaigns are as alike as these are less than once in"
+    f" {round(1.0 / TOO_RARE)}: readings or a certificate may be the same in both, or uncertainties"
+    " are stated too large"
+)
+
 # Standard uncertainties below this part of the largest of a group are rounding: the frame, or the
 # plate's axes, hold the figure.
 HELD = 1e-9

@@ -14,12 +14,10 @@ from ballplate.extensions.campaign.drawings import MARGIN, SIZE, place_drawing
 from ballplate.extensions.campaign.sheet_forms import (
     COLUMNS,
     sheet_csv,
-    sheet_data,
-    sheet_lines,
     sheet_markdown,
 )
 from ballplate.extensions.campaign.sheet_page import sheet_page
-from ballplate.planning.run_sheet_tables import summary
+from ballplate.planning.run_sheet_tables import sheet_data, sheet_lines, summary
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.laboratory.any_table import TableRows
+from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.reading_sources import read_source
+from ballplate.simulator.readings.reading_sources import source_text
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -54,7 +55,9 @@ def read(
     def is_possible(x: np.ndarray) -> bool:
         return not design.machine.volume.far_outside(x).any()
 
-    found = read_source(source, names, stated, wrong, is_possible, 3, {})  # type: ignore[arg-type]
+    found = any_table_rows(
+        source_text(source, stated.encoding), names, stated, wrong, is_possible, 3, {}
+    )  # type: ignore[arg-type]
     if wrong:
         raise ExperimentError(wrong)  # type: ignore[arg-type]
     return found

@@ -10,13 +10,14 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
+from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.digits import doubts_about_units
-from ballplate.simulator.readings.reading_sources import read_source
+from ballplate.simulator.readings.reading_sources import source_text
 
 DESIGN = Path("designs/quickstart.yaml")
 
@@ -41,8 +42,14 @@ def uncertainties(
     lines += [f"z low,r1c{k},down,{100 * k}.1,200.25,250.125,{cells}" for k in (1, 2)]
     text = "\n".join(lines).replace(",", separator) + "\n"
     settings = experiment.with_readings(said).readings
-    found = read_source(
-        GivenText("t.csv", text), names, settings, [], lambda x: bool(np.isfinite(x).all()), 3, {}
+    found = any_table_rows(
+        source_text(GivenText("t.csv", text)),
+        names,
+        settings,
+        [],
+        lambda x: bool(np.isfinite(x).all()),
+        3,
+        {},
     )
     return [row.lengths[3] for row in found.rows], " ".join(found.told)
 

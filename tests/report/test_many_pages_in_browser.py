@@ -12,7 +12,7 @@ from typing import Any
 
 import ballplate as bp
 import pytest
-from ballplate.extensions.sweeps.report.design_contents import page_of_design
+from ballplate.extensions.pages.design_contents import page_of_design
 from ballplate.extensions.sweeps.task import CellResult
 from ballplate.simulator.inputs.yamltree import to_python
 

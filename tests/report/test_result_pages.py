@@ -16,7 +16,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.sweeps.report.design_contents import page_of_design
+from ballplate.extensions.pages.design_contents import page_of_design
 
 from tests.report.pages_read import ResultPage, assert_quoted
 

@@ -10,7 +10,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.sweeps.report.design_contents import page_of_design
+from ballplate.extensions.pages.design_contents import page_of_design
 
 from tests.report.browser import Browser, assert_quiet, browser, program
 from tests.report.test_page_in_browser import CUT, OUTSIDE

@@ -12,12 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.extensions.laboratory.heading_words import is_clock
 from ballplate.planning.schedule import RunSheet, Step
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.messages import in_one_line, refused
+from ballplate.simulator.inputs.quantities import DURATION_UNITS
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import AXES
@@ -101,7 +101,7 @@ def template_csv(readings: Sequence[PlannedReading], experiment: Experiment) -> 
     for kind in lay_out(experiment).influences if experiment.influences else ():
         # Times are those of a clock.
         named = (
-            name if is_clock("", units) else f"{name}_{next(iter(units))}"
+            name if units == DURATION_UNITS else f"{name}_{next(iter(units))}"
             for name, units in kind.columns.items()
         )
         blank += [name for name in named if name not in blank]

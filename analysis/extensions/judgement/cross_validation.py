@@ -16,6 +16,8 @@ from ballplate.presentation.formatting import aligned, as_data, number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.results.campaign_sigmas import campaign_sigmas
 from ballplate.results.campaign_tests import (
+    TOO_ALIKE,
+    TOO_RARE,
     EstimatedSigma,
     Roots,
     SigmaPair,
@@ -38,7 +40,7 @@ from ballplate.simulator.readings.same_readings import (
     same_readings,
 )
 
-from .lack_of_fit import TOO_ALIKE, TOO_RARE, chance_words
+from .lack_of_fit import chance_words
 from .left_out import MOST_POINTS
 from .left_out_result import FAILED
 

@@ -52,14 +52,6 @@ def pure_error(design: Design, state: State, x: Array) -> PureError:
     return PureError(float((weight * (off - mean[group]) ** 2).sum()), freedom)
 
 
-# Differences that are so small by no larger chance than this are doubted.
-TOO_RARE = 1e-3
-TOO_ALIKE = (
-    "two independent campaigns are as alike as these are less than once in"
-    f" {round(1.0 / TOO_RARE)}: readings or a certificate may be the same in both, or uncertainties"
-    " are stated too large"
-)
-
 # Chances below this are told as that.
 LEAST_TOLD = 1e-6
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.extensions.judgement.lack_of_fit import TOO_ALIKE, TOO_RARE
 from ballplate.presentation.formatting import aligned, finite, number, picked
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import FEW
+from ballplate.results.campaign_tests import TOO_ALIKE, TOO_RARE
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import InCommon

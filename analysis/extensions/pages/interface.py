@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ballplate.arguments import (
     PathLike,
@@ -16,9 +16,9 @@ from ballplate.simulator.inputs.arguments import (
     ensure_report,
     ensure_type,
 )
+from ballplate.simulator.inputs.extensions import function, optional_service
 
 if TYPE_CHECKING:
-    from ballplate.extensions.sweeps.running import SweepResult
     from ballplate.results.fit import Fit
     from ballplate.results.prediction import Prediction
 
@@ -53,7 +53,7 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
 
 
 def page(
-    given: Experiment | PathLike | Prediction | Fit | SweepResult,
+    given: Experiment | PathLike | Prediction | Fit | Any,
     path: PathLike | None = None,
     run_modules: bool = False,
     compare: PathLike | None = None,
@@ -75,7 +75,6 @@ def page(
     >>> bp.page(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))).splitlines()[0]
     '<!DOCTYPE html>'
     """
-    from ballplate.extensions.sweeps.running import SweepResult
     from ballplate.presentation.files import write_file
     from ballplate.results.fit import Fit
     from ballplate.results.prediction import Prediction
@@ -85,16 +84,18 @@ def page(
     ensure_report(report)
     if path is not None:
         ensure_path("path", path)
-    if (run_modules or compare is not None) and not isinstance(given, SweepResult):
+    kind = optional_service("SweepResult")
+    is_sweep = kind is not None and isinstance(given, kind)
+    if (run_modules or compare is not None) and not is_sweep:
         raise ValueError("run_modules and compare go with sweeps only; leave them out")
     if isinstance(given, Fit):
         text = given.page()
-    elif isinstance(given, SweepResult):
-        from ballplate.extensions.sweeps.stores import sweep_report
-
-        text = sweep_report(given.store, given.number, "html", run_modules, report, compare)
+    elif is_sweep:
+        text = function("sweep_report")(
+            given.store, given.number, "html", run_modules, report, compare
+        )
     else:
-        from ballplate.extensions.sweeps.report.design_contents import page_of_design
+        from .design_contents import page_of_design
 
         predicted = given if isinstance(given, Prediction) and given.quantities else None
         chosen = given.experiment if isinstance(given, Prediction) else experiment_of(given)

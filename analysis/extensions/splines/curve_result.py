@@ -8,11 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.extensions.compensation.compensated_points import (
-    CompensatedPoints,
-    compensated_points,
-    nominal_points,
-)
 from ballplate.presentation.result import Result
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
@@ -20,6 +15,7 @@ from ballplate.simulator.splines.pieces import Powers
 from ballplate.simulator.splines.read import Column, CurvePoints, choose_points, read_points
 from ballplate.simulator.splines.spline_problems import SplineError
 
+from .compensated_points import CompensatedPoints, compensated_points, nominal_points
 from .curve_options import Asked, curve_settings, listed, positive
 from .curve_tables import coefficients_csv, curve_data, curve_lines, shown
 from .error_curve import ErrorCurve, fit_curve

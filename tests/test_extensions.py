@@ -1,0 +1,287 @@
+"""Extensions: the kernel imports none, each imports few others, and without any of them the basic
+commands work and what is missing is named.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import ballplate as bp
+import pytest
+from ballplate.extensions import SHIPPED
+from ballplate.simulator.inputs import extensions
+from ballplate.simulator.inputs.extensions import KINDS, Extension
+from ballplate.simulator.inputs.unusable import UnusableError
+
+from tests.test_architecture import EXTENSIONS, arrows, trees
+
+TOP = Path(__file__).parents[1]
+NAMES = tuple(extension.name for extension in SHIPPED)
+
+# What an extension takes from another one, and why that is no part of the kernel.
+BUILDS_ON = {
+    ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
+    ("pages", "campaign"): "the page of a design has its run sheet",
+    ("pages", "maps"): "the page of a design has its map of lengths",
+    ("sweeps", "pages"): "the page of a sweep is a page",
+    ("studio", "repair"): "the studio writes changes into the file as repairs are written",
+    ("studio", "sweeps"): "the studio computes sweeps and shows their page",
+}
+
+
+def extension_of(path: Path) -> str:
+    """The extension of a module; empty of one of the kernel."""
+    return path.parts[2] if EXTENSIONS in path.parents and len(path.parts) > 3 else ""
+
+
+def texts(path: Path) -> Iterator[str]:
+    """The texts in a module that are no docstrings."""
+    docstrings = {
+        id(node.body[0].value)
+        for node in ast.walk(trees()[path])
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(trees()[path]):
+        if isinstance(node, ast.Constant) and id(node) not in docstrings:
+            yield str(node.value)
+
+
+def test_the_kernel_imports_no_extension() -> None:
+    """By whatever means; the face names their functions for those who check types."""
+    for path, found in arrows().items():
+        if not extension_of(path) and path not in (Path("analysis/__init__.py"),):
+            assert not [other for other in found if extension_of(other)], path
+            assert not [text for text in texts(path) if "ballplate.extensions." in text], path
+
+
+def test_extensions_build_on_few_others() -> None:
+    between = {
+        (extension_of(path), extension_of(other))
+        for path, found in arrows().items()
+        for other in found
+        if extension_of(path) and extension_of(other)
+    }
+    assert {pair for pair in between if pair[0] != pair[1]} == set(BUILDS_ON)
+
+
+def test_no_extension_imports_another_by_its_name() -> None:
+    for path in trees():
+        if extension_of(path):
+            assert not [text for text in texts(path) if "ballplate.extensions." in text], path
+
+
+def test_each_folder_is_an_extension() -> None:
+    folders = {extension_of(path) for path in trees()} - {""}
+    assert folders == set(NAMES) and len(NAMES) == len(folders)
+
+
+@pytest.mark.parametrize("extension", SHIPPED, ids=NAMES)
+def test_what_the_table_names_is_there(extension: Extension) -> None:
+    for name, module in extension.commands.items():
+        command = extension.load(module)
+        assert command.HELP and command.DESCRIPTION and command.run and command.add_options, name
+    for kind in ("functions", "services"):
+        for name, module in getattr(extension, kind).items():
+            assert callable(getattr(extension.load(module), name)), name
+    for module in extension.schemas.values():
+        assert extension.load(module).schema()
+
+
+def test_no_name_is_provided_twice() -> None:
+    for kind in KINDS:
+        names = extensions.names(kind)
+        assert len(names) == len(set(names)), kind
+
+
+WITHOUT = """
+import sys
+from importlib.abc import MetaPathFinder
+
+class Missing(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if any(f"{name}.".startswith(f"ballplate.extensions.{one}.") for one in sys.argv[3:]):
+            raise ModuleNotFoundError(f"{name} is hidden", name=name)
+
+sys.meta_path.insert(0, Missing())
+from ballplate.cli import main
+
+quickstart = "designs/quickstart.yaml"
+for line in (
+    ["check", quickstart],
+    ["run", quickstart],
+    ["run", quickstart, "--trials", "4"],
+    ["simulate", quickstart, "-o", sys.argv[1]],
+    ["simulate", quickstart, "-o", sys.argv[1], "--force"],
+    ["plan", sys.argv[2], "--positions", "6", "--workers", "1"],
+    ["compare", quickstart, "--trials", "2"],
+    ["fit", quickstart, sys.argv[1]],
+):
+    assert main([*line, "--quiet"]) == 0, line
+
+import ballplate as bp
+import contextlib, io, warnings
+
+fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
+from ballplate.extensions import SHIPPED
+for one in SHIPPED:
+    if one.name in sys.argv[3:]:
+        for command in one.commands:
+            told = io.StringIO()
+            with contextlib.redirect_stderr(told):
+                assert main([command, "--help"]) == 2
+            assert f"the extension {one.name} is not installed" in told.getvalue()
+        for function in one.functions:
+            try:
+                getattr(bp, function)
+            except bp.MissingExtensionError as error:
+                assert one.name in str(error)
+            else:
+                raise AssertionError(function)
+"""
+
+OPTIONS = {
+    "repair": (["check", "designs/quickstart.yaml", "--suggest"],),
+    "requirements": (["check", "designs/quickstart.yaml", "--goal", "U6 average 1 um"],),
+    "pages": (["run", "designs/quickstart.yaml", "--report", "page.html"],),
+    "judgement": (["fit", "designs/quickstart.yaml", "READINGS", "--components", "axis"],),
+    "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
+    "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
+    "sweeps": (["schema", "sweep"],),
+}
+
+POOL = """
+pool:
+  candidates:
+    - {name: low, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}
+"""
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [NAMES, *(pytest.param((name,), marks=pytest.mark.long) for name in NAMES)],
+    ids=["every one", *NAMES],
+)
+def test_the_kernel_works_without(hidden: tuple[str, ...], tmp_path: Path) -> None:
+    quickstart = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    (tmp_path / "pool.yaml").write_text(quickstart + POOL, encoding="utf-8")
+    files = (str(tmp_path / "readings.csv"), str(tmp_path / "pool.yaml"))
+    command = [sys.executable, "-c", WITHOUT, *files, *hidden]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+
+
+OPTION_WITHOUT = (
+    WITHOUT.split("from ballplate.cli import main")[0]
+    + """
+from ballplate.cli import main
+
+sys.exit(main(sys.argv[1].split("|")))
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "line"), [(name, line) for name, lines in OPTIONS.items() for line in lines]
+)
+def test_an_option_names_the_extension_that_it_needs(
+    name: str, line: list[str], tmp_path: Path
+) -> None:
+    quickstart = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    places = {"POOL": tmp_path / "pool.yaml", "READINGS": tmp_path / "readings.csv"}
+    places["POOL"].write_text(quickstart + POOL, encoding="utf-8")
+    bp.simulate("designs/quickstart.yaml").to_csv(places["READINGS"], index=False)
+    words = [
+        str(places.get(word, tmp_path / word if "." in word[-5:] and "/" not in word else word))
+        for word in line
+    ]
+    command = [sys.executable, "-c", OPTION_WITHOUT, "|".join(words), "", name]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode in (2, 3), (ended.stdout, ended.stderr)
+    assert f"extension {name}" in ended.stderr and "not installed" in ended.stderr
+    assert not list(tmp_path.glob("*.html"))
+
+
+class EntryPoint:
+    """An entry point of a laboratory's own."""
+
+    def __init__(self, extension: object) -> None:
+        self.extension = extension
+
+    def load(self) -> object:
+        return self.extension
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[object]]:
+    """Extensions that are installed besides those shipped."""
+    found: list[object] = []
+    monkeypatch.setattr(
+        "importlib.metadata.entry_points", lambda group: [EntryPoint(one) for one in found]
+    )
+    extensions.registered.cache_clear()
+    yield found
+    extensions.registered.cache_clear()
+
+
+def test_an_extension_of_a_laboratory_is_found(
+    installed: list[object],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Its command, its function, and its line in the help."""
+    from ballplate.cli import main
+
+    (tmp_path / "our_laboratory.py").write_text(
+        """
+HELP = DESCRIPTION = "print the number of positions of a design"
+
+
+def add_options(parser):
+    parser.add_argument("file")
+
+
+def run(options):
+    print(count(options.file))
+    return 0
+
+
+def count(file):
+    import ballplate as bp
+
+    return len(bp.load(file).positions)
+""",
+        encoding="utf-8",
+    )
+    (tmp_path / "laboratory_package").mkdir()
+    (tmp_path / "our_laboratory.py").rename(tmp_path / "laboratory_package" / "counting.py")
+    (tmp_path / "laboratory_package" / "__init__.py").write_text("", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    provided = {"commands": {"count": "counting"}, "functions": {"count": "counting"}}
+    installed.append(Extension("counting", "laboratory_package", **provided))
+    assert main(["count", "designs/quickstart.yaml"]) == 0
+    assert capsys.readouterr().out == "6\n"
+    assert bp.count("designs/quickstart.yaml") == 6
+    vars(bp).pop("count")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "print the number of positions of a design" in capsys.readouterr().out
+
+
+def test_a_name_that_is_used_twice_is_refused(installed: list[object]) -> None:
+    installed.append(Extension("mine", "mine", commands={"sweep": "sweep"}))
+    with pytest.raises(UnusableError, match="extensions sweeps and mine both provide sweep"):
+        extensions.registered()
+
+
+def test_what_is_no_extension_is_refused(installed: list[object]) -> None:
+    installed.append("mine")
+    with pytest.raises(UnusableError, match="'mine' is no Extension"):
+        extensions.registered()
