@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         load_map,
         plan,
         quickstart,
-        reliability,
         run,
         simulate,
         write_map,
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
         map,
     )
     from ballplate.extensions.pages.interface import page, view
+    from ballplate.extensions.reliability.interface import reliability
     from ballplate.extensions.repair.interface import repair
     from ballplate.extensions.reproduction.interface import reproduce
     from ballplate.extensions.requirements.interface import reach
@@ -156,7 +156,6 @@ _KERNEL = {
         "load_map",
         "plan",
         "quickstart",
-        "reliability",
         "run",
         "simulate",
         "write_map",

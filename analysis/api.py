@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
     from .arguments import Tables
     from .estimators.distances import EstimatorComparison
-    from .gross_errors.reliability import Reliability
     from .planning.criteria import CriterionName
     from .planning.orders import OrderName
     from .planning.selection import Campaign
@@ -465,33 +464,6 @@ def plan(
     taken = None if done is None else table_of("done", done)
     before = None if earlier is None else Path(earlier)
     return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)
-
-
-def reliability(
-    experiment: Experiment | PathLike,
-    false_alarm: float = 0.001,
-    power: float = 0.8,
-    sigma: Literal["estimated", "given"] | None = None,
-    report: Report = unreported,
-) -> Reliability:
-    """Which mistakes in readings and certificates residuals would show, and what those do that they
-    would not.
-
-    >>> reliability(quickstart()).degrees_of_freedom
-    580
-    """
-    from .gross_errors import redundancy
-    from .gross_errors.power import LEAST_CHANCE, MOST_CHANCE
-
-    ensure_one_of(SIGMAS, sigma=sigma)
-    limits = f"between {LEAST_CHANCE:g} and {MOST_CHANCE:g}"
-    ensure_positive(f"a ratio {limits}", MOST_CHANCE, false_alarm=false_alarm, power=power)
-    ensure_report(report)
-    if not LEAST_CHANCE <= false_alarm < power:
-        raise ValueError(
-            f"false_alarm={false_alarm}, power={power}; give ratios {limits}, the power the larger"
-        )
-    return redundancy.reliability(experiment_of(experiment), false_alarm, power, sigma, report)
 
 
 def load_map(path: PathLike) -> FittedMap:

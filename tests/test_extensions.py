@@ -27,6 +27,8 @@ BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
+    ("pages", "reliability"): "pages show how gross errors would act",
+    ("studio", "pages"): "the studio moves designs as pages do",
     ("sweeps", "pages"): "the page of a sweep is a page",
     ("studio", "repair"): "the studio writes changes into the file as repairs are written",
     ("studio", "sweeps"): "the studio computes sweeps and shows their page",

@@ -26,7 +26,7 @@ USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
 # Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
 COMMANDS = (
-    *("check", "run", "plan", "simulate", "fit", "compare", "reliability"),
+    *("check", "run", "plan", "simulate", "fit", "compare"),
     *("schema", "init"),
 )
 

@@ -62,6 +62,11 @@ SHIPPED = (
         services=_from("bootstrap", "bootstrap") | _from("components", "variance_components"),
     ),
     _here(
+        "reliability",
+        commands={"reliability": "reliability_command"},
+        functions=_from("interface", "reliability"),
+    ),
+    _here(
         "certificates",
         commands={"certificate": "certificate_command"},
         services=_from("plate_certificate", "plate_certificate"),

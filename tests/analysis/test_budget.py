@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.results.budget import UncertaintyBudget
-from ballplate.results.source_sums import source_sums, sources_of
+from ballplate.extensions.judgement.budget import UncertaintyBudget
+from ballplate.extensions.judgement.source_sums import source_sums, sources_of
 from ballplate.simulator.estimation.corrections import corrected_points
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise

@@ -7,7 +7,13 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.rank.motions import Motion, moved_balls, moved_points, null_motions, weak_motions
+from ballplate.extensions.pages.motions import (
+    Motion,
+    moved_balls,
+    moved_points,
+    null_motions,
+    weak_motions,
+)
 from ballplate.simulator.design.arrays import State, locations
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out

@@ -15,10 +15,10 @@ from xml.etree import ElementTree
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.certificates.datum import chosen_datum
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.datum import chosen_datum
 from ballplate.simulator.inputs.messages import ExperimentError
 from numpy.typing import NDArray
 

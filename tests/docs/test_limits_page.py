@@ -16,6 +16,7 @@ from ballplate.extensions.maps import volumetric_errors as volumetric
 from ballplate.extensions.requirements import root_search as search
 from ballplate.extensions.splines import curve_options
 from ballplate.extensions.splines import error_curve as curve
+from ballplate.extensions.splines import read_points as read
 from ballplate.extensions.sweeps import axes, bundle, load
 from ballplate.extensions.sweeps import sweep_settings as settings
 from ballplate.gross_errors import leftover
@@ -38,7 +39,6 @@ from ballplate.simulator.experiment import (
 from ballplate.simulator.geometry import artefacts, directions
 from ballplate.simulator.inputs import decoding, messages, tables, yamltree
 from ballplate.simulator.inputs import settings as input_settings
-from ballplate.simulator.splines import read
 
 PAGE = Path("docs/reference/limits.md")
 

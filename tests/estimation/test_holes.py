@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate import compare
-from ballplate.gross_errors.redundancy import reliability
+from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.parameters import shared_layout

@@ -7,8 +7,8 @@ from random import Random
 from typing import Any
 
 import pytest
+from ballplate.extensions.repair.yamltext import TextChange, with_changes
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.yamltext import TextChange, with_changes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

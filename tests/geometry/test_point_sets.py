@@ -6,10 +6,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from ballplate.extensions.certificates.datum import chosen_datum
+from ballplate.extensions.laboratory.symmetry import turns_onto_itself
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.axes import plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.datum import chosen_datum
 from ballplate.simulator.geometry.directions import GeneratedDirectionsSettings, directions
 from ballplate.simulator.geometry.motions import (
     rigid_motions,
@@ -18,7 +19,6 @@ from ballplate.simulator.geometry.motions import (
     without_rigid_motion,
 )
 from ballplate.simulator.geometry.rotations import rotation_matrix
-from ballplate.simulator.geometry.symmetry import turns_onto_itself
 
 
 def grid(*counts: int) -> np.ndarray:

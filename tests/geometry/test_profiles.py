@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.geometry.profile import NotOnProfileError, along
+from ballplate.extensions.splines.profile import NotOnProfileError, along
 
 RADIUS = 0.037
 

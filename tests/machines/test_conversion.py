@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ballplate.extensions.judgement.containing_models import NotContainedError, linear_map
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Basis, Monomial, Polynomial, Spline
-from ballplate.simulator.machines.conversion import NotContainedError, linear_map
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import kinematic_model, kinematic_model_of
 from ballplate.simulator.machines.terms import quadratic, sums

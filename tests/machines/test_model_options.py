@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.extensions.judgement.containing_models import linear_map
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial, Spline
-from ballplate.simulator.machines.conversion import linear_map
 from ballplate.simulator.machines.curves import Points, curves_model
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.error_names import AXIS_ERRORS, ERRORS, SQUARENESS_ERRORS

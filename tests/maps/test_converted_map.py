@@ -11,9 +11,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.judgement.containing_models import linear_map
+from ballplate.extensions.maps.corrected_points import corrected, corrected_with_root
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.conversion import linear_map
-from ballplate.simulator.maps.corrected_points import corrected, corrected_with_root
 from ballplate.simulator.maps.fitted_map import FittedMap
 
 

@@ -215,7 +215,7 @@ def test_tasks_of_an_experiment(fitted: FittedMap, tmp_path: Path) -> None:
         {"evaluation": {"tasks": [task, {**task, "name": "tight", "target_uncertainty": "1 nm"}]}}
     )
     from ballplate.extensions.maps.correction import correction
-    from ballplate.results.wanted_lengths import tasks_of_experiment
+    from ballplate.extensions.maps.wanted_lengths import tasks_of_experiment
     from ballplate.simulator.readings.point_files import GivenPoints
 
     nothing = GivenPoints(np.zeros((0, 3)), (), np.zeros(0, np.int64))

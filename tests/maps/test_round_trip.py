@@ -63,7 +63,7 @@ def test_a_map_is_read_as_it_was_written(kind: str, name: str, folder: Path) -> 
 
 @pytest.mark.parametrize("kind", MODELS)
 def test_a_map_corrects_as_its_fit(kind: str, folder: Path) -> None:
-    from ballplate.simulator.maps.corrected_points import corrected_with_root
+    from ballplate.extensions.maps.corrected_points import corrected_with_root
 
     fit = fit_of(kind, folder)
     fitted = fit.to_map()

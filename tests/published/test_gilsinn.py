@@ -15,8 +15,8 @@ from ballplate.extensions.splines.error_curve import (
     Hold,
     fit_curve,
 )
+from ballplate.extensions.splines.read_points import choose_points, read_points
 from ballplate.simulator.splines.pieces import pieces
-from ballplate.simulator.splines.read import choose_points, read_points
 
 from tests.reference import truncated_powers
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.extensions.reliability.power import noncentrality
 from ballplate.gross_errors.cause_search import FAMILY, Search, diagnosis
 from ballplate.gross_errors.events import Cause, cause
-from ballplate.gross_errors.power import noncentrality
 from ballplate.gross_errors.suspects import Diagnosis
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.design.observations.distances import CalibratedDistances

@@ -16,8 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from ballplate.extensions.reliability.power import noncentrality
 from ballplate.gross_errors.cause_search import FAMILY, Search
-from ballplate.gross_errors.power import noncentrality
 from ballplate.gross_errors.refits import diagnosis_with_refits
 from ballplate.gross_errors.wording import diagnosis_words
 from ballplate.simulator.design.arrays import Design

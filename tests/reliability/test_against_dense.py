@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.redundancy import reliability_of
+from ballplate.extensions.reliability.reliability_result import Reliability
 from ballplate.gross_errors.patterns import Patterns, patterns
-from ballplate.gross_errors.redundancy import reliability_of
-from ballplate.gross_errors.reliability import Reliability
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances

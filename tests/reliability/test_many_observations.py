@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.gross_errors import effects
+from ballplate.extensions.reliability import effects
+from ballplate.extensions.reliability.redundancy import reliability
+from ballplate.extensions.reliability.response import responses
 from ballplate.gross_errors.leftover import entries, leftover
 from ballplate.gross_errors.patterns import patterns
-from ballplate.gross_errors.redundancy import reliability
-from ballplate.gross_errors.response import responses
 from ballplate.results.study import fit
 from ballplate.simulator.estimation.functions import BallPlaces, Distances, displacements
 from ballplate.simulator.estimation.linearisation import linearise

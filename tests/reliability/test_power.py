@@ -9,12 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.power import (
+    alarm_limit,
+    chance_of_alarm,
+    noncentrality,
+)
+from ballplate.extensions.reliability.redundancy import reliability_of
+from ballplate.extensions.reliability.reliability_result import Reliability
 from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.leftover import Columns, leftover
 from ballplate.gross_errors.patterns import Patterns, patterns
-from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentrality
-from ballplate.gross_errors.redundancy import reliability_of
-from ballplate.gross_errors.reliability import Reliability
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.redundancy import reliability_of
+from ballplate.extensions.reliability.reliability_result import write_observations
 from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.names import name
-from ballplate.gross_errors.redundancy import reliability_of
-from ballplate.gross_errors.reliability import write_observations
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from ballplate.extensions.pages.design_views import ball_views, motion_view, point_view
 from ballplate.extensions.pages.elements import Html
+from ballplate.extensions.pages.motions import null_motions
 from ballplate.extensions.pages.spatial import figure_of
-from ballplate.rank.motions import null_motions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.splines.read_points import Column, choose_points, read_points
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.splines.read import Column, choose_points, read_points
 
 
 @pytest.fixture

@@ -21,7 +21,6 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.datum import Datum, chosen_datum, in_datum, relative_to
 from ballplate.simulator.inputs.covariances import MOST_NAMES
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint, listing
@@ -35,6 +34,7 @@ from ballplate.uncertainty.tasks import expansion
 from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_page import certificate_page
 from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
+from .datum import Datum, chosen_datum, in_datum, relative_to
 from .digital_form import digital_certificate
 from .uncertain_archive import gtc_archive
 

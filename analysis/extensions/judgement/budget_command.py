@@ -39,8 +39,9 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print the budget of one experiment."""
-    from ballplate.results.budget import budget
     from ballplate.results.study import fit
+
+    from .budget import budget
 
     with_fit = [name for name in ("certificate", "sigma", *KEYS) if getattr(options, name)]
     if with_fit and not options.readings:

@@ -22,9 +22,9 @@ from ballplate.simulator.inputs.arguments import (
 if TYPE_CHECKING:
     import pandas
     from ballplate.arguments import Tables
-    from ballplate.results.budget import UncertaintyBudget
     from ballplate.results.fit import Fit
 
+    from .budget import UncertaintyBudget
     from .cross_validation import CrossValidation
     from .ladder_result import Ladder
     from .left_out_result import Validation
@@ -113,8 +113,9 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     >>> bp.budget(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())), by="probe").sources[0]
     'calibration[0]: distances of plate'
     """
-    from ballplate.results.budget import budget as budget_of
     from ballplate.results.fit import Fit
+
+    from .budget import budget as budget_of
 
     ensure_one_of(GROUPINGS, by=str(by))
     if isinstance(given, Fit):

@@ -15,13 +15,14 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import Settings
 from ballplate.simulator.machines.bases import Basis
-from ballplate.simulator.machines.conversion import NotContainedError, linear_map
 from ballplate.simulator.machines.empirical_settings import EmpiricalSettings
 from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.kinematic_settings import FunctionsSettings, KinematicSettings
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.settings import build_error_model
+
+from .containing_models import NotContainedError, linear_map
 
 # What the file's own model is called in front of its kind, where it is none of the others.
 FILE = "the file's, "

@@ -14,13 +14,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from ballplate.simulator.design.arrays import Design, nominal_places
 from ballplate.simulator.geometry.motions import fit_motion, fixes_pose
-from ballplate.simulator.geometry.symmetry import turns_onto_itself
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.inputs.settings import listing, shorten
 from ballplate.simulator.inputs.tables import FileRow
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .heading_words import folded
+from .symmetry import turns_onto_itself
 
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.

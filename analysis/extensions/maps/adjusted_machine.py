@@ -20,10 +20,10 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.geometry.motions import AXIS_NAMES, rigid_motions
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array, Unit
-from ballplate.simulator.maps.corrected_points import corrected, drawn_rows
 from ballplate.simulator.maps.fit_verdict import verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap, readings_in_common
 
+from .corrected_points import corrected, drawn_rows
 from .machine_changes import MachineChange
 from .second_campaign import (
     ROUNDING,

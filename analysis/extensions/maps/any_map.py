@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from functools import reduce
 from pathlib import Path
 
-from ballplate.results.wanted_lengths import tasks_of_experiment
 from ballplate.simulator.design.objects import Tasks
 from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.experiment.model import Experiment
@@ -19,6 +18,7 @@ from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 from .map_places import PlacesAsked
 from .realisations import Draws
 from .volumetric_results import MachineErrors, machine_errors
+from .wanted_lengths import tasks_of_experiment
 
 # A map file says at its beginning that it is one.
 OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)

@@ -16,17 +16,18 @@ from ballplate.presentation.formatting import (
 from ballplate.presentation.result import Result
 from ballplate.results.map_of_fit import FRAMES
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.stated_models import stated_model
-from ballplate.simulator.maps.corrected_points import corrected_with_root
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
-from ballplate.simulator.maps.largest_differences import (
+
+from .corrected_points import corrected_with_root
+from .largest_differences import (
     Differences,
     LargestDifference,
     largest_at_points,
     largest_of_lengths,
 )
-from ballplate.simulator.maps.map_conversion import MapConversion, converted
+from .map_conversion import MapConversion, converted
+from .stated_models import stated_model
 
 # Points between which lengths have the uncertainty that is stated beside their difference.
 POINTS = 60

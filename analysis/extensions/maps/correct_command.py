@@ -138,12 +138,9 @@ def run(options: Namespace) -> int:
 
 def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
-    from ballplate.results.wanted_lengths import (
-        between_listed,
-        between_named,
-        tasks_of_experiment,
-    )
     from ballplate.simulator.experiment.load import load
+
+    from .wanted_lengths import between_listed, between_named, tasks_of_experiment
 
     found = between_named(given, [(first, second) for first, second in options.length])
     if options.lengths:

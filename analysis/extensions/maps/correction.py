@@ -18,16 +18,13 @@ from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.corrected_points import (
-    corrected_with_blocks,
-    corrected_with_root,
-    tips,
-)
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.maps.mapped_lengths import mapped_lengths
 from ballplate.simulator.readings.point_files import GivenPoints
 from ballplate.uncertainty.scale import stretches
+
+from .corrected_points import corrected_with_blocks, corrected_with_root, tips
+from .mapped_lengths import mapped_lengths
 
 # Points and lengths that the text shows.
 SHOWN = 20

@@ -11,15 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.maps.corrected_points import (
-    POINTS_AT_ONCE,
-    corrected,
-    drawn_rows,
-    probe_indices,
-    tips,
-)
 from ballplate.simulator.maps.fitted_map import FittedMap
 
+from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices, tips
 from .map_places import MapPlaces
 from .realisations import Draws, Realisations, symmetric_root
 from .volumetric_errors import length_errors

@@ -317,10 +317,10 @@ def correct(
     '0.080 µm'
     """
     import pandas
-    from ballplate.results.wanted_lengths import between_named
     from ballplate.simulator.readings import point_files
 
     from .correction import correction
+    from .wanted_lengths import between_named
 
     ensure_one_of(("scale readings", "ball centres"), coordinates=coordinates)
     ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)

@@ -8,14 +8,15 @@ from ballplate.extensions.campaign.sheet import sheet_of
 from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.pages.design_page import DesignContents, design_page
 from ballplate.extensions.pages.page_facts import assumptions, target_in_words, unjudged
-from ballplate.gross_errors.redundancy import reliability_of
+from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.planning.checked_files import Wanted, checked_design
-from ballplate.rank.motions import null_motions, weak_motions
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.load import with_pool
 from ballplate.simulator.experiment.model import Experiment
+
+from .motions import null_motions, weak_motions
 
 # Points along each axis of the map of lengths, in two and in three dimensions.
 GRID = {2: (7,), 3: (5,)}

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.rank.motions import Motion
 from ballplate.simulator.estimation.linearisation import Linearisation
 
 from .design_views import ball_views, motion_view, point_view, volume_view
 from .document import Page, PageSection, facts_list, origin, written
 from .elements import Html, element, folded, joined, note, sentence, table
 from .length_sections import lengths_section
+from .motions import Motion
 from .quoted import QuotedData
 from .residual_sections import reliability_section
 from .spatial import figure_of

@@ -9,13 +9,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from ballplate.presentation.scene import MOST_BALLS, box_edges, hull, names_fit, projection
 from ballplate.presentation.svg import round_number
-from ballplate.rank.motions import Motion, moved_balls, moved_points
 from ballplate.simulator.design.arrays import Design, locations, nominal_state
 from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .elements import Html, element, joined
+from .motions import Motion, moved_balls, moved_points
 from .spatial import Layer, SpatialPicture
 
 # Of the picture's size: the longest half axis of an ellipsoid, and the largest displacement.

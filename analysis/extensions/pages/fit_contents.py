@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.gross_errors.redundancy import reliability_of
+from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.presentation.scene import box_edges, projection
 from ballplate.results.estimates import ParameterEstimate, labels
 from ballplate.results.residuals import reading_residuals

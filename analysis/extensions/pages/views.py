@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from ballplate.presentation.scene import box_edges, projection
-from ballplate.rank.motions import Motion, null_motions, weak_motions
 from ballplate.rank.verdict import Direction, Verdict
 from ballplate.results.residuals import reading_residuals
 from ballplate.simulator.computing.threads import single_threaded
@@ -17,6 +16,7 @@ from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from .design_views import ball_views, motion_view, point_view, volume_view
+from .motions import Motion, null_motions, weak_motions
 from .residual_sections import residual_view
 from .spatial import SpatialPicture
 

@@ -13,7 +13,6 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import place_of
 from ballplate.simulator.inputs.messages import Steps, format_path
 from ballplate.simulator.inputs.trust import UNKNOWN, Trust
-from ballplate.simulator.inputs.yamltext import TextChange, changed_data, with_changes
 from ballplate.simulator.inputs.yamltree import (
     Mapping as MappingNode,
 )
@@ -28,6 +27,7 @@ from ballplate.simulator.inputs.yamltree import (
 from .changes import apply_all
 from .repair_search import Repair, Repairs
 from .written import Edit, edits, lacks_probes, position_settings
+from .yamltext import TextChange, changed_data, with_changes
 
 PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")

@@ -20,11 +20,11 @@ from ballplate.simulator.geometry.positions import (
 )
 from ballplate.simulator.inputs.messages import Step, format_path
 from ballplate.simulator.inputs.quantities import LengthFunction, parse_length, typed_length
-from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.inputs.yamltree import to_list, to_python
 from ballplate.simulator.machines.protocol import Array
 
 from .changes import ball_set, pair_set
+from .yamltext import flow
 
 AXES = "xyz"
 

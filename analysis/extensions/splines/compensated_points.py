@@ -15,11 +15,12 @@ import numpy as np
 from ballplate.extensions.splines.curve_tables import SIDES
 from ballplate.extensions.splines.error_curve import ErrorCurve
 from ballplate.presentation.formatting import fixed
-from ballplate.simulator.geometry.profile import NotOnProfileError
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.inputs.tables import header_names, read_table
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.splines.spline_problems import SplineError, SplineProblem
+
+from .profile import NotOnProfileError
 
 # Sine of the least angle at which two features make a corner.
 CORNER = 0.05

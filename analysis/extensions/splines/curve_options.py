@@ -17,9 +17,9 @@ from ballplate.simulator.inputs.quantities import (
     parse_ratio,
 )
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.splines.read import Column, CurvePoints
 
 from .error_curve import EVERY, CurveSettings, Hold, Place
+from .read_points import Column, CurvePoints
 
 # A polynomial through so many points keeps seven digits; with each further order it loses nearly
 # one.

@@ -12,7 +12,6 @@ from ballplate.presentation.result import Result
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.splines.pieces import Powers
-from ballplate.simulator.splines.read import Column, CurvePoints, choose_points, read_points
 from ballplate.simulator.splines.spline_problems import SplineError
 
 from .compensated_points import CompensatedPoints, compensated_points, nominal_points
@@ -20,6 +19,7 @@ from .curve_options import Asked, curve_settings, listed, positive
 from .curve_tables import coefficients_csv, curve_data, curve_lines, shown
 from .error_curve import ErrorCurve, fit_curve
 from .error_curve_plots import draw_curve, draw_whiskers
+from .read_points import Column, CurvePoints, choose_points, read_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

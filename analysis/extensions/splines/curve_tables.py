@@ -21,10 +21,10 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.splines.constraints import Constraint
 from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
-from ballplate.simulator.splines.read import Column
 from ballplate.simulator.splines.space import Side
 
 from .error_curve import ErrorCurve
+from .read_points import Column
 
 ORDERS = {
     2: "broken line",

@@ -11,13 +11,14 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.geometry.profile import NotOnProfileError, Profile, along
 from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, straight
 from ballplate.simulator.splines.knots import at_every, with_boundaries
-from ballplate.simulator.splines.read import ARC_LENGTH, CurvePoints
 from ballplate.simulator.splines.space import Array, SplineSpace
 from ballplate.simulator.splines.spline_fit import SplineFit, fit
 from ballplate.simulator.splines.spline_problems import SplineError, SplineProblem
+
+from .profile import NotOnProfileError, Profile, along
+from .read_points import ARC_LENGTH, CurvePoints
 
 Place = float | tuple[float, float] | Literal["start", "end"]
 """An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""

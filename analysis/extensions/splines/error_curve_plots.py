@@ -21,10 +21,10 @@ from ballplate.presentation.svg import (
     sticks,
 )
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.splines.read import CurvePoints
 
 from .curve_tables import derivative_unit, shown
 from .error_curve import ErrorCurve, whole_profile
+from .read_points import CurvePoints
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,7 +13,7 @@ from ballplate.cli.common import add_picture, count, print_json, print_lines
 from ballplate.cli.outputs import UsageError, Writer, add_force, add_output, write
 
 if TYPE_CHECKING:
-    from ballplate.simulator.splines.read import CurvePoints
+    from .read_points import CurvePoints
 
 
 HELP = "fit a spline with prescribed values and slopes to measured errors"

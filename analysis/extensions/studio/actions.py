@@ -20,6 +20,7 @@ from ballplate.extensions.repair.mending import (
 from ballplate.extensions.repair.placing import middle_of
 from ballplate.extensions.repair.positions import with_added
 from ballplate.extensions.repair.written import Edit, position_settings
+from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import (
     QUARTER_TURNS,
@@ -27,7 +28,6 @@ from ballplate.simulator.geometry.positions import (
     plane_rotation,
 )
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
-from ballplate.simulator.inputs.yamltext import TextChange
 from ballplate.simulator.inputs.yamltree import parse_tree, to_python
 from ballplate.simulator.machines.protocol import Array
 

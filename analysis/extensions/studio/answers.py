@@ -8,9 +8,14 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from ballplate.extensions.pages.motions import (
+    moved_balls,
+    moved_points,
+    null_motions,
+    weak_motions,
+)
 from ballplate.extensions.repair.written import plane_of
 from ballplate.presentation.formatting import finite
-from ballplate.rank.motions import moved_balls, moved_points, null_motions, weak_motions
 from ballplate.rank.verdict import Verdict, verdict
 from ballplate.results.parts import scale_lines, scale_warnings, target_lines
 from ballplate.results.prediction import length_headline, rank_words

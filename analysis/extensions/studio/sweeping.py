@@ -15,6 +15,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from ballplate.extensions.repair.yamltext import flow
 from ballplate.extensions.sweeps.bundle import Bundle, bundle_of, names_of, unpack
 from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.extensions.sweeps.local import local_runner
@@ -33,7 +34,6 @@ from ballplate.simulator.experiment.named_files import named_in
 from ballplate.simulator.experiment.variants import node_at
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import Trust
-from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.inputs.yamltree import Mark, Node, Scalar
 
 from .actions import ActionError, value_of

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.rank.verdict import null_changes, weak_changes
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Readings
 from ballplate.simulator.estimation.corrections import correction_rows
@@ -12,8 +13,6 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import cross_matrices
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, Integers
-
-from .verdict import null_changes, weak_changes
 
 
 @dataclass(frozen=True, eq=False)

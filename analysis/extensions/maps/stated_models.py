@@ -6,16 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..design.objects import Volume
-from ..inputs.messages import ExperimentError, refused
-from ..inputs.problems import Problems
-from ..inputs.trust import OPENED
-from ..inputs.validation import validated
-from ..inputs.yamltree import Mapping as MappingNode
-from ..inputs.yamltree import Mark, Node, parse_tree, read_tree, to_python
-from ..machines.custom import CustomModelError
-from ..machines.protocol import ErrorModel
-from ..machines.settings import (
+from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.experiment.changes import node_of
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.experiment.model_files import absolute
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.trust import OPENED
+from ballplate.simulator.inputs.validation import validated
+from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
+from ballplate.simulator.inputs.yamltree import Mark, Node, parse_tree, read_tree, to_python
+from ballplate.simulator.machines.custom import CustomModelError
+from ballplate.simulator.machines.protocol import ErrorModel
+from ballplate.simulator.machines.settings import (
     ErrorModelSettings,
     MachineFileSettings,
     PythonSettings,
@@ -23,9 +26,6 @@ from ..machines.settings import (
     kind_of,
     with_defaults,
 )
-from .changes import node_of
-from .machine_file import load_machine
-from .model_files import absolute
 
 
 @dataclass(frozen=True, eq=False)

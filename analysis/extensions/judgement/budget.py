@@ -7,6 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.formatting import aligned, finite, number
+from ballplate.presentation.result import Result
+from ballplate.results.adjustments import few_degrees_of_freedom
+from ballplate.results.fit import Fit
+from ballplate.results.groupings import Grouping
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.functions import (
@@ -19,14 +24,9 @@ from ballplate.simulator.estimation.linearisation import LinearFunctions, Linear
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.uncertainty.quantities import evaluation_points, task_distances
+from ballplate.uncertainty.tasks import expansion
 
-from ..presentation.formatting import aligned, finite, number
-from ..presentation.result import Result
-from ..uncertainty.quantities import evaluation_points, task_distances
-from ..uncertainty.tasks import expansion
-from .adjustments import few_degrees_of_freedom
-from .fit import Fit
-from .groupings import Grouping
 from .source_sums import SourceSums, source_sums, sources_of
 
 # Evaluation points of which all distances are looked at; of more, some are chosen evenly.

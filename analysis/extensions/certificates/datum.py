@@ -11,11 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from ..inputs.settings import hint
-from .axes import PlateAxes, axes_words, plate_axes
-from .ball_layouts import BallLayout
-from .motions import Array, fit_motion, rigid_motions, without_rigid_motion
+from ballplate.simulator.geometry.axes import PlateAxes, axes_words, plate_axes
+from ballplate.simulator.geometry.ball_layouts import BallLayout
+from ballplate.simulator.geometry.motions import (
+    Array,
+    fit_motion,
+    rigid_motions,
+    without_rigid_motion,
+)
+from ballplate.simulator.inputs.settings import hint
 
 # A ball nearer to the line of two others than this fraction of how far it is along fixes no plane.
 IN_LINE = 1e-3

@@ -13,16 +13,21 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-
-from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
-from ..inputs.quantities import (
+from ballplate.simulator.inputs.messages import (
+    MORE_ERRORS,
+    MOST_MESSAGES,
+    ExperimentError,
+    Message,
+    refused,
+)
+from ballplate.simulator.inputs.quantities import (
     ANGLE_UNITS,
     LENGTH_UNITS,
     QuantityError,
     exact_number,
 )
-from ..inputs.settings import hint, listing, shorten
-from ..inputs.tables import (
+from ballplate.simulator.inputs.settings import hint, listing, shorten
+from ballplate.simulator.inputs.tables import (
     MOST_ROWS,
     header_cells,
     read_number,
@@ -30,8 +35,8 @@ from ..inputs.tables import (
     table_lines,
     wrong_count,
 )
-from ..inputs.yamltree import Mark
-from .space import Array
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.splines.space import Array
 
 EXAMPLE = "position_mm,error_um"
 PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))

@@ -8,9 +8,20 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import yaml
-
-from .messages import ExperimentError, Step, Steps, format_path, refused
-from .yamltree import LOADER, Mark, parse_tree, resolve_scalar, to_python
+from ballplate.simulator.inputs.messages import (
+    ExperimentError,
+    Step,
+    Steps,
+    format_path,
+    refused,
+)
+from ballplate.simulator.inputs.yamltree import (
+    LOADER,
+    Mark,
+    parse_tree,
+    resolve_scalar,
+    to_python,
+)
 
 # What ends a line for YAML's parser.
 LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")

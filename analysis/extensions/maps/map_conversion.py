@@ -8,12 +8,11 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-
-from ..computing.threads import single_threaded
-from ..design.observations.readings import rotation_sensitivity
-from ..machines.empirical import USUAL_OFFSET
-from ..machines.protocol import Array, ErrorModel
-from .fitted_map import FittedMap, determined_only
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.observations.readings import rotation_sensitivity
+from ballplate.simulator.machines.empirical import USUAL_OFFSET
+from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.maps.fitted_map import FittedMap, determined_only
 
 # Random places for each parameter of the richer model, and the least number of them.
 PLACES_EACH, LEAST_PLACES = 2, 200

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.maps.fitted_map import FittedMap
 
-from ..computing.threads import single_threaded
-from ..machines.protocol import Array, Integers
 from .corrected_points import corrected, drawn_rows, tips
-from .fitted_map import FittedMap
 
 # Lengths whose derivatives are held at once.
 LENGTHS_AT_ONCE = 2000

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-
-from ..computing.threads import single_threaded
-from ..design.observations.readings import offset_sensitivity
-from ..machines.protocol import Array, Integers
-from .fitted_map import FittedMap
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.observations.readings import offset_sensitivity
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.maps.fitted_map import FittedMap
 
 # Points of which derivatives are held at once.
 POINTS_AT_ONCE = 1000

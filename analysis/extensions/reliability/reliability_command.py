@@ -7,8 +7,8 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from functools import partial
 
-from .common import add_file, add_json, number
-from .outputs import UsageError, add_force, add_output, text_writer, write
+from ballplate.cli.common import add_file, add_json, number
+from ballplate.cli.outputs import UsageError, add_force, add_output, text_writer, write
 
 HELP = "find which biases of readings and certificates would be noticed, and what the others change"
 DESCRIPTION = (
@@ -52,7 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _share(text: str) -> float:
-    from ..gross_errors.power import LEAST_CHANCE, MOST_CHANCE
+    from .power import LEAST_CHANCE, MOST_CHANCE
 
     value = number(text, "%") / 100.0
     if not text.endswith("%") or not LEAST_CHANCE <= value <= MOST_CHANCE:
@@ -64,10 +64,11 @@ def _share(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Tell the reliability of all experiments of the files."""
-    from ..gross_errors.redundancy import reliability
-    from ..gross_errors.reliability import write_observations
-    from .common import experiments, print_json, print_lines
-    from .progress import progress
+    from ballplate.cli.common import experiments, print_json, print_lines
+    from ballplate.cli.progress import progress
+
+    from .redundancy import reliability
+    from .reliability_result import write_observations
 
     if options.power <= options.false_alarm:
         raise UsageError("--power must be above --false-alarm; any test has at least that power")
