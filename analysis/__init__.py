@@ -56,7 +56,14 @@ if TYPE_CHECKING:
     from ballplate.simulator.computing.processes import in_processes
     from ballplate.simulator.design.arrays import Design, Observations
     from ballplate.simulator.design.influences.protocol import Influence
-    from ballplate.simulator.estimation.functions import linear_functions
+    from ballplate.simulator.estimation.functions import (
+        BallPlaces,
+        Coordinates,
+        Distances,
+        MeasuredPoints,
+        Parameters,
+        linear_functions,
+    )
     from ballplate.simulator.estimation.linearisation import (
         LinearFunctions,
         Linearisation,
@@ -73,9 +80,12 @@ if TYPE_CHECKING:
     from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind
 
 __all__ = [
+    "BallPlaces",
     "Candidate",
+    "Coordinates",
     "Criterion",
     "Design",
+    "Distances",
     "ESTIMATORS",
     "ErrorModel",
     "Experiment",
@@ -87,10 +97,12 @@ __all__ = [
     "Influence",
     "LinearFunctions",
     "Linearisation",
+    "MeasuredPoints",
     "Message",
     "MissingExtensionError",
     "Observations",
     "OtherSweepError",
+    "Parameters",
     "Prediction",
     "QUANTITIES",
     "QuantityKind",
@@ -173,7 +185,14 @@ _KERNEL = {
     "ballplate.simulator.computing.processes": ("in_processes",),
     "ballplate.simulator.design.arrays": ("Design", "Observations"),
     "ballplate.simulator.design.influences.protocol": ("Influence",),
-    "ballplate.simulator.estimation.functions": ("linear_functions",),
+    "ballplate.simulator.estimation.functions": (
+        "BallPlaces",
+        "Coordinates",
+        "Distances",
+        "MeasuredPoints",
+        "Parameters",
+        "linear_functions",
+    ),
     "ballplate.simulator.estimation.linearisation": (
         "LinearFunctions",
         "Linearisation",

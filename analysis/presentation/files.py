@@ -12,6 +12,12 @@ def write_file(path: str | Path, content: bytes) -> None:
     """Write a file as a whole.
 
     :raises OSError: it cannot be written; where its folder is missing the text says so.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_file(f"{folder}/page.html", b"<p>")
+    ...     Path(folder, "page.html").read_bytes()
+    b'<p>'
     """
     ensure_path("path", path)
     path = Path(path)

@@ -34,6 +34,9 @@ def in_processes(
 
     In the order of the arguments, or as they come. An end before the last of them ends the workers
     as well, and so does within seconds whatever ends this process.
+
+    >>> list(in_processes(pow, [(2, 3), (2, 4)], workers=1))
+    [8, 16]
     """
     if workers == 1:
         for own in arguments:

@@ -256,6 +256,13 @@ def point_rows(
 def linear_functions(at: Linearisation, functions: Functions) -> LinearFunctions:
     """Derivatives of all functions: dense, for some of them rather than for all distances of a
     large plate.
+
+    >>> import ballplate as bp
+    >>> at = bp.linearise(bp.lay_out(bp.quickstart()))
+    >>> ends = MeasuredPoints(np.array([[0.1, 0.2, 0.3], [0.9, 0.2, 0.3]]), np.array([0, 0]))
+    >>> length = Distances(ends, np.array([[0, 1]]), ("along x",))
+    >>> linear_functions(at, length).shared.shape == (1, len(at.layout))
+    True
     """
     found = _derivatives(at, at.state, functions)
     if at.drawn is None or isinstance(functions, Parameters):

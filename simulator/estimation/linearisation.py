@@ -141,6 +141,10 @@ def linearise(
     """Linearise a design at a `state`, as drawn by default, with scale readings `x`
     (readings, d) or error-free ones. With a spectrum `drawn` rank and null space are those, see
     `spectrum`.
+
+    >>> import ballplate as bp
+    >>> linearise(bp.lay_out(bp.quickstart())).rank
+    99
     """
     state = nominal_state(design) if state is None else state
     layout = design.once(shared_layout)

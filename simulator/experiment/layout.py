@@ -53,8 +53,7 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
 
     >>> from pathlib import Path
     >>> from ballplate.simulator.experiment.load import load
-    >>> design = lay_out(load(Path("designs/quickstart.yaml"))[0])
-    >>> design.dimension
+    >>> lay_out(load(Path("designs/quickstart.yaml"))[0]).dimension
     3
     """
     machine, d = experiment.machine, experiment.dimension
