@@ -69,7 +69,10 @@ SHIPPED = (
     _here(
         "certificates",
         commands={"certificate": "certificate_command"},
-        services=_from("plate_certificate", "plate_certificate"),
+        services={
+            **_from("plate_certificate", "plate_certificate"),
+            **_from("digital_values", "read_digital"),
+        },
     ),
     _here(
         "maps",

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
+from ...inputs.extensions import service
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthUncertainty
 from ...inputs.settings import Forms, Settings, Text, hint, listing
@@ -20,7 +21,6 @@ from ..lookup import References
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration
 from .certificate_tables import read_rows
-from .digital_values import read_digital
 from .stated_values import CertificateSettings, check_keys, is_digital, uncertainties_of
 from .whitening import CovarianceRoot, at_least_exact
 
@@ -243,7 +243,7 @@ def _certified_coordinates(
     covariance = None
     if is_digital(settings.values):
         wanted = [(layout.names[ball], axis) for ball in balls for axis in axes]
-        digital = read_digital(settings, wanted, False, steps, references)
+        digital = service("read_digital")(settings, wanted, False, steps, references)
         if digital is None:
             return None
         covariance = digital.covariance

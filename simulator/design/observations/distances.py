@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
+from ...inputs.extensions import service
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthFunction, PositiveLength, UncertaintyFunction
 from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
@@ -20,7 +21,6 @@ from ..lookup import References
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration, far_from_drawing
 from .certificate_tables import read_rows
-from .digital_values import read_digital
 from .stated_values import (
     CertificateEntry,
     CertificateSettings,
@@ -368,7 +368,7 @@ def _entries(
 ) -> FileValues | None:
     """What the file or the list of values states; None after saying what is wrong."""
     if is_digital(settings.values):
-        return read_digital(settings, wanted, True, steps[:-1], references)
+        return service("read_digital")(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):
         read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
         if read is None:

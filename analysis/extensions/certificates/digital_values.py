@@ -7,13 +7,17 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...inputs.messages import ExperimentError, Steps
-from ...inputs.settings import listing, shorten
-from ..lookup import References
-from .stated_values import CertificateEntry, FileValues, value_name
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.observations.stated_values import (
+    CertificateEntry,
+    FileValues,
+    value_name,
+)
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.settings import listing, shorten
 
 if TYPE_CHECKING:
-    from ...inputs.digital_certificates import DigitalResult, DigitalValue
+    from .digital_certificates import DigitalResult, DigitalValue
 
 REFERENCE_TEMPERATURE = 20.0
 # Words about a value that are part of no name.
@@ -43,7 +47,7 @@ def read_digital(
     The result is the one that is named, or else the only one that has them all.
     """
     # Loaded with a parser of XML, which few experiments need.
-    from ...inputs.digital_certificates import RELATIVE, matrix_of, read_digital_certificate
+    from .digital_certificates import RELATIVE, matrix_of, read_digital_certificate
 
     problems, place = references.problems, (*steps, "values")
     try:

@@ -15,14 +15,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.simulator.inputs.covariances import (
+    MOST_NAMES,
+    Floats,
+    NamedMatrix,
+    half_digit,
+    matrix_problems,
+    unit_of_area,
+)
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.quantities import QuantityError, metres_or_radians
+from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs.xmltree import Element, read_xml
+from ballplate.simulator.inputs.yamltree import Mark
 
-from .covariances import MOST_NAMES, Floats, NamedMatrix, half_digit, matrix_problems, unit_of_area
 from .dsi_units import celsius, length_factor
-from .messages import ExperimentError, Message
-from .quantities import QuantityError, metres_or_radians
-from .settings import shorten
-from .xmltree import Element, read_xml
-from .yamltree import Mark
 
 ROOT = "digitalCalibrationCertificate"
 VERSIONS = ("2", "3")

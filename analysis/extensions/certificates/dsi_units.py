@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
-from .quantities import QuantityError
-from .settings import shorten
+from ballplate.simulator.inputs.quantities import QuantityError
+from ballplate.simulator.inputs.settings import shorten
 
 PREFIXES = {
     "kilo": 3,
