@@ -91,9 +91,9 @@ def page(
     if isinstance(given, Fit):
         text = given.page()
     elif is_sweep:
-        text = function("sweep_report")(
-            given.store, given.number, "html", run_modules, report, compare
-        )
+        sweep: Any = given
+        asked = sweep.store, sweep.number, "html", run_modules, report, compare
+        text = function("sweep_report")(*asked)
     else:
         from .design_contents import page_of_design
 
