@@ -67,7 +67,7 @@ def run(options: Namespace) -> int:
     from .session import Session
 
     (path,) = options.files
-    template = files(__package__).joinpath("template.yaml").read_text(encoding="utf-8")
+    template = files("ballplate.cli").joinpath("template.yaml").read_text(encoding="utf-8")
     session = Session(path, options.variant[0] if options.variant else None, template)
     if not path.exists():
         note(options, f"{path} is new: it begins as ballplate init writes it")
