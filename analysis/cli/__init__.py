@@ -24,11 +24,17 @@ from .telling import add_telling, told
 
 USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
-# Modules of this package in the order of the help: each has HELP, DESCRIPTION, add_options and run.
-COMMANDS = (
-    *("check", "run", "plan", "simulate", "fit", "compare"),
-    *("schema", "init"),
-)
+# Modules of this package in the order of the help: each has GROUP, HELP, DESCRIPTION, add_options
+# and run.
+COMMANDS = ("init", "check", "run", "plan", "simulate", "fit", "compare", "schema")
+# Groups of commands in the help, with their titles.
+GROUPS = {
+    "plan": "plan an experiment",
+    "measure": "measure",
+    "evaluate": "evaluate readings",
+    "use": "use the machine's map",
+    "more": "more",
+}
 
 
 def commands_of_all() -> tuple[str, ...]:
@@ -91,6 +97,8 @@ def parser(names: Sequence[str] | None = None) -> _Parser:
                 continue
             raise
         command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
+        # What is printed for it, of which argparse knows no group.
+        vars(commands._choices_actions[-1])["group"] = getattr(module, "GROUP", "more")
         module.add_options(command)
         command.set_defaults(run=module.run)
         add_telling(command)
@@ -133,6 +141,9 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
             try:
                 given = sys.argv[1:] if arguments is None else arguments
                 # The grammar of all commands is needed only where none is named.
+                if not given:
+                    parser().print_help(sys.stderr)
+                    return USAGE
                 named = [one for one in given[:1] if _is_command(one)]
                 options = parser(named or None).parse_args(given)
             except UnusableError as error:
@@ -267,7 +278,19 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Formatter(argparse.HelpFormatter):
-    """Shows arguments that may be left out in brackets, positional ones too."""
+    """Shows arguments that may be left out in brackets, positional ones too, and commands in
+    groups.
+    """
+
+    def _format_action(self, action: argparse.Action) -> str:
+        if not isinstance(action, argparse._SubParsersAction):
+            return super()._format_action(action)
+        parts = []
+        for group, title in GROUPS.items():
+            rows = [one for one in action._choices_actions if getattr(one, "group", "") == group]
+            if rows:
+                parts += [f"\n {title}\n", *map(self._format_action, rows)]
+        return "".join(parts).removeprefix("\n")
 
     def _format_args(self, action: argparse.Action, default_metavar: str) -> str:
         if action.nargs == "+" and not action.option_strings and not action.required:

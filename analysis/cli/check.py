@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
+GROUP = "plan"
 HELP = "check whether designs determine all their parameters"
 DESCRIPTION = (
     "Determine the rank of each design, the share of lengths within its target, and"

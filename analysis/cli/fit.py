@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from ..results.fit import Fit
 
+GROUP = "evaluate"
 HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
     "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"

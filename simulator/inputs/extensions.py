@@ -29,9 +29,9 @@ class MissingExtensionError(UnusableError):
 class Extension:
     """What a `package` provides, each name with the module below the package that has it.
 
-    A module of `commands` has HELP, DESCRIPTION, add_options and run. `functions` are those of
-    `import ballplate`, `services` what the kernel asks for, and `schemas` kinds of files whose
-    module has a function `schema`.
+    A module of `commands` has HELP, DESCRIPTION, add_options and run, and may have the GROUP of the
+    help that it is listed in. `functions` are those of `import ballplate`, `services` what the
+    kernel asks for, and `schemas` kinds of files whose module has a function `schema`.
     """
 
     name: str

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.cli import main
+from ballplate.cli import GROUPS, commands_of_all, main
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.truth import true_parameters
@@ -486,3 +486,22 @@ def test_an_error_of_the_program_is_not_called_a_failed_check() -> None:
     assert done.returncode == 70
     message = "internal error: AssertionError: two is one. Please report"
     assert "Traceback" in done.stderr and message in done.stderr
+
+
+def test_help_lists_all_commands_in_groups(capsys: pytest.CaptureFixture[str]) -> None:
+    """Also where no command is named, which is wrong usage."""
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    help_text = capsys.readouterr().out
+    assert ended.value.code == 0
+    assert main([]) == 2 and capsys.readouterr().err == help_text
+    of_group: dict[str, list[str]] = {}
+    for line in help_text[help_text.index("commands:") :].splitlines():
+        if line[1:] in GROUPS.values():
+            of_group[line[1:]] = []
+        elif found := re.match(r"  ([a-z]+)\s", line):
+            list(of_group.values())[-1].append(found[1])
+    assert list(of_group) == list(GROUPS.values())
+    listed = [name for names in of_group.values() for name in names]
+    assert sorted(listed) == sorted(commands_of_all())
+    assert len(listed) - len(of_group["more"]) <= 20

@@ -10,6 +10,7 @@ from ballplate.cli.reading_options import add_readings, observed_readings, warn_
 from ballplate.cli.table_options import KEYS
 from ballplate.results.groupings import GROUPINGS
 
+GROUP = "more"
 HELP = "split uncertainties by their sources: readings, certificates, probes, influences"
 DESCRIPTION = (
     "Compute what each source of uncertainty contributes to U4, U6, the body diagonals and the"

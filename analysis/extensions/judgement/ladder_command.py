@@ -7,6 +7,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from ballplate.cli.common import add_json, whole
 from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
 
+GROUP = "evaluate"
 HELP = "compare error models on readings: which one do they call for?"
 DESCRIPTION = (
     "Fit error models from the poorest to the richest that the design determines, kinematic ones"

@@ -8,6 +8,7 @@ from pathlib import Path
 from ballplate.cli.common import FITTED, add_json, map_path
 from ballplate.cli.outputs import add_force, add_output, write
 
+GROUP = "more"
 HELP = "convert the map of a fit to another error model, with its covariance"
 DESCRIPTION = (
     "Convert a map that fit -o has written to another error model of the same volume: the nearest"

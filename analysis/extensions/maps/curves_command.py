@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .fitted_errors_result import FittedErrorMap
     from .volumetric_results import MachineErrors
 
+GROUP = "more"
 HELP = "tell the parametric errors of a map that a fit left behind, with their uncertainties"
 DESCRIPTION = (
     "Tell every error function of a map file (fit -o) along its axis with its expanded uncertainty,"

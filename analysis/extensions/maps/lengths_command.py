@@ -29,6 +29,7 @@ from ballplate.cli.outputs import (
 MOST_PAIRS = 500_000
 
 
+GROUP = "more"
 HELP = "map the uncertainty of lengths over the volume against a target"
 DESCRIPTION = (
     "Compute the standard uncertainty u of the length between every two points of a"

@@ -10,6 +10,7 @@ from functools import partial
 from ballplate.cli.common import add_file, add_json, number
 from ballplate.cli.outputs import UsageError, add_force, add_output, text_writer, write
 
+GROUP = "more"
 HELP = "find which biases of readings and certificates would be noticed, and what the others change"
 DESCRIPTION = (
     "Compute the redundancy of every observation of a design, the smallest biases of"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 BAD_FILE = 3
 
 
+GROUP = "more"
 HELP = "write a sweep's results as CSV or Parquet"
 DESCRIPTION = (
     "Write a row for each cell of a store and a column for each figure, in metres and"

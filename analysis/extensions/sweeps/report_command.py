@@ -29,6 +29,7 @@ SUFFIXES = {
 }
 
 
+GROUP = "more"
 HELP = "write a sweep's results as an HTML page, or its tables"
 DESCRIPTION = (
     "Write the results of a sweep as one HTML page that needs no network: tables,"

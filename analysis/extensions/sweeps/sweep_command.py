@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 BAD_FILE = 3
 
 
+GROUP = "plan"
 HELP = "compute a family of experiments into a store"
 DESCRIPTION = (
     "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
