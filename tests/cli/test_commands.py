@@ -408,7 +408,7 @@ def test_shipped_files_name_their_schema() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["chekc"], ["check"], ["run", "--what"], ["simulate", QUICKSTART]]
+    "arguments", [["chekc"], ["check"], ["run", "--what"], ["simulate", QUICKSTART]]
 )
 def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
