@@ -7,7 +7,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import ballplate as bp
@@ -210,39 +210,35 @@ def test_an_option_names_the_extension_that_it_needs(
     assert not list(tmp_path.glob("*.html"))
 
 
-class EntryPoint:
-    """An entry point of a laboratory's own."""
-
-    def __init__(self, extension: object) -> None:
-        self.extension = extension
-
-    def load(self) -> object:
-        return self.extension
-
-
 @pytest.fixture
-def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[object]]:
-    """Extensions that are installed besides those shipped."""
-    found: list[object] = []
-    monkeypatch.setattr(
-        "importlib.metadata.entry_points", lambda group: [EntryPoint(one) for one in found]
-    )
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
+    """Installs a package of a laboratory's own, with what it registers."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def install(registered: str) -> None:
+        folder = tmp_path / "laboratory_package"
+        folder.mkdir()
+        (folder / "__init__.py").write_text(
+            f"from ballplate import Extension\n\nEXTENSION = {registered}\n", encoding="utf-8"
+        )
+        (folder / "counting.py").write_text(COUNTING, encoding="utf-8")
+        about = tmp_path / "laboratory_package-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: laboratory-package\nVersion: 1.0\n"
+        )
+        (about / "entry_points.txt").write_text(
+            "[ballplate.extensions]\ncounting = laboratory_package:EXTENSION\n"
+        )
+        extensions.registered.cache_clear()
+
+    yield install
     extensions.registered.cache_clear()
-    yield found
-    extensions.registered.cache_clear()
+    for name in [name for name in sys.modules if name.startswith("laboratory_package")]:
+        del sys.modules[name]
 
 
-def test_an_extension_of_a_laboratory_is_found(
-    installed: list[object],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Its command, its function, and its line in the help."""
-    from ballplate.cli import main
-
-    (tmp_path / "our_laboratory.py").write_text(
-        """
+COUNTING = """
 HELP = DESCRIPTION = "print the number of positions of a design"
 
 
@@ -259,15 +255,19 @@ def count(file):
     import ballplate as bp
 
     return len(bp.load(file).positions)
-""",
-        encoding="utf-8",
+"""
+
+
+def test_an_extension_of_a_laboratory_is_found(
+    installed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its command, its function, and its line in the help."""
+    from ballplate.cli import main
+
+    installed(
+        'Extension("counting", "laboratory_package", commands={"count": "counting"},'
+        ' functions={"count": "counting"})'
     )
-    (tmp_path / "laboratory_package").mkdir()
-    (tmp_path / "our_laboratory.py").rename(tmp_path / "laboratory_package" / "counting.py")
-    (tmp_path / "laboratory_package" / "__init__.py").write_text("", encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    provided = {"commands": {"count": "counting"}, "functions": {"count": "counting"}}
-    installed.append(Extension("counting", "laboratory_package", **provided))
     assert main(["count", "designs/quickstart.yaml"]) == 0
     assert capsys.readouterr().out == "6\n"
     assert bp.count("designs/quickstart.yaml") == 6
@@ -277,13 +277,13 @@ def count(file):
     assert "print the number of positions of a design" in capsys.readouterr().out
 
 
-def test_a_name_that_is_used_twice_is_refused(installed: list[object]) -> None:
-    installed.append(Extension("mine", "mine", commands={"sweep": "sweep"}))
+def test_a_name_that_is_used_twice_is_refused(installed: Callable[[str], None]) -> None:
+    installed('Extension("mine", "mine", commands={"sweep": "sweep"})')
     with pytest.raises(UnusableError, match="extensions sweeps and mine both provide sweep"):
         extensions.registered()
 
 
-def test_what_is_no_extension_is_refused(installed: list[object]) -> None:
-    installed.append("mine")
+def test_what_is_no_extension_is_refused(installed: Callable[[str], None]) -> None:
+    installed('"mine"')
     with pytest.raises(UnusableError, match="'mine' is no Extension"):
         extensions.registered()

@@ -8,14 +8,20 @@ entry point `ballplate.extensions`, and are looked up only for names that the ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .unusable import UnusableError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 ENTRY_POINT = "ballplate.extensions"
 KINDS = ("commands", "functions", "services", "schemas")
@@ -61,9 +67,7 @@ def registered() -> tuple[Extension, ...]:
 
     :raises UnusableError: one of them provides what another one does already.
     """
-    from importlib.metadata import entry_points
-
-    found = tuple(point.load() for point in entry_points(group=ENTRY_POINT))
+    found = tuple(point.load() for point in _entry_points())
     known = list(shipped())
     for extension in found:
         if not isinstance(extension, Extension):
@@ -78,6 +82,30 @@ def registered() -> tuple[Extension, ...]:
                     )
         known.append(extension)
     return found
+
+
+def _entry_points() -> Iterable[EntryPoint]:
+    """Entry points of extensions. Most often there are none, which reading the files of installed
+    packages tells in a twentieth of the time that it takes to parse all of them.
+    """
+    group = f"[{ENTRY_POINT}]".encode()
+    if not any(group in path.read_bytes() for path in _files_of_entry_points()):
+        return ()
+    from importlib.metadata import entry_points
+
+    return entry_points(group=ENTRY_POINT)
+
+
+def _files_of_entry_points() -> Iterator[Path]:
+    for folder in sys.path:
+        try:
+            names = os.listdir(folder or ".")
+        except OSError:
+            continue
+        for name in names:
+            path = Path(folder, name, "entry_points.txt")
+            if name.endswith((".dist-info", ".egg-info")) and path.is_file():
+                yield path
 
 
 def shipped() -> tuple[Extension, ...]:
