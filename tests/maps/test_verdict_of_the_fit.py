@@ -121,6 +121,8 @@ def test_a_target_is_not_simply_met_beyond_the_limit() -> None:
         assert result.quantities["U6"].within_target == 1.0
         (line,) = (one for one in result.lines() if one.startswith("within the target"))
         assert ("100 % of U6" in line) and (caveat in line) == (name == "beyond")
+        page = result.page()
+        assert "within the target" in page and page.count(caveat) == 2 * (name == "beyond")
 
 
 def test_a_reversal_has_the_verdict_of_multiple_redundancy() -> None:

@@ -59,7 +59,7 @@ class FitContents:
     where that was left out for the reason `unreliable`; why residuals were not tested for gross
     errors, empty where they were; `kinds` of the estimates by name; the
     edges (k, 2, d) of the volume; `target` in words; `files` that it comes from, and what was
-    assumed.
+    assumed; the `caveat` to what is said of the target.
     """
 
     title: str
@@ -73,6 +73,7 @@ class FitContents:
     target: str
     files: Sequence[str]
     facts: Sequence[tuple[str, str]]
+    caveat: str = ""
 
 
 def fit_page(contents: FitContents) -> str:
@@ -108,7 +109,9 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
     return [
         PageSection("rank", "What the readings determine", _rank(fit)),
         PageSection(
-            "lengths", "Uncertainties and target", joined([uncertainty_table(fit), task_table(fit)])
+            "lengths",
+            "Uncertainties and target",
+            joined([uncertainty_table(fit, contents.caveat), task_table(fit, contents.caveat)]),
         ),
         PageSection("curves", "Error curves", curves_section(fit)),
         PageSection(
@@ -169,7 +172,7 @@ def _verdict(fit: QuotedData, contents: FitContents) -> Html:
         suspects,
         ".",
     )
-    second = sentence(lengths_words(fit, contents.target))
+    second = sentence(lengths_words(fit, contents.target, contents.caveat))
     warnings = [sentence("Warning: ", one.text()) for one in fit.at("warnings").each()]
     return joined([first, second, *warnings])
 

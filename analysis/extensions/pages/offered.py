@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ballplate.simulator.estimation.linearisation import linearise
@@ -48,4 +49,4 @@ def fit_page_text(fit: Fit) -> str:
         not fit.without_scatter,
         fit.untested,
     )
-    return fit_page(contents)
+    return fit_page(replace(contents, caveat=fit.lack_of_fit.caveat))

@@ -14,7 +14,7 @@ def expansion(quantities: QuotedData) -> float:
     return next((one for one in stated if one is not None and one != 1.0), 2.0)
 
 
-def uncertainty_table(result: QuotedData) -> Html:
+def uncertainty_table(result: QuotedData, caveat: str = "") -> Html:
     """U1 to U6 with their expanded uncertainties."""
     quantities = result.at("quantities")
     k = expansion(quantities)
@@ -44,7 +44,7 @@ def uncertainty_table(result: QuotedData) -> Html:
         if one.data.get("within_target") is not None:
             by = uncertainty_words(one.data["target_coverage_factor"])
             within = one.share("within_target")
-            notes.append(note(f"Within the target ({by}): ", within, f" of {symbol}."))
+            notes.append(note(f"Within the target ({by}): ", within, f" of {symbol}{caveat}."))
         if one.data.get("parameters"):
             each = (
                 joined([f"{name} ", one.micro("parameters", name)])
@@ -59,8 +59,8 @@ def uncertainty_table(result: QuotedData) -> Html:
     return joined([table("quantities", caption, heads, rows, (0, 1, 6, 8)), *notes])
 
 
-def task_table(result: QuotedData) -> Html:
-    """Measuring tasks one by one."""
+def task_table(result: QuotedData, caveat: str = "") -> Html:
+    """Measuring tasks one by one; a `caveat` is added to what is said of the target."""
     if "tasks" not in result:
         return Html()
     rows = []
@@ -79,10 +79,10 @@ def task_table(result: QuotedData) -> Html:
             ]
         )
     heads = ["task", "length, mm", "u, µm", "U, µm", "k of U", "target, µm", "within target"]
-    return table("tasks", "Measuring tasks", heads, rows, (0, 6))
+    return table("tasks", f"Measuring tasks{caveat}", heads, rows, (0, 6))
 
 
-def lengths_words(result: QuotedData, target: str) -> Html:
+def lengths_words(result: QuotedData, target: str, caveat: str = "") -> Html:
     """In a sentence, how the lengths that the corrected machine measures compare with the
     target, or how uncertain they are where none is stated.
     """
@@ -115,7 +115,8 @@ def lengths_words(result: QuotedData, target: str) -> Html:
     by = uncertainty_words(u6["target_coverage_factor"])
     share = lengths.share("within_target")
     told = (
-        f" of the distances between corrected points are within the target {target} ({by}); u is "
+        f" of the distances between corrected points are within the target {target} ({by}){caveat};"
+        " u is "
     )
     return joined([open_, share, told, amounts, "."])
 
