@@ -18,6 +18,7 @@ from typing import Any
 
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import Mutant
+from tests.reference.copies import copy_file, copy_tree
 from tests.reference.package_copies import TOP
 from tests.robustness.kit import make_kit
 from tests.robustness.recipes import RECIPES
@@ -111,6 +112,6 @@ def copied(kit: Path, folder: Path) -> None:
     shutil.copytree(kit, folder, symlinks=True, ignore=shutil.ignore_patterns("pipe.csv"))
     for path in (TOP / "designs").iterdir():
         if path.is_dir() and path.name != "__pycache__":
-            shutil.copytree(path, folder / path.name, dirs_exist_ok=True)
+            copy_tree(path, folder / path.name, dirs_exist_ok=True)
         elif path.suffix == ".yaml":
-            shutil.copy(path, folder)
+            copy_file(path, folder)
