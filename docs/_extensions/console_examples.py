@@ -111,7 +111,9 @@ class _Example(SphinxDirective):
         found: Any = self.env.temp_data.get("example_folder")
         if found is None:
             found = tempfile.TemporaryDirectory(prefix="ballplate-docs-")
-            shutil.copytree(TOP / "designs", Path(found.name, "designs"))
+            # Without their modes: a checkout may be one that cannot be written.
+            designs = Path(found.name, "designs")
+            shutil.copytree(TOP / "designs", designs, copy_function=shutil.copyfile)
             self.env.temp_data["example_folder"] = found
         return Path(found.name)
 
