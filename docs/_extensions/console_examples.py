@@ -20,6 +20,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import errno
+import gc
 import html
 import importlib
 import io
@@ -297,6 +298,8 @@ def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
     process, terminal = pty.fork()
     if process == 0:
         status = 1
+        # What the pages are made of is not searched for garbage once more in each process.
+        gc.freeze()
         try:
             os.chdir(folder)
             os.environ.update(TERMINAL, PATH=f"{tools}:{os.environ['PATH']}")
