@@ -9,7 +9,7 @@ import pytest
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.axes import plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.datum import chosen_datum
+from ballplate.simulator.geometry.datum import Datum, chosen_datum, in_datum
 from ballplate.simulator.geometry.directions import GeneratedDirectionsSettings, directions
 from ballplate.simulator.geometry.motions import (
     rigid_motions,
@@ -104,6 +104,41 @@ def test_a_datum_names_as_many_balls_as_there_are_dimensions() -> None:
         chosen_datum(layout, 3, ("a", "b"))
     with pytest.raises(ValueError, match="name 2 different balls, .*, one on an axis, or all"):
         chosen_datum(layout, 2, ("a", "b", "c"))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_balls_in_a_datum_are_as_they_are_drawn(axis: int, sign: float, side: float) -> None:
+    """Drawn so that they meet its conditions, and then moved: on either half of an axis, with the
+    third ball on either side of it, and above and below its plane.
+    """
+    drawn = np.array([[0.0, 0, 0], [0, 0, 0], [0.4, 0.2, 0], [0.1, 0.5, 0.3], [-0.6, 0.2, -0.2]])
+    drawn[1, axis] = 2.0 * sign
+    drawn[2, 1 - axis] = 0.7 * side
+    shifted = drawn + [0.3, -0.1, 0.8]
+    layout = BallLayout(("o", "on", "plane", "above", "below"), shifted)
+    rotation = rotation_matrix([2.0, -0.7, 1.3])
+    for d, names in ((3, ("o", "on", "plane")), (2, ("o", "on"))):
+        datum = chosen_datum(layout, d, names)
+        turn = rotation if d == 3 else rotation_matrix([2.5])
+        moved = shifted[:, :d] @ turn.T + np.arange(d)
+        found, turned = in_datum(moved, datum, shifted)
+        np.testing.assert_allclose(found, drawn[:, :d], atol=1e-14)
+        np.testing.assert_allclose(turned, turn.T, atol=1e-14)
+
+
+def test_all_balls_in_a_datum_are_as_close_as_possible_to_the_drawing() -> None:
+    drawn = np.random.default_rng(4).standard_normal((5, 3))
+    rotation = rotation_matrix([2.0, -0.7, 1.3])
+    found, turned = in_datum(drawn @ rotation.T + 5.0, Datum(None), drawn)
+    np.testing.assert_allclose(found, drawn, atol=1e-14)
+    np.testing.assert_allclose(turned, rotation.T, atol=1e-14)
+
+
+def test_nothing_is_taken_from_errors_of_no_places_or_no_errors() -> None:
+    for shape in ((0, 3, 2), (4, 3, 0), (0, 2, 0)):
+        assert without_rigid_motion(np.zeros(shape[:2]), np.zeros(shape)).shape == shape
 
 
 def test_random_directions_are_those_of_the_seed() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import json.decoder
 import subprocess
 import sys
 from pathlib import Path
@@ -204,6 +205,17 @@ def test_a_package_that_is_a_former_one_is_told(
     assert "imports package_of_old, which is no longer a package of its own" in line
     line = refusal(written(tmp_path, source.replace("_of_old", "_of_nobody"))[0])
     assert "cannot be imported: ModuleNotFoundError" in line and "no longer" not in line
+
+
+def test_the_file_of_a_module_is_found_without_running_it(tmp_path: Path) -> None:
+    (tmp_path / "apart").mkdir()
+    (tmp_path / "apart" / "own.py").write_text("raise SystemExit", encoding="utf-8")
+    assert custom.module_source("apart.own:build", tmp_path) == tmp_path / "apart" / "own.py"
+    assert custom.module_source("json.decoder:JSONDecoder", tmp_path) == Path(json.decoder.__file__)
+    # A module without a file, and one that is nowhere.
+    for name in ("sys:exit", "nobody_has_this:at_all", "json.nothing:here"):
+        for folder in (tmp_path, None):
+            assert custom.module_source(name, folder) is None
 
 
 def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
