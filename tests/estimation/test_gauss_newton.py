@@ -155,17 +155,23 @@ def test_deficient_designs_leave_what_is_open_where_it_was() -> None:
     assert np.abs(solution.state.a).max() < 1e-2
 
 
+@pytest.mark.parametrize("noise", [1.0, 4.0])
 @pytest.mark.parametrize(("turned", "is_followed"), [(1e-2, True), (2e-3, False)])
-def test_what_is_open_is_followed_where_an_f_test_says_so(turned: float, is_followed: bool) -> None:
-    """Poses that are turned a lot open what is open as drawn by far more than noise explains."""
+def test_what_is_open_is_followed_where_an_f_test_says_so(
+    turned: float, is_followed: bool, noise: float
+) -> None:
+    """Poses that are turned a lot, of readings with more noise than stated in the same proportion,
+    tell of what is open as drawn by far more than noise explains.
+    """
     balls = grid(4)
     design = plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=7)
     generator = np.random.default_rng(1)
-    turn = rotation_from_vector(turned * generator.standard_normal((6, 3)))
+    turn = rotation_from_vector(noise * turned * generator.standard_normal((6, 3)))
     turn[0] = np.eye(3)
     truth = replace(truth_of(design, 1), rotations=turn @ design.positions.rotations)
     design = exactly_calibrated(design, truth)
-    readings, x = noisy_readings(design, truth, generator)
+    noisy = altered(design, machine={"repeatability": noise * design.machine.repeatability})
+    readings, x = noisy_readings(noisy, truth, generator)
     design = replace(design, readings=readings)
     start, drawn = initial_state(design, x), as_drawn(design)
     held, followed = (

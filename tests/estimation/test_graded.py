@@ -48,15 +48,16 @@ def least_squares(rows: np.ndarray, sides: np.ndarray) -> tuple[np.ndarray, np.n
     return solution.astype(float), (left.T @ left).astype(float)
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-15])
 @pytest.mark.parametrize("order", ["as they are", "lightest first", "heaviest first"])
-def test_a_triangle_keeps_what_the_lightest_rows_tell(order: str) -> None:
+def test_a_triangle_keeps_what_the_lightest_rows_tell(order: str, size: float) -> None:
     places = {
         "as they are": np.arange(10),
         "lightest first": np.argsort(WEIGHTS),
         "heaviest first": np.argsort(-WEIGHTS),
     }[order]
-    found = triangle(ROWS[places], SIDES[places])
-    solution, left = least_squares(ROWS, SIDES)
+    found = triangle(size * ROWS[places], size * SIDES[places])
+    solution, left = least_squares(size * ROWS, size * SIDES)
     ours = np.empty((4, 3))
     ours[found.order] = solve_triangular(found.root, found.side)
     np.testing.assert_allclose(ours, solution, rtol=1e-12)
@@ -99,9 +100,10 @@ def test_rows_that_are_collected_give_the_triangle_of_all() -> None:
     np.testing.assert_allclose(found.rest.T @ found.rest, left, rtol=1e-12)
 
 
-def test_balls_are_eliminated_with_all_digits_of_the_lightest_rows() -> None:
+@pytest.mark.parametrize("size", [1.0, 1e-15])
+def test_balls_are_eliminated_with_all_digits_of_the_lightest_rows(size: float) -> None:
     """Of three balls, one has a heavy row, one two, and one none; the rest has two columns."""
-    weights = np.array(
+    weights = size * np.array(
         [
             [1.0, 1e-2, 1e10, 1.0, 1.0, 1e-1],
             [1e12, 1.0, 1.0, 1e-1, 1e10, 1.0],

@@ -20,7 +20,8 @@ from tests.estimation.test_stars import small
 COUNT = 3
 
 
-def design_with_all() -> Design:
+def design_with_all(place: str) -> Design:
+    """With a star whose place is unknown one of its tips is held."""
     kinds = {
         "calibration": [
             {"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"},
@@ -31,12 +32,23 @@ def design_with_all() -> Design:
             {"parameter": "x low: rotation y", "standard_uncertainty": "10 urad"},
         ],
     }
-    return lay_out(small({"standard_uncertainty": "0.4 um"}, **kinds))
+    return lay_out(small({"standard_uncertainty": "0.4 um", "place": place}, **kinds))
 
 
-@pytest.mark.parametrize("kind", [CalibratedDistances, CalibratedCoordinates, Priors, Stars])
-def test_misfits_are_those_of_the_rows_at_each_replicate(kind: type[Observations]) -> None:
-    design = design_with_all()
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        (CalibratedDistances, "stated"),
+        (CalibratedCoordinates, "stated"),
+        (Priors, "stated"),
+        (Stars, "stated"),
+        (Stars, "unknown"),
+    ],
+)
+def test_misfits_are_those_of_the_rows_at_each_replicate(
+    kind: type[Observations], place: str
+) -> None:
+    design = design_with_all(place)
     layout = shared_layout(design)
     generator = np.random.default_rng(3)
     s, n, d = len(layout), len(design.balls.names), design.dimension
