@@ -122,16 +122,28 @@ def test_balls_in_a_datum_are_as_they_are_drawn(axis: int, sign: float, side: fl
     drawn = np.array([[0.0, 0, 0], [0, 0, 0], [0.4, 0.2, 0], [0.1, 0.5, 0.3], [-0.6, 0.2, -0.2]])
     drawn[1, axis] = 2.0 * sign
     drawn[2, 1 - axis] = 0.7 * side
-    shifted = drawn + [0.3, -0.1, 0.8]
-    layout = BallLayout(("o", "on", "plane", "above", "below"), shifted)
+    drawn = drawn[[3, 1, 2, 0, 4]]
+    shifted = drawn + [30.0, -50.0, 80.0]
+    layout = BallLayout(("above", "on", "plane", "o", "below"), shifted)
     rotation = rotation_matrix([2.0, -0.7, 1.3])
     for d, names in ((3, ("o", "on", "plane")), (2, ("o", "on"))):
         datum = chosen_datum(layout, d, names)
         turn = rotation if d == 3 else rotation_matrix([2.5])
         moved = shifted[:, :d] @ turn.T + np.arange(d)
         found, turned = in_datum(moved, datum, shifted)
-        np.testing.assert_allclose(found, drawn[:, :d], atol=1e-14)
-        np.testing.assert_allclose(turned, turn.T, atol=1e-14)
+        np.testing.assert_allclose(found, drawn[:, :d], atol=1e-12)
+        np.testing.assert_allclose(turned, turn.T, atol=1e-12)
+
+
+@pytest.mark.parametrize("along", [*np.eye(3), [0.6, 0.0, -0.8]])
+def test_balls_in_line_are_on_their_axis(along: np.ndarray) -> None:
+    drawn = np.outer([1.0, 0.0, 3.0], [0.8, 0.6, 0.0])
+    datum = chosen_datum(BallLayout(("a", "o", "b"), drawn), 3, (), PlateAxes(1, 2, 0))
+    assert datum.plane is None
+    found, rotation = in_datum(np.outer([1.0, 0.0, 3.0], along) + 7.0, datum, drawn)
+    np.testing.assert_allclose(found, np.outer([1.0, 0.0, 3.0], [1.0, 0.0, 0.0]), atol=1e-13)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-13)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
 def test_all_balls_in_a_datum_are_as_close_as_possible_to_the_drawing() -> None:
