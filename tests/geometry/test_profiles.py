@@ -96,6 +96,42 @@ def test_a_place_between_points_of_a_circle_is_on_its_arc() -> None:
                 profile.located(aside)
 
 
+def signed_curvature(one: complex, two: complex, three: complex) -> float:
+    """Of the circle through three points: four times the area of the triangle over its sides."""
+    first, second = two - one, three - two
+    area = 0.5 * (first.real * second.imag - first.imag * second.real)
+    return 4.0 * area / (abs(first) * abs(second) * abs(three - one))
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_arcs_of_a_curve_have_the_mean_curvature_of_their_ends(backwards: bool) -> None:
+    """Behind a cylinder a quarter of an ellipse, on which no two points have the same curvature."""
+    angle = np.radians([0.0, 12.0, 20.0, 35.0, 41.0, 60.0, 80.0])
+    ellipse = np.column_stack([0.04 * np.cos(angle), 0.025 * np.sin(angle)])
+    cylinder = np.array([[0.04, -0.03], [0.04, -0.01]])
+    places = np.concatenate([cylinder, ellipse])
+    labels = ["cylinder"] * 2 + ["dome"] * 7
+    step = -1 if backwards else 1
+    profile, own, _ = along(places[::step], labels[::step], np.zeros((0, 2)))
+    points = ellipse[::step, 1] + 1j * ellipse[::step, 0]
+    curvature = [signed_curvature(*points[k : k + 3]) for k in range(5)]
+    curvature = [curvature[0], *curvature, curvature[-1]]
+    lengths = profile.lengths[own][:7] if backwards else profile.lengths[own][2:]
+    for k in range(6):
+        mean = 0.5 * (curvature[k] + curvature[k + 1])
+        chord = points[k + 1] - points[k]
+        turn = 2.0 * np.arcsin(0.5 * abs(mean * chord))
+        assert lengths[k + 1] - lengths[k] == pytest.approx(turn / abs(mean), rel=1e-12)
+        height = np.sqrt(1.0 / mean**2 - 0.25 * abs(chord) ** 2)
+        centre = points[k] + 0.5 * chord + np.sign(mean) * 1j * chord / abs(chord) * height
+        for share in (0.1, 0.5, 0.8):
+            on_arc = centre + (points[k] - centre) * np.exp(1j * np.sign(mean) * turn * share)
+            length, normal = profile.located(np.array([on_arc.imag, on_arc.real]))
+            outwards = (on_arc - centre) / abs(on_arc - centre)
+            np.testing.assert_allclose(normal, [outwards.imag, outwards.real], atol=1e-12)
+            assert length == pytest.approx(lengths[k] + share * turn / abs(mean), rel=1e-12)
+
+
 # A cylinder with a step inwards, a conical face and a part beyond: features of two and three places.
 STEPPED = np.array(
     [[0.04, -0.05], [0.04, -0.03], [0.04, -0.02], [0.03, -0.01], [0.02, 0.0], [0.01, 0.0]]
