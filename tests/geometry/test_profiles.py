@@ -154,17 +154,18 @@ def test_a_place_on_a_line_is_at_its_distance() -> None:
             profile.located(np.array(place))
 
 
-def test_both_sides_of_a_place_that_features_share() -> None:
-    """The quarter circle turns from the line at its end; the cone makes an angle with it."""
+@pytest.mark.parametrize("step", [1, -1])
+def test_both_sides_of_a_place_that_features_share(step: int) -> None:
+    """The quarter circle turns from the line at its end, on the way up and down again."""
     arc = dome(np.array([0.0, 20.0, 50.0, 80.0]))
     line = np.array([[RADIUS + 0.02, -RADIUS - 0.02], [RADIUS + 0.01, -RADIUS - 0.01]])
     places = np.concatenate([line, arc])
-    profile, _, at = along(places, [""] * 6, arc[:1])
-    normals, tangents = profile.beside(arc[0])
-    assert at.tolist() == [2]
+    profile, _, at = along(places[::step], [""] * 6, arc[:1])
+    normals, tangents = (one[::step] for one in profile.beside(arc[0]))
+    assert at.tolist() == [2 if step == 1 else 3]
     half = np.sqrt(0.5)
     np.testing.assert_allclose(normals, [[half, half], [1.0, 0.0]], atol=1e-13)
-    np.testing.assert_allclose(tangents, [[-half, half], [0.0, 1.0]], atol=1e-13)
+    np.testing.assert_allclose(step * tangents, [[-half, half], [0.0, 1.0]], atol=1e-13)
     for place in (arc[1], line[0], arc[-1]):
         with pytest.raises(NotOnProfileError):
             profile.beside(place)
