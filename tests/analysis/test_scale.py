@@ -286,7 +286,6 @@ def test_what_cannot_be_laid_out_has_no_scale(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("evaluated", "count"),
     [
-        ("tasks: [{name: one, from: [0 m, 0 m, 0 m], to: [1 m, 1 m, 1 m]}]", 0),
         ("points: [[0 mm, 0 mm, 0 mm]]", 0),
         ("points: [[0 mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm]]", 0),
         ("points: {random: 20}", 190),
