@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from ballplate.rank.missing_bars import _told
 from ballplate.rank.verdict import Verdict
 from ballplate.results.study import check, predict
 from ballplate.simulator.experiment.load import load
@@ -196,6 +197,22 @@ def test_a_combination_is_told_of_those_that_no_bar_tells_apart(tmp_path: Path) 
     assert (
         "nothing determines the scale of Y nor its squareness to X and Z nor a combination of the"
         " scale of X and the scale of Z;" in told
+    )
+
+
+@pytest.mark.parametrize("seed", [None, *range(5)])
+def test_any_basis_of_what_is_open_is_told_alike(seed: int | None) -> None:
+    """One in which each strain has its own scales and squareness, and mixtures of these."""
+    # Coefficients of u_x^2, u_x u_y, u_x u_z, u_y^2, u_y u_z and u_z^2.
+    strains = np.zeros((6, 3))
+    strains[[0, 5], 0] = np.sqrt(0.5), -np.sqrt(0.5)
+    strains[3, 1] = strains[1, 2] = 1.0
+    if seed is not None:
+        generator = np.random.default_rng(seed)
+        strains = strains @ np.linalg.qr(generator.standard_normal((3, 3)))[0]
+    assert _told(strains, 3, False) == (
+        "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale"
+        " of Z"
     )
 
 

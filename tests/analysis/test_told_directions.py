@@ -95,6 +95,9 @@ def at_random(seed: int) -> tuple[Linearisation, Real, Real]:
         draw.choice([1.0, 1e-2, 1e-4])
         * at.design.artefacts.is_plate[at.design.balls.artefact][:, None]
     )
+    # What is mere rounding beside the largest.
+    moved[0][draw.random(len(moved[0])) < 0.1] *= 1e-10
+    moved[1][draw.random(len(moved[1])) < 0.1] *= 1e-10
     largest = max(float(np.abs(one).max()) for one in moved)
     shared, balls = moved[0] / largest, moved[1] / largest
     return with_null(at, 3e-4 * shared / effects(at), 3e-4 * balls), shared, balls
@@ -102,11 +105,14 @@ def at_random(seed: int) -> tuple[Linearisation, Real, Real]:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_direction_moves_points_by_a_micrometre_at_the_most(seed: int) -> None:
+    """And what is a billionth of that is nothing."""
     other, shared, balls = at_random(seed)
     ((found, moved),) = null_changes(other)
-    sign = np.sign(found[0] * shared[0])
-    np.testing.assert_allclose(found * effects(other), sign * 1e-6 * shared, rtol=1e-8)
-    np.testing.assert_allclose(moved, sign * 1e-6 * balls, rtol=1e-8)
+    first = np.abs(shared).argmax()
+    sign = np.sign(found[first] * shared[first])
+    for part, expected in ((found * effects(other), shared), (moved, balls)):
+        without_rounding = np.where(np.abs(expected) > 1e-9, expected, 0.0)
+        np.testing.assert_allclose(part, sign * 1e-6 * without_rounding, rtol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(12))
