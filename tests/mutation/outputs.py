@@ -34,6 +34,8 @@ OTHERS = (
 SECONDS = 120.0
 # Times of day and of the processor, which are other ones in each run.
 TIMES = re.compile(r"\d+(?:\.\d+)? s\b|\d\d:\d\d(?::\d\d)?")
+# Lines that tell how far a command has come, as often as it takes long.
+PROGRESS = re.compile(r"^\d+/\d+ .* so far, .* left.*\n?", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -98,11 +100,19 @@ def _written(line: str, kit: Path) -> list[Any]:
         except Exception as error:
             return [repr(error)]
         files = {
-            path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+            path.relative_to(folder).as_posix(): hashlib.sha256(
+                _timeless(path).encode()
+            ).hexdigest()
             for path in sorted(folder.rglob("*"))
             if path.is_file() and path.suffix not in (".sqlite", ".npz")
         }
-        return [status, *(TIMES.sub("", text.replace(top, "")) for text in texts), files]
+        texts = [PROGRESS.sub("", text.replace(top, "")) for text in texts]
+        return [status, *(TIMES.sub("", text) for text in texts), files]
+
+
+def _timeless(path: Path) -> str:
+    """The content of a file without the times of day that pages state."""
+    return TIMES.sub("", path.read_bytes().decode("latin-1"))
 
 
 def copied(kit: Path, folder: Path) -> None:
