@@ -298,7 +298,7 @@ def test_the_bars_that_are_proposed_cure(
         assert check(with_bars(tmp_path, given + fewer, **sections)).verdict.deficiency == left + 1
 
 
-@pytest.mark.parametrize("tilt", [2.5, 3.0, 3.5])
+@pytest.mark.parametrize("tilt", [2.5, 3.0, 3.5, 4.5, 6.0])
 def test_the_bars_that_are_proposed_cure_what_others_hardly_tell(
     tmp_path: Path, tilt: float
 ) -> None:
