@@ -33,6 +33,8 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
     for folder in ("analysis", "simulator", "tests"):
         compileall.compile_dir(ROOT / folder, quiet=2)
 os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+# What pytest makes of the tests is kept for the next run, by its own processes too.
+sys.dont_write_bytecode = not os.access(ROOT, os.W_OK)
 
 # The program takes one thread of linear algebra, dense references would take all: beside other
 # processes these wait for each other a hundred times as long as they compute.

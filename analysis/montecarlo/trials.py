@@ -106,10 +106,5 @@ def _parts(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, trials: int, workers: int
 ) -> Iterator[Accumulator]:
     tasks = range(-(-trials // TASK))
-    if workers == 1 or len(tasks) == 1:
-        for task in tasks:
-            yield sum_of_task(shared, aims, seed, task, trials)
-        return
-    yield from in_processes(
-        sum_of_task, ((shared, aims, seed, task, trials) for task in tasks), workers
-    )
+    arguments = ((shared, aims, seed, task, trials) for task in tasks)
+    return in_processes(sum_of_task, arguments, min(workers, len(tasks)))

@@ -44,6 +44,8 @@ def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
     like = int(np.flatnonzero(given.to_pivot == gauge_only)[0])
     pool = list(_places() if gauge_only else bar_directions(design.dimension))
     rows = _rows(design, given.direction, np.arange(len(given)))
+    # Strains are open also where these lengths tell too little of them, which is not to count.
+    rows[:, : len(strains)] -= _what_is_told(rows, strains) @ strains.T
     more = [_rows(design, u, np.full(len(u), like)) for _, _, u in pool]
     wanted = strains.shape[1] - (overall is not None)
     for size in range(1 if gauge_only else wanted, (3 if gauge_only else wanted) + 1):
@@ -74,16 +76,18 @@ def _rows(design: Design, u: Array, like: np.ndarray) -> Array:
 
 
 def _leave_open(rows: Array, strains: Array) -> int:
-    """How many of the strains are still open, pivots and lengths taking up what they can."""
+    """How many of the strains are still open."""
+    values = np.linalg.svd(_what_is_told(rows, strains), compute_uv=False)
+    return strains.shape[1] - int((values > SINGULAR_VALUE_TOLERANCE).sum())
+
+
+def _what_is_told(rows: Array, strains: Array) -> Array:
+    """What rows tell of strains (m, k), pivots and lengths taking up what they can."""
     size = len(strains)
-    others = rows[:, size:]
-    u, values, _ = np.linalg.svd(others, full_matrices=False)
+    u, values, _ = np.linalg.svd(rows[:, size:], full_matrices=False)
     taken = u[:, values > SINGULAR_VALUE_TOLERANCE * max(values.max(initial=0.0), 1.0)]
     told = rows[:, :size] @ strains
-    told = told - taken @ (taken.T @ told)
-    return strains.shape[1] - int(
-        (np.linalg.svd(told, compute_uv=False) > SINGULAR_VALUE_TOLERANCE).sum()
-    )
+    return np.asarray(told - taken @ (taken.T @ told))
 
 
 def bar_directions(d: int) -> Iterator[tuple[str, str, Array]]:

@@ -251,7 +251,7 @@ def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSumm
     it is open.
     """
     at = _linearised(with_offsets(experiment, uncertainty))
-    if at is None or not len(at.design.evaluation.points):
+    if at is None:
         return None
     pairs = point_pairs(at)[1]
     return None if pairs.undetermined or not pairs.count else pairs

@@ -20,6 +20,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import errno
+import gc
 import html
 import importlib
 import io
@@ -111,7 +112,9 @@ class _Example(SphinxDirective):
         found: Any = self.env.temp_data.get("example_folder")
         if found is None:
             found = tempfile.TemporaryDirectory(prefix="ballplate-docs-")
-            shutil.copytree(TOP / "designs", Path(found.name, "designs"))
+            # Without their modes: a checkout may be one that cannot be written.
+            designs = Path(found.name, "designs")
+            shutil.copytree(TOP / "designs", designs, copy_function=shutil.copyfile)
             self.env.temp_data["example_folder"] = found
         return Path(found.name)
 
@@ -295,6 +298,8 @@ def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
     process, terminal = pty.fork()
     if process == 0:
         status = 1
+        # What the pages are made of is not searched for garbage once more in each process.
+        gc.freeze()
         try:
             os.chdir(folder)
             os.environ.update(TERMINAL, PATH=f"{tools}:{os.environ['PATH']}")

@@ -80,9 +80,9 @@ def map_format() -> str:
     return _keys(whole)
 
 
-def reproduction() -> str:
+def reproduction(data_sets: int = DATA_SETS) -> str:
     """The published figures beside ours, as Markdown."""
-    found = reproduce(npl(), Shipped(TOP / "designs" / "npl"), (), DATA_SETS)
+    found = reproduce(npl(), Shipped(TOP / "designs" / "npl"), (), data_sets)
     # The page has a title of its own.
     return reproduction_markdown(found).partition("\n")[2]
 
@@ -254,6 +254,7 @@ def _text(action: argparse.Action) -> str:
     return (action.help or "").replace("%%", "%") + "."
 
 
+REPRODUCTION = "<!-- reproduction -->"
 PARTS = {
     "<!-- file format -->": file_format,
     "<!-- sweep format -->": sweep_format,
@@ -261,12 +262,13 @@ PARTS = {
     "<!-- map format -->": map_format,
     "<!-- units -->": units,
     "<!-- commands -->": commands,
-    "<!-- reproduction -->": reproduction,
+    REPRODUCTION: reproduction,
 }
 
 
 def _fill(app: Sphinx, page: str, source: list[str]) -> None:
-    for marker, part in PARTS.items():
+    parts = {**PARTS, REPRODUCTION: lambda: reproduction(app.config.data_sets)}
+    for marker, part in parts.items():
         if marker in source[0]:
             source[0] = source[0].replace(marker, part())
             # The program may have changed although the page has not.
@@ -274,5 +276,7 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
+    # Fewer are drawn where it is tested that the pages can be built.
+    app.add_config_value("data_sets", DATA_SETS, "env", int)
     app.connect("source-read", _fill)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -57,8 +58,14 @@ def distances(source: Array, target: Array, rotation: Array, origin: Array) -> A
 
 def _subsets(source: Array) -> NDArray[np.int64]:
     """Indices (c, d) of subsets that fix a motion, the most widely spread ones of those drawn."""
-    m, d = source.shape
-    size = min(d, m)
+    return _widest(source.tobytes(), source.shape[1])
+
+
+@lru_cache(maxsize=64)
+def _widest(content: bytes, d: int) -> NDArray[np.int64]:
+    """Those of the points in `content`; a position is compared several times in each evaluation."""
+    source = np.frombuffer(content).reshape(-1, d)
+    m, size = len(source), min(d, len(source))
     if m <= 10:
         drawn = np.array(list(combinations(range(m), size)), np.int64)
     else:

@@ -211,6 +211,10 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
         for event in yaml.parse(text, Loader=LOADER):
             builder.take(event)
     except yaml.MarkedYAMLError as error:
+        # Since 6.0.4, PyYAML refuses a thousand brackets in a line before it tells of the first.
+        end = error.problem_mark
+        if end is not None and "nesting depth" in str(error.problem):
+            return parse_tree(text[: end.index], file)
         builder.messages.append(_syntax_message(error, text, file))
         builder.root = None
     if builder.messages and (minor is None or builder.root is None):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from ballplate.rank.missing_bars import _told
 from ballplate.rank.verdict import Verdict
 from ballplate.results.study import check, predict
 from ballplate.simulator.experiment.load import load
@@ -188,6 +189,71 @@ def test_planes_and_axes_are_told_without_a_length_or_without_scales(tmp_path: P
     )
 
 
+def test_a_combination_is_told_of_those_that_no_bar_tells_apart(tmp_path: Path) -> None:
+    """From bars at 45 deg in the xz plane the sum of two scales follows, and not their difference;
+    all else that a bar along y takes part in is open by itself.
+    """
+    told = reason(tmp_path, [(0.0, 45.0), (0.0, 135.0)])
+    assert (
+        "nothing determines the scale of Y nor its squareness to X and Z nor a combination of the"
+        " scale of X and the scale of Z;" in told
+    )
+
+
+@pytest.mark.parametrize("seed", [None, *range(5)])
+def test_any_basis_of_what_is_open_is_told_alike(seed: int | None) -> None:
+    """One in which each strain has its own scales and squareness, and mixtures of these."""
+    # Coefficients of u_x^2, u_x u_y, u_x u_z, u_y^2, u_y u_z and u_z^2.
+    strains = np.zeros((6, 3))
+    strains[[0, 5], 0] = np.sqrt(0.5), -np.sqrt(0.5)
+    strains[3, 1] = strains[1, 2] = 1.0
+    if seed is not None:
+        generator = np.random.default_rng(seed)
+        strains = strains @ np.linalg.qr(generator.standard_normal((3, 3)))[0]
+    assert _told(strains, 3, False) == (
+        "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale"
+        " of Z"
+    )
+
+
+def gauges(tmp_path: Path, few: int, many: int) -> str:
+    """The reason of two gauges on pivots of their own, read in few and in many places at one
+    height.
+    """
+    content = yaml.safe_load((FOLDER / "bryan-gauge.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    places = {
+        name: [[f"{k * 360 // count} deg", "30 deg"] for k in range(count)]
+        for name, count in (("few", few), ("many", many))
+    }
+    content["artefacts"] = {
+        name: {"kind": "bryan_gauge", "radius": "300 mm", "directions": own}
+        for name, own in places.items()
+    }
+    content["positions"] = [
+        {"name": name, "artefact": name, "pose": {"origin": ["500 mm", "400 mm", "100 mm"]}}
+        for name in places
+    ]
+    content["calibration"] = [
+        {"kind": "radius", "artefact": name, "standard_uncertainty": "0.5 um"} for name in places
+    ]
+    (tmp_path / "gauges.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    (told,) = check(load(tmp_path / "gauges.yaml")[0]).verdict.reasons
+    return told
+
+
+@pytest.mark.parametrize(("few", "many"), [(3, 3), (3, 4), (4, 3), (2, 9), (5, 5)])
+def test_any_three_places_lie_in_a_plane_and_more_do_not(
+    tmp_path: Path, few: int, many: int
+) -> None:
+    told = gauges(tmp_path, few, many)
+    assert told.startswith(
+        "the places of the ball are too few or too similar"
+        if max(few, many) == 3
+        else "every place of the ball lies in a plane parallel to the xy plane"
+    )
+
+
 # Azimuths and elevations of the bars that are proposed.
 BARS = {"along x": (0.0, 0.0), "along y": (90.0, 0.0), "along z": (0.0, 90.0)}
 BARS |= {f"in the xy plane at {sign}45 deg": (float(f"{sign}45"), 0.0) for sign in ("", "-")}
@@ -230,6 +296,23 @@ def test_the_bars_that_are_proposed_cure(
     for k in range(len(proposed)):
         fewer = [BARS[one] for one in proposed[:k] + proposed[k + 1 :]]
         assert check(with_bars(tmp_path, given + fewer, **sections)).verdict.deficiency == left + 1
+
+
+@pytest.mark.parametrize("tilt", [2.5, 3.0, 3.5, 4.5, 6.0])
+def test_the_bars_that_are_proposed_cure_what_others_hardly_tell(
+    tmp_path: Path, tilt: float
+) -> None:
+    """Of the scale of Z bars that are hardly tilted tell the square of the tilt, which is no
+    deficiency of the rank: it takes one bar, and not any.
+    """
+    given = [(30.0 * k, tilt * (k % 2)) for k in range(12)]
+    before = check(with_bars(tmp_path, given)).verdict
+    assert before.deficiency == 0 and len(before.weak) == 1
+    (told,) = before.reasons
+    assert "nothing determines the scale of Z; add for example a bar along z" in told
+    for one, cures in (("along z", True), ("along x", False)):
+        after = check(with_bars(tmp_path, [*given, BARS[one]])).verdict
+        assert (after.reasons == () and after.weak == ()) == cures
 
 
 @pytest.mark.parametrize("calibrated", [True, False])

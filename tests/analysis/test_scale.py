@@ -5,7 +5,7 @@ design.
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,14 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.functions import Distances, MeasuredPoints, linear_functions
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Parameter, Reported
 from ballplate.uncertainty.scale import (
     EXACT_OFFSETS,
     OWN_SCALES,
@@ -25,11 +28,12 @@ from ballplate.uncertainty.scale import (
     lengths_with_offsets,
     scale_row,
     scale_uncertainty,
+    stretches,
     with_offsets,
 )
 
 from tests.reference import dense
-from tests.reference.designs import altered
+from tests.reference.designs import altered, grid, plate_design, six_positions
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace(
@@ -258,6 +262,116 @@ def test_a_certificate_is_suggested_and_does_what_is_told(
     assert f"average U6 {1e6 * average:.4f} µm with 1 µm on the probe offsets" in told
     assert main(["check", str(file), "--suggest"]) == 0
     assert "warning" not in capsys.readouterr().out
+
+
+def test_what_cannot_be_laid_out_has_no_scale(tmp_path: Path) -> None:
+    """Without the certificate a pose is held that the file states a prior of."""
+    text = ONE_PROBE.replace("distances, pairs: corner sides,", "coordinates,")
+    prior = '{parameter: "a: rotation z", value: 0 urad, standard_uncertainty: 10 urad}'
+    experiment = experiment_of(tmp_path, f"{text}\npriors:\n  - {prior}\n")
+    without = replace(experiment, calibration=())
+    with pytest.raises(ExperimentError, match='"a: rotation z" is held'):
+        lay_out(without)
+    assert 0.0 < scale_uncertainty(experiment) < 1e-6
+    assert scale_uncertainty(without) == np.inf
+    found = check(experiment, with_scale=True).scale
+    assert found is not None
+    assert [(one.words, one.without) for one in found.carriers] == [
+        ("certificates of plate", np.inf)
+    ]
+    assert lengths_with_offsets(experiment, 1e-6) is not None
+    assert lengths_with_offsets(without, 1e-6) is None
+
+
+@pytest.mark.parametrize(
+    ("evaluated", "count"),
+    [
+        ("points: [[0 mm, 0 mm, 0 mm]]", 0),
+        ("points: [[0 mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm]]", 0),
+        ("points: {random: 20}", 190),
+    ],
+)
+def test_without_two_points_there_are_no_lengths_to_be_uncertain_of(
+    tmp_path: Path, evaluated: str, count: int
+) -> None:
+    text = ONE_PROBE.replace("points: {random: 20}", evaluated)
+    found = lengths_with_offsets(experiment_of(tmp_path, text), 1e-6)
+    assert (0 if found is None else found.count) == count
+    assert (found is None) == (count == 0)
+
+
+@dataclass(frozen=True)
+class Strains:
+    """An error model whose parameters strain the volume: e = sum of a_k times matrices (d, d) times
+    x.
+    """
+
+    matrices: tuple[np.ndarray, ...]
+
+    @property
+    def dimension(self) -> int:
+        return 3
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return tuple(Parameter(f"S{k}", "1", f"S{k}", "strain") for k in range(len(self.matrices)))
+
+    def error(self, x: np.ndarray, a: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return p + np.asarray(self.jacobian(x, a, p) @ a)
+
+    def jacobian(self, x: np.ndarray, a: np.ndarray, p: np.ndarray) -> np.ndarray:
+        columns = [x @ one.T for one in self.matrices]
+        return np.stack(columns, axis=2) if columns else np.zeros((*x.shape, 0))
+
+    def reported(self) -> Reported:
+        return Reported.as_is(self.parameters)
+
+
+X, Y, Z = (np.outer(axis, axis) for axis in np.eye(3))
+SHEAR = np.outer(np.eye(3)[0], np.eye(3)[1])
+LINE = np.linspace(-0.5, 0.5, 3)
+# In the middle of which a point is no distance from the centroid along any axis.
+SYMMETRIC = np.array(list(itertools.product(LINE, LINE, LINE)))
+PLACES = {
+    "symmetric": SYMMETRIC,
+    "elsewhere": SYMMETRIC + [0.2, 0.7, 0.1],
+    "random": np.random.default_rng(1).random((20, 3)),
+    "none": np.zeros((0, 3)),
+    "level": np.random.default_rng(2).random((20, 3)) * [1.0, 1.0, 0.0],
+}
+
+
+@pytest.mark.parametrize(
+    ("matrices", "in_space", "in_a_level"),
+    [
+        ((X + Y + Z,), True, True),
+        ((X, Y, Z), True, True),
+        ((X - Y, SHEAR, 1e-6 * Z, X + Y), True, True),
+        ((X + Y + Z + SHEAR,), False, False),
+        ((X + Y + Z + SHEAR, 1e6 * SHEAR), True, True),
+        ((X + Y + Z + 1e-8 * SHEAR,), True, True),
+        ((X + Y,), False, True),
+        ((X, Y, SHEAR), False, True),
+        ((X, Z), False, False),
+        ((0.0 * X,), False, False),
+        ((), False, False),
+    ],
+)
+@pytest.mark.parametrize("points", PLACES.values(), ids=PLACES)
+def test_a_model_stretches_where_it_holds_the_unit_strain(
+    matrices: tuple[np.ndarray, ...], in_space: bool, in_a_level: bool, points: np.ndarray
+) -> None:
+    """At all points at once, which in a level are less than the whole volume."""
+    design = plate_design(
+        grid(3), six_positions(), (), (), position_coefficients=3, rotation_coefficients=3
+    )
+    model = Strains(matrices)
+    moved = altered(design, model=model, evaluation={"points": points})
+    is_level = len(points) > 0 and not np.ptp(points[:, 2])
+    expected = in_a_level if is_level else in_space
+    assert can_stretch(moved, nominal_state(moved)) is expected
+    volume = Volume(np.array([-0.5, 0.0, 0.2]), np.array([0.5, 2.0, 0.6]))
+    assert stretches(model, volume, np.zeros(len(matrices))) is in_space
 
 
 def with_points(at: Linearisation, points: np.ndarray) -> Linearisation:

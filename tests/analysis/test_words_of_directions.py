@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from ballplate.rank.proposed_bars import bar_directions
-from ballplate.rank.verdict import deformation
+from ballplate.rank.verdict import deformation, shape
 
 GRID = np.array([[0.1 * x, 0.15 * y, 0.0] for x in range(4) for y in range(3)])
 # Equal moments, so that a shear is half a turn and half a symmetric strain.
@@ -50,6 +50,88 @@ def test_bends_and_uneven_distortions() -> None:
     assert deformation(BODY, (BODY[:, :1] - 0.1) ** 2 * Z) == "distorts unevenly"
     twisted = np.outer(x * 0 + 1, X) * (x - 0.15) + 3.0 * (x - 0.15) * (y - 0.15) * Z
     assert deformation(GRID, twisted) == "stretches along its x, bends out of its plane"
+
+
+def of_unit_length(field: np.ndarray) -> np.ndarray:
+    return field / np.linalg.norm(field)
+
+
+# Displacements of one length that are orthogonal to one another and to all motions of a rigid body.
+AWAY = of_unit_length((GRID[:, :1] - GRID[:, :1].mean()) * X)
+WAVE = GRID[:, :1] ** 2 - 0.3 * GRID[:, :1]
+WAVE -= WAVE.mean()
+BENT, UNEVEN = of_unit_length(WAVE * Z), of_unit_length(WAVE * X)
+
+
+@pytest.mark.parametrize(
+    ("small", "words"),
+    [(0.049, "stretches along its {}"), (0.051, "stretches along its x and its y")],
+)
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_stretch_is_told_beyond_a_twentieth_of_the_largest(
+    small: float, words: str, axis: int
+) -> None:
+    stretch = np.where(np.arange(3) == axis, 1.0, small) * [1.0, 1.0, 0.0]
+    assert deformation(GRID, GRID * stretch) == words.format("xy"[axis])
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        (0.981, "changes its size as a whole"),
+        (0.979, "stretches along its x and its y"),
+        (-0.979, "stretches along its x and shrinks along its y"),
+    ],
+)
+def test_equal_stretches_are_those_within_two_hundredths(other: float, words: str) -> None:
+    assert deformation(GRID, GRID * [1.0, other, 0.0]) == words
+    assert deformation(GRID[:, :2], GRID[:, :2] * [1.0, other]) == words
+    # Of a body whose third axis keeps its length it is no change as a whole.
+    assert deformation(BODY, BODY * [1.0, other, 0.0]).startswith("stretches along its x and ")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_shear_is_told_beyond_a_tenth_of_the_largest(sign: float) -> None:
+    for angle, told in ((0.099, False), (0.101, True)):
+        half = sign * angle / 2
+        matrix = np.outer(X, X) + half * (np.outer(X, Y) + np.outer(Y, X))
+        words = deformation(SQUARE, SQUARE @ matrix.T)
+        assert words == "stretches along its x" + (", shears in its xy plane" if told else "")
+
+
+@pytest.mark.parametrize("share", [0.019, 0.021, 0.979, 0.981])
+@pytest.mark.parametrize(
+    ("rest", "words"), [(BENT, "bends out of its plane"), (UNEVEN, "distorts unevenly")]
+)
+def test_a_part_is_told_beyond_two_hundredths_of_the_squares(
+    rest: np.ndarray, words: str, share: float
+) -> None:
+    told = deformation(GRID, np.sqrt(1.0 - share) * AWAY + np.sqrt(share) * rest).split(", ")
+    wanted = [words] if share > 0.02 else []
+    assert told == (["stretches along its x"] if share < 0.98 else []) + wanted
+
+
+@pytest.mark.parametrize("share", [0.49, 0.51])
+def test_what_is_mostly_out_of_its_plane_bends(share: float) -> None:
+    displacement = np.sqrt(share) * BENT + np.sqrt(1.0 - share) * UNEVEN
+    words = "bends out of its plane" if share > 0.5 else "distorts unevenly"
+    assert deformation(GRID, displacement) == words
+
+
+@pytest.mark.parametrize("degree", range(1, 12))
+def test_the_shape_of_a_curve_is_the_degree_that_describes_it(degree: int) -> None:
+    """Polynomials that are orthogonal on the places of the curve, so that a fit of lower degrees
+    leaves one of them as it is: another one beside it counts from a thousandth on.
+    """
+    t = np.linspace(0.0, 1.0, 201)
+    curves = np.linalg.qr(np.polynomial.legendre.legvander(2.0 * t - 1.0, 12))[0]
+    curve, beside = (
+        curves[:, degree : degree + 2].T / np.abs(curves[:, degree : degree + 2]).max(0)[:, None]
+    )
+    words = ["", "linear", "quadratic", "cubic"]
+    words += [f"of degree {k}" for k in range(4, 11)] + ["irregular"] * 2
+    assert shape(t, curve) == shape(t, curve + 0.99e-3 * beside) == words[degree]
+    assert shape(t, curve + 1.01e-3 * beside) == words[degree + 1]
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -17,6 +17,8 @@ from ballplate.cli import main
 from ballplate.results.study import check
 from ballplate.simulator.experiment.load import load
 
+from tests.reference.copies import copy_file
+
 SYMMETRICAL = Path("designs/npl/6.1.1.yaml").resolve()
 QUICKSTART = Path("designs/quickstart.yaml").resolve()
 GAUGE = Path("designs/hurt_foss/bryan-gauge.yaml").resolve()
@@ -47,7 +49,7 @@ def run(*arguments: str | Path) -> int:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "shifted.yaml").write_text(SHIFTED, encoding="utf-8")
     (tmp_path / "commented.yaml").write_text(COMMENTED, encoding="utf-8")
-    shutil.copy(QUICKSTART, tmp_path / "good.yaml")
+    copy_file(QUICKSTART, tmp_path / "good.yaml")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -60,7 +62,7 @@ def test_deficient_variants_are_mended_and_the_others_left(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = folder / "6.1.1.yaml"
-    shutil.copy(SYMMETRICAL, path)
+    copy_file(SYMMETRICAL, path)
     assert deficiencies(path) == [0, 2, 0, 2]
     assert run("check", "--fix", path) == 0
     out, err = capsys.readouterr()
@@ -139,7 +141,7 @@ def test_what_cannot_be_repaired_is_told_as_it_is_suggested(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = folder / "gauge.yaml"
-    shutil.copy(GAUGE, path)
+    copy_file(GAUGE, path)
     text = path.read_bytes()
     found = []
     for option in ("--suggest", "--fix"):
@@ -238,7 +240,7 @@ def test_a_weak_design_is_mended_where_weak_ones_fail(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = folder / "weak.yaml"
-    shutil.copy(Path(__file__).parents[2] / "designs/certified/weak.yaml", path)
+    copy_file(Path(__file__).parents[2] / "designs/certified/weak.yaml", path)
     before = path.read_bytes()
     assert run("check", "--fix", path) == 0
     assert capsys.readouterr().err.endswith("weak: nothing to repair\n")

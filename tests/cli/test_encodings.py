@@ -6,7 +6,6 @@ import ast
 import io
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,8 @@ from xml.etree import ElementTree
 
 import pytest
 from ballplate.cli import main
+
+from tests.reference.copies import copy_tree
 
 ROOT = Path(__file__).parents[2]
 TITLE = "Prüfkörper “A” – 0.5 µm ± 2 µm × 3, ≤ 20 °C …"
@@ -62,7 +63,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (top / "plate.yaml").write_text(text, encoding="utf-8")
     lines = (ROOT / "designs/park/machines/gec-like.yaml").read_text(encoding="utf-8").splitlines()
     text = "\n".join(f"title: '{TITLE}'" if line.startswith("title:") else line for line in lines)
-    shutil.copytree(ROOT / "designs/park/machines", top, dirs_exist_ok=True)
+    copy_tree(ROOT / "designs/park/machines", top, dirs_exist_ok=True)
     (top / "machine.yaml").write_text(text, encoding="utf-8")
     (top / "sizes.yaml").write_text(
         f"title: '{TITLE}'\nbase: plate.yaml\naxes: {{µ: {{paths: ['artefacts.plate.balls[0]',"

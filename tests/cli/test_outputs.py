@@ -32,6 +32,7 @@ from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
 from tests.cli.cuts import remains
 from tests.cli.test_check_fix import SHIFTED as OPEN
 from tests.planning.small_pool import TEXT as POOL
+from tests.reference.copies import copy_file, copy_tree
 from tests.report.stores import axis, done, made_up
 
 DESIGN = """\
@@ -217,9 +218,9 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "sweep.yaml").write_text(f"title: two\nbase: design.yaml\n{axes}\n", encoding="utf-8")
     for name in ("drawn.yaml", "done.csv", "nominal.csv"):
         (folder / name).write_text("is not read\n", encoding="utf-8")
-    shutil.copy("designs/gilsinn/table-1.csv", folder / "points.csv")
-    shutil.copy("designs/park/machines/measured-errors.yaml", folder / "machine.yaml")
-    shutil.copytree("designs/park/machines/measured", folder / "measured")
+    copy_file("designs/gilsinn/table-1.csv", folder / "points.csv")
+    copy_file("designs/park/machines/measured-errors.yaml", folder / "machine.yaml")
+    copy_tree("designs/park/machines/measured", folder / "measured")
     figures = {
         "rank_deficiency": 0.0,
         "as_expected": 1.0,

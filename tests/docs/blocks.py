@@ -10,12 +10,13 @@ from __future__ import annotations
 import importlib
 import re
 import shlex
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from tests.reference.copies import copy_file, copy_tree
 
 TOP = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(TOP / "docs" / "_extensions"))
@@ -87,7 +88,7 @@ def made(block: Block, folder: Path) -> list[str]:
 
     :raises ValueError: the command fails, or prints no line of the kind of one that is shown.
     """
-    shutil.copytree(TOP / "designs", folder / "designs", dirs_exist_ok=True)
+    copy_tree(TOP / "designs", folder / "designs", dirs_exist_ok=True)
     status, lines = examples.terminal_lines(f"ballplate {block.command}", folder)
     if status:
         raise ValueError(f"{block.page}: {block.command} has exit status {status}: {lines}")
@@ -112,7 +113,7 @@ def rewrite(page: Path) -> None:
         with tempfile.TemporaryDirectory() as folder:
             lines = made(block, Path(folder))
             for picture in block.pictures:
-                shutil.copy(Path(folder, picture.name), TOP / picture)
+                copy_file(Path(folder, picture.name), TOP / picture)
         old = f"ballplate {block.command}\n" + "".join(f"{line}\n" for line in block.shown)
         new = f"ballplate {block.command}\n" + "".join(f"{line}\n" for line in lines)
         assert text.count(old) == 1, f"{page}: {block.command} stands there more than once"

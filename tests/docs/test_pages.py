@@ -48,11 +48,13 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The pages, built with the network out of reach."""
+    """The pages, built with the network out of reach; the data sets of the page on the reproduction,
+    which `ballplate reproduce` draws as well, are few.
+    """
     folder = tmp_path_factory.mktemp("docs")
     nowhere = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
     found = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "-b", "html", DOCS, folder],
+        [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "-D", "data_sets=4", DOCS, folder],
         env={**os.environ, **nowhere},
         capture_output=True,
         text=True,

@@ -15,7 +15,7 @@ from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
-from ballplate.simulator.estimation.length_equations import length_estimate
+from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.estimation.spheres import fit_sphere
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
@@ -325,14 +325,88 @@ def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path
     on_truth, truth = truth_of(changed(tmp_path, "bryan-gauge", **BOTH), design)
     _, x = exact_readings(on_truth, truth)
     found = length_estimate(design, x, "sphere-then-metric")
-    metric = np.eye(3)
-    metric[np.triu_indices(3)] += found.factors
-    metric = np.triu(metric) + np.triu(metric, 1).T
+    metric = metric_of(found.factors)
     seen = x + design.probes.offsets[design.readings.probe]
     bar = seen[design.of(Lengths).first[0]] - seen[design.of(Lengths).second[0]]
     # Nothing else depends on it, so that its own equation holds.
     assert found.lengths[0] ** 2 == pytest.approx(bar @ metric @ bar, rel=1e-14)
     assert abs(found.lengths[0] - np.linalg.norm(bar)) > 1e-6
+
+
+def metric_of(factors: np.ndarray) -> np.ndarray:
+    """The metric tensor of e1 to e6."""
+    metric = np.eye(3)
+    metric[np.triu_indices(3)] += factors
+    return np.asarray(np.triu(metric) + np.triu(metric, 1).T)
+
+
+@pytest.mark.parametrize("estimator", ["length-equations", "sphere-then-metric"])
+def test_length_equations_are_solved_as_scipy_does(
+    estimator: LengthEstimator, tmp_path: Path
+) -> None:
+    """Centres, radii, the metric and its parameters' uncertainties; two gauges of a known radius,
+    one of an unknown one, and a bar of an unknown length.
+    """
+    experiment = changed(tmp_path, "bryan-gauge", **BOTH)
+    design = lay_out(experiment)
+    _, x = exact_readings(*truth_of(experiment, design))
+    x = x + 1e-5 * np.random.default_rng(8).standard_normal(x.shape)
+    found = length_estimate(design, x, estimator)
+    seen = x + design.probes.offsets[design.readings.probe]
+    position = design.readings.position
+    bar = np.subtract(*seen[position == 0])
+    gauges = [seen[position == k] for k in (1, 2, 3)]
+
+    def of_gauges(metric: np.ndarray, centres: np.ndarray, short: float) -> np.ndarray:
+        rows = [
+            np.einsum("mi,ij,mj->m", places - centre, metric, places - centre) - radius**2
+            for places, centre, radius in zip(
+                gauges, centres.reshape(3, 3), (0.3001, 0.3001, short), strict=True
+            )
+        ]
+        return np.concatenate(rows)
+
+    centres = np.array([places.mean(axis=0) for places in gauges]).ravel()
+    strict = {"x_scale": "jac", "xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    spheres = least_squares(
+        lambda u: of_gauges(np.eye(3), u[:9], u[9]), np.append(centres, 0.2), "3-point", **strict
+    ).x
+    if estimator == "sphere-then-metric":
+        centres, short = spheres[:9], spheres[9]
+        # Linear in the factors; the bar's equation gives its own length only.
+        derivative = central_difference(
+            lambda u: of_gauges(metric_of(u), centres, short), np.zeros(6), 1e-3
+        )
+        residual = of_gauges(np.eye(3), centres, short)
+        factors = np.linalg.lstsq(derivative, -residual, rcond=None)[0]
+    else:
+        whole = least_squares(
+            lambda u: of_gauges(metric_of(u[:6]), u[6:15], u[15]),
+            np.append(np.zeros(6), spheres),
+            "3-point",
+            **strict,
+        )
+        factors, centres, short, derivative = whole.x[:6], whole.x[6:15], whole.x[15], whole.jac
+    metric = metric_of(factors)
+    left = of_gauges(metric, centres, short)
+    freedom = len(left) - derivative.shape[1]
+    covariance = left @ left / freedom * np.linalg.inv(derivative.T @ derivative)[:6, :6]
+
+    def factors_of(parameters: np.ndarray) -> np.ndarray:
+        axes = directions(parameters)
+        return np.asarray((axes.T @ axes - np.eye(3))[np.triu_indices(3)])
+
+    by_factor = np.linalg.inv(central_difference(factors_of, np.zeros(6), 1e-5))
+    spread = np.sqrt(np.diag(by_factor @ covariance @ by_factor.T))
+    ours = np.sqrt((found.spread**2).sum(axis=1))
+    assert found.degrees_of_freedom == freedom and found.deficiency == 0 and found.converged
+    np.testing.assert_allclose(found.factors, factors, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(factors_of(found.parameters), factors, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.centres[1:].ravel(), centres, rtol=0, atol=1e-10)
+    wanted = [np.sqrt(bar @ metric @ bar), short]
+    np.testing.assert_allclose(found.lengths, wanted, rtol=0, atol=1e-10)
+    assert found.scatter == pytest.approx(np.sqrt(left @ left / freedom), rel=1e-6)
+    np.testing.assert_allclose(ours, spread, rtol=1e-5)
 
 
 def test_true_gauges_have_the_certified_radius(tmp_path: Path) -> None:

@@ -11,7 +11,12 @@ import pytest
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
+from ballplate.simulator.estimation.gauss_newton import (
+    GaussNewtonSettings,
+    as_drawn,
+    estimate,
+    gauss_newton,
+)
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
@@ -22,6 +27,7 @@ from ballplate.simulator.readings.generate import (
     noisy_readings,
     scale_readings,
 )
+from scipy.stats import f
 
 from tests.reference.designs import altered, corner_sides, grid, plate_design, six_positions
 
@@ -147,6 +153,38 @@ def test_deficient_designs_leave_what_is_open_where_it_was() -> None:
     # weak.
     assert solution.factor.sum_of_squares < 1e-12 * solution.iterations[0].sum_of_squares
     assert np.abs(solution.state.a).max() < 1e-2
+
+
+@pytest.mark.parametrize("noise", [1.0, 4.0])
+@pytest.mark.parametrize(("turned", "is_followed"), [(1e-2, True), (2e-3, False)])
+def test_what_is_open_is_followed_where_an_f_test_says_so(
+    turned: float, is_followed: bool, noise: float
+) -> None:
+    """Poses that are turned a lot, of readings with more noise than stated in the same proportion,
+    tell of what is open as drawn by far more than noise explains.
+    """
+    balls = grid(4)
+    design = plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=7)
+    generator = np.random.default_rng(1)
+    turn = rotation_from_vector(noise * turned * generator.standard_normal((6, 3)))
+    turn[0] = np.eye(3)
+    truth = replace(truth_of(design, 1), rotations=turn @ design.positions.rotations)
+    design = exactly_calibrated(design, truth)
+    noisy = altered(design, machine={"repeatability": noise * design.machine.repeatability})
+    readings, x = noisy_readings(noisy, truth, generator)
+    design = replace(design, readings=readings)
+    start, drawn = initial_state(design, x), as_drawn(design)
+    held, followed = (
+        gauss_newton(design, x, start, None, one).factor.sum_of_squares for one in (drawn, None)
+    )
+    freedom = design.observation_count - design.parameter_count
+    assert drawn.deficiency == 6
+    chance = f.sf((held - followed) / 6 / (followed / freedom), 6, freedom)
+    assert chance < 1e-6 if is_followed else chance > 0.01
+    found = estimate(design, x)
+    wanted = followed if is_followed else held
+    assert found.factor.sum_of_squares == pytest.approx(wanted, rel=1e-9)
+    assert found.spectrum.deficiency == 6
 
 
 def test_too_few_iterations_are_a_status() -> None:

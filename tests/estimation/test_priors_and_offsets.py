@@ -24,6 +24,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from scipy.spatial.transform import Rotation
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 PRIORS = """\
@@ -139,6 +140,38 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     expected = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)))[:count] * size[:count]
     found = at.of_shared(np.eye(count))
     np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_a_prior_is_about_what_it_names(written: Callable[[str], Path]) -> None:
+    """Turns as scipy has them, co-ordinates and coefficients of a state that is nothing like the
+    drawing.
+    """
+    design = lay_out(load(written(UNKNOWN + PRIORS))[0])
+    generator = np.random.default_rng(6)
+    layout = shared_layout(design)
+    step = 0.1 * generator.standard_normal(len(layout))
+    state = moved(nominal_state(design), layout, step, np.zeros_like(design.balls.places))
+    priors = design.of(Priors)
+    values = priors.rows(design, state, None).residual * priors.uncertainty + priors.value
+    found = dict(zip(priors.names, values.tolist(), strict=True))
+    low, high = (design.positions.names.index(name) for name in ("x low", "y high"))
+    turn = Rotation.from_matrix(state.rotations[low] @ design.positions.rotations[low].T)
+    names = [one.name for one in design.model.parameters]
+    reported = design.model.reported()
+    row = reported.names.index("EYY t^2")
+    left = design.probes.names.index("left")
+    wanted = {
+        "EAX": None,
+        "EXX[2]": state.a[names.index("EXX[2]")],
+        "EYY t^2": reported.matrix[row] @ state.a,
+        "x low: rotation y": turn.as_rotvec()[1],
+        "y high: origin z": state.origins[high, 2],
+    }
+    wanted |= {f"probe left: offset {axis}": state.probes[left, k] for k, axis in enumerate("xyz")}
+    assert len({round(value, 9) for value in found.values()}) == len(found)
+    for name, value in wanted.items():
+        if value is not None:
+            assert found[name] == pytest.approx(value, abs=1e-14), name
 
 
 def test_a_prior_adds_what_the_readings_leave_open(written: Callable[[str], Path]) -> None:

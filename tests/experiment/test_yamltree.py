@@ -159,6 +159,17 @@ def test_aliases_stand_where_they_are_used() -> None:
             "a: " + "[" * 5000,
             [f"f:1:{4 + DEEPEST - 1}: nested more than {DEEPEST} deep; check the brackets"],
         ),
+        (
+            "µ: 😀\nb: [" + "{a: " * 5000,
+            [f"f:2:{5 + (DEEPEST - 2) * 4}: nested more than {DEEPEST} deep; check the brackets"],
+        ),
+        (
+            "a: 1\na: 2\nb: " + "[" * 5000 + "]" * 5000,
+            [
+                'f:2:1: the key "a" is already in line 1; remove one of the two',
+                f"f:3:{4 + DEEPEST - 1}: nested more than {DEEPEST} deep; check the brackets",
+            ],
+        ),
     ],
 )
 def test_refusals(text: str, lines: list[str]) -> None:

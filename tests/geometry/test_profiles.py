@@ -75,3 +75,119 @@ def test_a_boundary_off_the_profile_is_refused() -> None:
     with pytest.raises(NotOnProfileError) as error:
         along(dome(np.array([0.0, 20.0, 40.0])), [""] * 3, np.array([[RADIUS, 0.5]]))
     assert error.value.args == (0,)
+
+
+def test_a_place_between_points_of_a_circle_is_on_its_arc() -> None:
+    """Its arc length, and the normal there, on the way up a quarter circle and down again."""
+    degrees = np.array([0.0, 3.0, 11.0, 30.0, 31.0, 60.0, 85.0])
+    asked = np.array([0.0, 1.0, 2.9, 10.0, 25.0, 30.2, 47.0, 84.0, 85.0])
+    for step in (1, -1):
+        profile, _, _ = along(dome(degrees[::step]), [""] * 7, np.zeros((0, 2)))
+        begin = degrees[::step][0]
+        for angle, place in zip(asked, dome(asked), strict=True):
+            length, normal = profile.located(place)
+            assert length == pytest.approx(RADIUS * np.radians(abs(angle - begin)), abs=1e-13)
+            outwards = [np.cos(np.radians(angle)), np.sin(np.radians(angle))]
+            np.testing.assert_allclose(normal, outwards, atol=1e-12)
+        for factor in (0.985, 1.015):
+            # Farther from the circle than a hundredth of the 29 degrees between the points.
+            aside = np.array([0.0, -RADIUS]) + factor * (dome(np.array([47.0]))[0] + [0.0, RADIUS])
+            with pytest.raises(NotOnProfileError):
+                profile.located(aside)
+
+
+def signed_curvature(one: complex, two: complex, three: complex) -> float:
+    """Of the circle through three points: four times the area of the triangle over its sides."""
+    first, second = two - one, three - two
+    area = 0.5 * (first.real * second.imag - first.imag * second.real)
+    return 4.0 * area / (abs(first) * abs(second) * abs(three - one))
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_arcs_of_a_curve_have_the_mean_curvature_of_their_ends(backwards: bool) -> None:
+    """Behind a cylinder a quarter of an ellipse, on which no two points have the same curvature."""
+    angle = np.radians([0.0, 12.0, 20.0, 35.0, 41.0, 60.0, 80.0])
+    ellipse = np.column_stack([0.04 * np.cos(angle), 0.025 * np.sin(angle)])
+    cylinder = np.array([[0.04, -0.03], [0.04, -0.01]])
+    places = np.concatenate([cylinder, ellipse])
+    labels = ["cylinder"] * 2 + ["dome"] * 7
+    step = -1 if backwards else 1
+    profile, own, _ = along(places[::step], labels[::step], np.zeros((0, 2)))
+    points = ellipse[::step, 1] + 1j * ellipse[::step, 0]
+    curvature = [signed_curvature(*points[k : k + 3]) for k in range(5)]
+    curvature = [curvature[0], *curvature, curvature[-1]]
+    lengths = profile.lengths[own][:7] if backwards else profile.lengths[own][2:]
+    for k in range(6):
+        mean = 0.5 * (curvature[k] + curvature[k + 1])
+        chord = points[k + 1] - points[k]
+        turn = 2.0 * np.arcsin(0.5 * abs(mean * chord))
+        assert lengths[k + 1] - lengths[k] == pytest.approx(turn / abs(mean), rel=1e-12)
+        height = np.sqrt(1.0 / mean**2 - 0.25 * abs(chord) ** 2)
+        centre = points[k] + 0.5 * chord + np.sign(mean) * 1j * chord / abs(chord) * height
+        for share in (0.1, 0.5, 0.8):
+            on_arc = centre + (points[k] - centre) * np.exp(1j * np.sign(mean) * turn * share)
+            length, normal = profile.located(np.array([on_arc.imag, on_arc.real]))
+            outwards = (on_arc - centre) / abs(on_arc - centre)
+            np.testing.assert_allclose(normal, [outwards.imag, outwards.real], atol=1e-12)
+            assert length == pytest.approx(lengths[k] + share * turn / abs(mean), rel=1e-12)
+
+
+# A cylinder with a step inwards, a conical face and a part beyond: features of two and three places.
+STEPPED = np.array(
+    [[0.04, -0.05], [0.04, -0.03], [0.04, -0.02], [0.03, -0.01], [0.02, 0.0], [0.01, 0.0]]
+)
+
+
+def test_a_place_on_a_line_is_at_its_distance() -> None:
+    labels = ["cylinder"] * 3 + ["cone"] * 2 + ["tip"]
+    profile, _, _ = along(STEPPED, labels, np.zeros((0, 2)))
+    assert profile.features == ((0, 2), (3, 4), (5, 5))
+    length, normal = profile.located(np.array([0.04, -0.034]))
+    assert length == pytest.approx(0.016, abs=1e-15)
+    np.testing.assert_allclose(normal, [1.0, 0.0], atol=1e-15)
+    length, normal = profile.located(np.array([0.022, -0.002]))
+    assert length == pytest.approx(0.03 + np.sqrt(2) * 0.018, abs=1e-15)
+    np.testing.assert_allclose(normal, np.sqrt([0.5, 0.5]), atol=1e-14)
+    # Between features that share no place, beside the way, and beyond its end.
+    for place in ([0.035, -0.015], [0.015, 0.0], [0.0404, -0.034], [0.04, -0.06]):
+        with pytest.raises(NotOnProfileError):
+            profile.located(np.array(place))
+
+
+@pytest.mark.parametrize("step", [1, -1])
+def test_both_sides_of_a_place_that_features_share(step: int) -> None:
+    """The quarter circle turns from the line at its end, on the way up and down again."""
+    arc = dome(np.array([0.0, 20.0, 50.0, 80.0]))
+    line = np.array([[RADIUS + 0.02, -RADIUS - 0.02], [RADIUS + 0.01, -RADIUS - 0.01]])
+    places = np.concatenate([line, arc])
+    profile, _, at = along(places[::step], [""] * 6, arc[:1])
+    normals, tangents = (one[::step] for one in profile.beside(arc[0]))
+    assert at.tolist() == [2 if step == 1 else 3]
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(normals, [[half, half], [1.0, 0.0]], atol=1e-13)
+    np.testing.assert_allclose(step * tangents, [[-half, half], [0.0, 1.0]], atol=1e-13)
+    for place in (arc[1], line[0], arc[-1]):
+        with pytest.raises(NotOnProfileError):
+            profile.beside(place)
+    # A feature of one point at the corner has no side of its own.
+    profile, _, _ = along(places, ["line"] * 2 + ["corner"] + ["arc"] * 3, np.zeros((0, 2)))
+    with pytest.raises(NotOnProfileError):
+        profile.beside(arc[0])
+
+
+def test_only_the_last_boundaries_may_be_corners() -> None:
+    """A way of 40 mm over a corner that is 26 mm without it, and a boundary on the way before it."""
+    places = np.array([[0.04, -0.03], [0.04, -0.02], [0.026, 0.0], [0.01, 0.0]])
+    corner, before = np.array([0.04, 0.0]), np.array([0.04, -0.024])
+    profile, own, at = along(places, [""] * 4, np.array([before, corner]), corners=1)
+    assert own.tolist() == [0, 2, 4, 5] and at.tolist() == [1, 3]
+    assert profile.features == ((0, 1), (1, 3), (3, 5))
+    np.testing.assert_allclose(profile.lengths, np.cumsum([0, 6, 4, 20, 14, 16]) * 1e-3, rtol=1e-12)
+    for boundaries, corners, wrong in (
+        ([before, corner], 0, 1),
+        ([corner, before], 1, 0),
+        ([before, corner, [0.3, 0.3]], 2, 2),
+    ):
+        with pytest.raises(NotOnProfileError) as error:
+            along(places, [""] * 4, np.array(boundaries), corners=corners)
+        assert error.value.args == (wrong,)

@@ -91,6 +91,56 @@ def test_what_is_wrong_is_told(changed: dict[str, Any], words: str) -> None:
     assert words in str(caught.value)
 
 
+@dataclass(frozen=True)
+class Twofold(Influence):
+    """Styli longer by `value` and by `beside`."""
+
+    value: float
+    beside: float
+    slopes: tuple[float, float]
+
+    @property
+    def parameters(self) -> tuple[InfluenceParameter, ...]:
+        return tuple(
+            InfluenceParameter(name, "1", value, 1e-5, 0.05)
+            for name, value in (("styli", self.value), ("more", self.beside))
+        )
+
+    def shifts(self, at: Disturbed) -> tuple[np.ndarray, np.ndarray]:
+        slope = -at.offsets[:, :, None] * np.array(self.slopes)
+        return -(self.value + self.beside) * at.offsets, slope
+
+
+@pytest.mark.parametrize("factor", [0.0, 2.0])
+def test_a_setting_of_two_parameters_tells_of_the_derivative_of_none(factor: float) -> None:
+    """Differences by a setting that moves both are the sum of what each does; where it moves one,
+    they are compared.
+    """
+
+    class Odd(InfluenceSettings):
+        kind: Literal["odd"] = "odd"
+        value: float = 1e-4
+
+        def influence(self, design: DesignParts) -> Twofold:
+            return Twofold(self.value, factor * self.value + 1e-5, (1.0, 1.0))
+
+    design = lay_out(replace(bp.quickstart(), influences=(Odd(),)))
+    values = [one.value for one in design.influence_parameters]
+    assert values == [1e-4, factor * 1e-4 + 1e-5]
+
+
+def test_a_setting_of_one_of_two_parameters_tells_of_its_derivative() -> None:
+    class Odd(InfluenceSettings):
+        kind: Literal["odd"] = "odd"
+        value: float = 1e-4
+
+        def influence(self, design: DesignParts) -> Twofold:
+            return Twofold(2e-5, self.value, (1.0, 3.0))
+
+    with pytest.raises(ExperimentError, match='the derivative of shifts by "more" is'):
+        lay_out(replace(bp.quickstart(), influences=(Odd(),)))
+
+
 def test_each_kind_is_there_once() -> None:
     class Again(InfluenceSettings):
         kind: Literal["sag"]

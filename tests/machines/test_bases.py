@@ -172,3 +172,27 @@ def test_slopes_of_zero_are_held_at_the_ends_that_state_them(slopes: dict[str, i
     for at, other, end in ((0.0, 1e-6, "start"), (1.0, 1.0 - 1e-6, "end")):
         change = np.abs(np.diff(spline.values(np.array([at, other])), axis=0)).max()
         assert (change < 1e-10) == (end in slopes)
+
+
+@pytest.mark.parametrize("coefficients", range(1, 8))
+@pytest.mark.parametrize("kind", [Polynomial, Monomial])
+def test_powers_of_a_polynomial_and_of_its_interior(
+    kind: type[Polynomial] | type[Monomial], coefficients: int
+) -> None:
+    """Any number of coefficients, the constant alone, too: the powers that are quoted add up to the
+    functions, and their names are those powers.
+    """
+    family = kind(coefficients)
+    for basis in (family, family.interior()):
+        quoted = basis.quoted()
+        assert quoted.names == tuple(f"t^{k}" for k in range(1, coefficients))
+        np.testing.assert_allclose(
+            written_out(basis, quoted.names, T) @ quoted.matrix if quoted.names else 0.0,
+            basis.values(T) if quoted.names else 0.0,
+            atol=1e-13,
+        )
+    whole = family.quoted_whole()
+    assert whole.names == ("", *(f"t^{k}" for k in range(1, max(coefficients, 2))))
+    functions = np.column_stack([np.ones_like(T), T, family.interior().values(T)])
+    found = T[:, None] ** np.arange(len(whole.names)) @ whole.matrix
+    np.testing.assert_allclose(found, functions, atol=1e-13)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import json.decoder
 import subprocess
 import sys
 from pathlib import Path
@@ -117,6 +118,8 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
             "import nonsense_nobody_has",
             "cannot be imported: ModuleNotFoundError",
         ),
+        ("import numpy as np", "import numpy as", "cannot be imported: SyntaxError"),
+        ("import numpy as np", "from numpy import nothing_at_all", "ImportError: cannot import"),
         ("def build(", "def built(", 'has no "build"; did you mean "built"?'),
         (
             "    return Straight(",
@@ -190,6 +193,29 @@ def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, fo
     assert done.returncode == 3
     assert former.partition(".")[0] in done.stderr
     assert "write: from ballplate.models import Parameter, Reported" in done.stderr
+
+
+def test_a_package_that_is_a_former_one_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In this process, with a package that no folder is named after."""
+    monkeypatch.setattr(custom, "FORMER_PACKAGES", ("package_of_old",))
+    source = GOOD.replace("import numpy as np", "import numpy as np\nimport package_of_old.model")
+    line = refusal(written(tmp_path, source)[0])
+    assert "imports package_of_old, which is no longer a package of its own" in line
+    line = refusal(written(tmp_path, source.replace("_of_old", "_of_nobody"))[0])
+    assert "cannot be imported: ModuleNotFoundError" in line and "no longer" not in line
+
+
+def test_the_file_of_a_module_is_found_without_running_it(tmp_path: Path) -> None:
+    (tmp_path / "apart").mkdir()
+    (tmp_path / "apart" / "own.py").write_text("raise SystemExit", encoding="utf-8")
+    assert custom.module_source("apart.own:build", tmp_path) == tmp_path / "apart" / "own.py"
+    assert custom.module_source("json.decoder:JSONDecoder", tmp_path) == Path(json.decoder.__file__)
+    # A module without a file, and one that is nowhere.
+    for name in ("sys:exit", "nobody_has_this:at_all", "json.nothing:here"):
+        for folder in (tmp_path, None):
+            assert custom.module_source(name, folder) is None
 
 
 def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:

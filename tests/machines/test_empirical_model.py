@@ -89,6 +89,19 @@ def test_quoted_form_gives_the_same_functions(terms: Terms) -> None:
     )
 
 
+@every
+def test_effects_are_the_largest_of_each_term_in_the_volume(terms: Terms) -> None:
+    """In metres; of rotations with an arm of a tenth of the longest side, here 0.13 m."""
+    model = empirical_model(terms, LOWER, UPPER)
+    along = np.linspace(0.0, 1.0, 9)
+    places = np.stack(np.meshgrid(along, along, along), axis=-1).reshape(-1, 3)
+    x = np.array(LOWER) + places * (np.array(UPPER) - np.array(LOWER))
+    for k, parameter in enumerate(model.parameters):
+        largest = np.abs(model.functions(x, np.eye(len(model.parameters))[k])).max()
+        arm = 0.13 if parameter.unit == "rad" else 1.0
+        assert parameter.effect == pytest.approx(arm * largest, rel=1e-12), parameter.name
+
+
 def test_quadratics_are_those_of_the_report() -> None:
     expected = {"1", "x", "y", "z", "x^2", "x*y", "x*z", "y^2", "y*z", "z^2"}
     assert set(quadratic().quoted().names) == expected

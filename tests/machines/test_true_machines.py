@@ -35,6 +35,28 @@ def test_monomial_coefficients() -> None:
     )
 
 
+def test_coefficients_of_all_sizes_are_met_beside_one_another() -> None:
+    """Those of nothing, too, which rounding of the others must not make contradict themselves."""
+    values = {
+        "EYX t^1": "1000 um",
+        "EYX t^2": "-1000.3 um",
+        "EYX t^3": "0.3 um",
+        "EYX t^4": "0 um",
+        "EZX t^1": "0 um",
+        "EXX t^1": "0.7 um",
+        "EXX t^4": "0 um",
+        "EAX t^1": "0.001 urad",
+        "EAX t^2": "700 urad",
+        "EAX t^3": "0 urad",
+    }
+    a = true_parameters(CoefficientSettings(kind="coefficients", values=values), MODEL)
+    reported = MODEL.reported()
+    found = dict(zip(reported.names, (1e6 * reported.matrix @ a).tolist(), strict=True))
+    for name in reported.names:
+        wanted = float(values.get(name, "0 um").split()[0])
+        assert found[name] == pytest.approx(wanted, abs=1e-9)
+
+
 def test_own_coefficients() -> None:
     a = true_parameters(CoefficientSettings(kind="coefficients", values={"EXX[2]": "3 um"}), MODEL)
     assert a[1] == 3e-6 and np.count_nonzero(a) == 1

@@ -374,6 +374,27 @@ def test_the_fitted_model_has_what_is_stated() -> None:
     ]
 
 
+@pytest.mark.parametrize("knots", [0, 3])
+def test_tables_are_fitted_by_cubic_splines_with_even_knots(knots: int) -> None:
+    """Both span the same functions as truncated powers: zero at the lower end, and straightness
+    errors at both.
+    """
+    table = Points((0.0, 0.7, 1.8), (0.0, 2e-6, 1e-6))
+    described = machine(errors=(ParametricError("EXX", table), ParametricError("EYX", table)))
+    model = fitted_volumetric(described, described.lower, described.upper, knots)
+    t = np.linspace(0.0, 1.0, 61)
+    points = np.outer(t, [1.8, 0.0, 0.0])
+    columns = model.jacobian(points, np.zeros(len(model.parameters)), np.zeros((61, 3)))
+    inside = np.arange(1, knots + 1) / (knots + 1)
+    powers = np.array([t, t**2, t**3, *(np.maximum(t - knot, 0.0) ** 3 for knot in inside)]).T
+    for axis, wanted in ((0, powers), (1, powers[:, 1:] - t[:, None] * powers[-1, 1:])):
+        used = columns[:, axis, np.abs(columns[:, axis]).max(axis=0) > 0.0]
+        assert used.shape[1] == wanted.shape[1]
+        for one, other in ((used, wanted), (wanted, used)):
+            left = one - other @ np.linalg.lstsq(other, one, rcond=None)[0]
+            np.testing.assert_allclose(left, 0.0, atol=1e-12)
+
+
 def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
     """The same file as machine and as model: the stated coefficients are the fitted model's own.
 

@@ -18,6 +18,7 @@ from typing import Any
 
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import Mutant
+from tests.reference.copies import copy_file, copy_tree
 from tests.reference.package_copies import TOP
 from tests.robustness.kit import make_kit
 from tests.robustness.recipes import RECIPES
@@ -32,8 +33,11 @@ OTHERS = (
     "reproduce hurt-foss --json",
 )
 SECONDS = 120.0
-# Times of day and of the processor, which are other ones in each run.
-TIMES = re.compile(r"\d+(?:\.\d+)? s\b|\d\d:\d\d(?::\d\d)?")
+# Times of day and of the processor, which are other ones in each run, and lines of how far a long
+# command has got, which come when it takes more than a second.
+TIMES = re.compile(
+    r"[^\r\n]*, [\d:]+ so far, [^\r\n]*[\r\n]*|\d+(?:\.\d+)? s\b|\d\d:\d\d(?::\d\d)?"
+)
 
 
 @dataclass(frozen=True)
@@ -98,11 +102,22 @@ def _written(line: str, kit: Path) -> list[Any]:
         except Exception as error:
             return [repr(error)]
         files = {
-            path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+            path.relative_to(folder).as_posix(): _digest(path, top)
             for path in sorted(folder.rglob("*"))
             if path.is_file() and path.suffix not in (".sqlite", ".npz")
         }
-        return [status, *(TIMES.sub("", text.replace(top, "")) for text in texts), files]
+        return [status, *(lasting(text, top) for text in texts), files]
+
+
+def lasting(text: str, top: str) -> str:
+    """A text without what differs from one run to the next."""
+    return TIMES.sub("", text.replace(top, ""))
+
+
+def _digest(path: Path, top: str) -> str:
+    # Reports state the time of day.
+    text = lasting(path.read_text(encoding="latin-1"), top)
+    return hashlib.sha256(text.encode("latin-1")).hexdigest()
 
 
 def copied(kit: Path, folder: Path) -> None:
@@ -111,6 +126,6 @@ def copied(kit: Path, folder: Path) -> None:
     shutil.copytree(kit, folder, symlinks=True, ignore=shutil.ignore_patterns("pipe.csv"))
     for path in (TOP / "designs").iterdir():
         if path.is_dir() and path.name != "__pycache__":
-            shutil.copytree(path, folder / path.name, dirs_exist_ok=True)
+            copy_tree(path, folder / path.name, dirs_exist_ok=True)
         elif path.suffix == ".yaml":
-            shutil.copy(path, folder)
+            copy_file(path, folder)

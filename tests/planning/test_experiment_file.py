@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import fields, replace
 from itertools import count
 from pathlib import Path
@@ -19,6 +18,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
+
+from tests.reference.copies import copy_file
 
 FOLDER = Path("designs/planning")
 NUMBERS = count()
@@ -184,7 +185,7 @@ def source(tmp_path: Path) -> Path:
     folder = tmp_path / "campaign"
     (folder / "tables").mkdir(parents=True)
     (folder / "machines").mkdir()
-    shutil.copy("designs/park/machines/gec-like.yaml", folder / "machines" / "true.yaml")
+    copy_file("designs/park/machines/gec-like.yaml", folder / "machines" / "true.yaml")
     # Python knows a module by its name, wherever it was.
     module = f"own_scale_model_{next(NUMBERS)}"
     (folder / f"{module}.py").write_text(MODEL)

@@ -198,7 +198,7 @@ def test_criteria_of_parameters_by_their_definitions() -> None:
 
 
 def test_the_number_of_workers_changes_nothing() -> None:
-    request = Request("U6", Budget(seconds=2.5 * HOUR))
+    request = Request("U6", Budget(seconds=2.0 * HOUR))
     one, two = (campaign(small(), request, workers=workers) for workers in (1, 2))
     assert [c.name for c in one.chosen] == [c.name for c in two.chosen]
     assert (one.value, one.bound) == (two.value, two.bound)

@@ -7,12 +7,12 @@ Each case is tried in a copy of it of its own.
 from __future__ import annotations
 
 import os
-import shutil
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+from tests.reference.copies import copy_file, copy_tree
 from tests.robustness.experiments import FILES
 from tests.robustness.worker import outcome
 
@@ -129,7 +129,7 @@ READINGS_OF = ("small", "tables", "splines", "bar-bell", "bryan-gauge", "dummy",
 def make_kit(folder: Path) -> None:
     """Fill an empty folder."""
     for source in (*FILES.glob("*.csv"), *FILES.glob("*.yaml"), *(FILES / "sweeps").glob("*.yaml")):
-        shutil.copy(source, folder)
+        copy_file(source, folder)
     copied = (
         *(
             "quickstart.yaml",
@@ -145,11 +145,9 @@ def make_kit(folder: Path) -> None:
         *("park/machines/measured/exx.csv", "certified/deficient.yaml", "reports/z-low.dmo"),
     )
     for name in copied:
-        shutil.copy(DESIGNS / name, folder)
-    shutil.copytree(
-        DESIGNS / "certified", folder / "certified", ignore=_all_but("weak", "deficient")
-    )
-    shutil.copytree(DESIGNS / "npl", folder / "npl", ignore=_all_but("5."))
+        copy_file(DESIGNS / name, folder)
+    copy_tree(DESIGNS / "certified", folder / "certified", ignore=_all_but("weak", "deficient"))
+    copy_tree(DESIGNS / "npl", folder / "npl", ignore=_all_but("5."))
     texts = {
         "small.yaml": SMALL,
         "pool.yaml": POOL,

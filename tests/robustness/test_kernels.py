@@ -11,7 +11,6 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -22,6 +21,7 @@ from typing import Any
 import pytest
 
 from tests.planning.small_pool import TEXT as POOL
+from tests.reference.copies import copy_file
 from tests.robustness.kernels import architectures
 
 ROOT = Path(__file__).parents[2]
@@ -100,9 +100,9 @@ def designs(folder: Path) -> None:
     }
     for name, text in written.items():
         (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
-    shutil.copy(ROOT / "designs" / "npl" / "6.1.1.yaml", folder / "npl.yaml")
+    copy_file(ROOT / "designs" / "npl" / "6.1.1.yaml", folder / "npl.yaml")
     for name in ("bar-bell", "bryan-gauge"):
-        shutil.copy(ROOT / "designs" / "hurt_foss" / f"{name}.yaml", folder)
+        copy_file(ROOT / "designs" / "hurt_foss" / f"{name}.yaml", folder)
 
 
 def why_not(kernel: str) -> str:

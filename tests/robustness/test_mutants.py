@@ -5,7 +5,6 @@ memory.
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 from ballplate.cli import main
 from hypothesis import HealthCheck, Phase, given, settings
 
+from tests.reference.copies import copy_file
 from tests.robustness.experiments import (
     EXPERIMENTS,
     FILES,
@@ -43,9 +43,9 @@ def folder(tmp_path: Path) -> Path:
     named.
     """
     for table in FILES.glob("*.csv"):
-        shutil.copy(table, tmp_path)
-    shutil.copy(QUICKSTART, tmp_path)
-    shutil.copy(FILES / "splines.yaml", tmp_path)
+        copy_file(table, tmp_path)
+    copy_file(QUICKSTART, tmp_path)
+    copy_file(FILES / "splines.yaml", tmp_path)
     (tmp_path / "loop.csv").symlink_to("loop.csv")
     os.mkfifo(tmp_path / "pipe.csv")
     return tmp_path
@@ -60,7 +60,7 @@ def faults(worker: Worker, found: Iterable[Mutant], folder: Path) -> Iterator[st
         fault = worker(path)
         if fault is not None:
             kept = folder / f"fault-{mutant.number}-{name}"
-            shutil.copy(path, kept)
+            copy_file(path, kept)
             yield f"{mutant}, kept as {kept}\n{fault}"
 
 
@@ -82,12 +82,12 @@ def try_sweeps(numbers: range, folder: Path) -> None:
 def try_readings(numbers: range, folder: Path) -> None:
     tables = []
     for design in (QUICKSTART, FILES / "tables.yaml"):
-        shutil.copy(design, folder)
+        copy_file(design, folder)
         tables.append(folder / "good" / f"{design.stem}.csv")
         tables[-1].parent.mkdir(exist_ok=True)
-        shutil.copy(design, tables[-1].parent)
+        copy_file(design, tables[-1].parent)
         for table in FILES.glob("*.csv"):
-            shutil.copy(table, tables[-1].parent)
+            copy_file(table, tables[-1].parent)
         assert main(["simulate", str(design), "-o", str(tables[-1])]) == 0
     with Worker(fit, [tables[0]]) as worker:
         found = list(islice(faults(worker, table_mutants(tables, SEED, numbers), folder), ENOUGH))

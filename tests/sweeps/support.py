@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import sqlite3
 import subprocess
@@ -13,6 +12,8 @@ from typing import Any
 import pandas
 from ballplate.extensions.sweeps.frame import frame
 from ballplate.extensions.sweeps.store import open_store
+
+from tests.reference.copies import copy_file
 
 ROOT = Path(__file__).parents[2]
 
@@ -28,7 +29,7 @@ seed: 3
 
 
 def small_sweep(folder: Path, count: int, more: str = "") -> Path:
-    shutil.copy(ROOT / "designs" / "quickstart.yaml", folder)
+    copy_file(ROOT / "designs" / "quickstart.yaml", folder)
     path = folder / "small.yaml"
     path.write_text(SWEEP.replace("COUNT", str(count)) + more, encoding="utf-8")
     return path

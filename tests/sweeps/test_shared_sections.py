@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import re
-import shutil
 from pathlib import Path
 
 import ballplate as bp
@@ -15,6 +14,8 @@ from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment import structure
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
+
+from tests.reference.copies import copy_tree
 
 from .support import ROOT, small_sweep
 
@@ -59,7 +60,7 @@ def test_what_is_shared_goes_with_the_file(tmp_path: Path) -> None:
 
 def test_an_experiment_stays_when_a_file_that_it_names_has_changed(tmp_path: Path) -> None:
     """What another experiment of the same tree reads later is that one's alone."""
-    shutil.copytree(ROOT / "designs" / "park", tmp_path / "park")
+    copy_tree(ROOT / "designs" / "park", tmp_path / "park")
     machine = tmp_path / "park" / "machines" / "npl-like.yaml"
     before = bp.load(tmp_path / "park" / "plate.yaml")
     readings = bp.simulate(before, seed=1)

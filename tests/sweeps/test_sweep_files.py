@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +12,8 @@ from ballplate.extensions.sweeps.model import Sweep
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.reference.copies import copy_file
+
 HEAD = "title: a test\nbase: quickstart.yaml\n"
 SIZE = '["artefacts.plate.size[0]", "artefacts.plate.size[1]"]'
 BALLS = '["artefacts.plate.balls[0]", "artefacts.plate.balls[1]"]'
@@ -22,7 +23,7 @@ Written = Callable[[str], Path]
 
 @pytest.fixture
 def written(tmp_path: Path) -> Written:
-    shutil.copy("designs/quickstart.yaml", tmp_path)
+    copy_file("designs/quickstart.yaml", tmp_path)
 
     def write(text: str) -> Path:
         path = tmp_path / "s.yaml"

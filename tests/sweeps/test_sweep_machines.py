@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,8 @@ from ballplate.extensions.sweeps.bundle import bundle_of, unpack
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment.load import load
+
+from tests.reference.copies import copy_tree
 
 SWEEP = """\
 title: with a machine file
@@ -24,7 +25,7 @@ record: [U4]
 
 @pytest.fixture
 def sweep(tmp_path: Path) -> Path:
-    shutil.copytree("designs/park", tmp_path / "park")
+    copy_tree("designs/park", tmp_path / "park")
     plate = tmp_path / "park/plate.yaml"
     text = plate.read_text(encoding="utf-8")
     truth = "true_machine: {kind: machine, file: machines/"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import os
 import re
-import shutil
 import sqlite3
 import subprocess
 from pathlib import Path
@@ -23,6 +22,8 @@ from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
+
+from tests.reference.copies import copy_file
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep
 
@@ -238,7 +239,7 @@ def test_what_two_sweeps_share_is_computed_once(
 
 def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
     path = small_sweep(tmp_path, 2)
-    shutil.copy("tests/sweeps/balls.csv", tmp_path)
+    copy_file("tests/sweeps/balls.csv", tmp_path)
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
     plate = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
     text = text.replace(plate, "{kind: balls, file: balls.csv}").replace(
