@@ -20,7 +20,7 @@ from ballplate.results.fit import Fit
 from ballplate.simulator.computing.steps import ProgressStep
 from matplotlib.colors import to_hex
 
-from tests.sweeps.support import small_sweep
+from tests.extensions.sweeps.support import small_sweep
 
 QUICKSTART = "designs/quickstart.yaml"
 MACHINE = "designs/park/machines/npl-like.yaml"

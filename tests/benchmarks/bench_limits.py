@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.sweeps.task import CellResult
 
-from tests.report.stores import axis, done, made_up
+from tests.extensions.sweeps.stores import axis, done, made_up
 
 ROOT = Path(__file__).parents[2]
 QUICKSTART = ROOT / "designs" / "quickstart.yaml"

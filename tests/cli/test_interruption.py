@@ -22,7 +22,7 @@ from ballplate.extensions.sweeps import execute
 from ballplate.simulator.computing import processes
 from ballplate.simulator.computing.processes import in_processes
 
-from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
+from tests.extensions.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
 
 
 @pytest.fixture(autouse=True)

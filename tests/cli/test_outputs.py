@@ -30,10 +30,10 @@ from ballplate.cli import main, outputs, parser
 from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
 
 from tests.cli.cuts import remains
-from tests.cli.test_check_fix import SHIFTED as OPEN
+from tests.extensions.repair.test_check_fix import SHIFTED as OPEN
+from tests.extensions.sweeps.stores import axis, done, made_up
 from tests.planning.small_pool import TEXT as POOL
 from tests.reference.copies import copy_file, copy_tree
-from tests.report.stores import axis, done, made_up
 
 DESIGN = """\
 title: a plate in two positions

@@ -16,7 +16,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.sweeps.support import ROOT, command, hearing_interruptions, run, small_sweep, stored
+from tests.extensions.sweeps.support import (
+    ROOT,
+    command,
+    hearing_interruptions,
+    run,
+    small_sweep,
+    stored,
+)
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="looks processes up in /proc"

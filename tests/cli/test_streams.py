@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main, schema
 
-from tests.sweeps.support import ROOT, small_sweep
+from tests.extensions.sweeps.support import ROOT, small_sweep
 
 COMMAND = f'"{sys.executable}" -m ballplate'
 

@@ -18,7 +18,7 @@ from ballplate.cli import main
 from ballplate.cli.progress import progress
 from ballplate.simulator.computing.steps import ProgressStep
 
-from tests.sweeps.support import hearing_interruptions
+from tests.extensions.sweeps.support import hearing_interruptions
 
 QUICKSTART = "designs/quickstart.yaml"
 

@@ -16,7 +16,7 @@ OF_ALL = [
     *sorted(Path("tests/robustness").glob("test_*.py")),
     Path("tests/cli/test_outputs.py"),
     Path("tests/cli/test_signals.py"),
-    Path("tests/sweeps/test_damaged_stores.py"),
+    Path("tests/extensions/sweeps/test_damaged_stores.py"),
 ]
 
 
@@ -79,7 +79,7 @@ def test_all_tests_of_outputs_signals_and_stores_are_named() -> None:
     for path in (
         "tests/cli/test_outputs.py",
         "tests/cli/test_signals.py",
-        "tests/sweeps/test_damaged_stores.py",
+        "tests/extensions/sweeps/test_damaged_stores.py",
     ):
         missing = [test for test in long_by_test(path) if (path, test) not in named]
         assert not missing, path

@@ -339,8 +339,16 @@ READINGS = "position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,"
         (lambda path: bp.fit(bp.quickstart(), path), READINGS, "1"),
         (lambda path: bp.fit(bp.quickstart(), path), READINGS.replace(",", ";"), " "),
         (bp.load_map, "map: 1\ntitle: ", "a "),
-        (bp.read_report, Path("tests/readings/samples/dmis_mm.dmo").read_text() + "$$ ", "-"),
-        (bp.read_report, Path("tests/readings/samples/pcdmis_mm.txt").read_text() + " ", " "),
+        (
+            bp.read_report,
+            Path("tests/extensions/laboratory/samples/dmis_mm.dmo").read_text() + "$$ ",
+            "-",
+        ),
+        (
+            bp.read_report,
+            Path("tests/extensions/laboratory/samples/pcdmis_mm.txt").read_text() + " ",
+            " ",
+        ),
     ],
     ids=["experiment", "text", "readings", "table", "map", "dmis", "pcdmis"],
 )
@@ -356,7 +364,7 @@ def test_long_lines(
 
 
 def test_a_report_in_xml_may_be_one_line(tmp_path: Path) -> None:
-    text = Path("tests/readings/samples/qif_3_0.qif").read_text(encoding="utf-8")
+    text = Path("tests/extensions/laboratory/samples/qif_3_0.qif").read_text(encoding="utf-8")
     path = tmp_path / "long.qif"
     path.write_text(" ".join(text.splitlines()) + MOST_IN_LINE * " ", encoding="utf-8")
     assert len(bp.read_report(path).to_frame())

@@ -54,7 +54,8 @@ def sample(room: str, count: int, seed: int = 1) -> list[Mutant]:
 def files_of_tests() -> list[str]:
     """The folders and files of tests that may notice a mutant."""
     top = Path(__file__).parents[1]
-    folders = [path for path in sorted(top.iterdir()) if path.name not in BLIND]
+    every = [*top.iterdir(), *(top / "extensions").iterdir()]
+    folders = [path for path in sorted(every) if path.name not in (*BLIND, "extensions")]
     return [str(path) for path in folders if path.is_dir() or path.name.startswith("test_")]
 
 

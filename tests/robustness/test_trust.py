@@ -20,7 +20,7 @@ from ballplate.extensions.studio.jobs import JOBS
 from ballplate.extensions.studio.session import Session
 from ballplate.simulator.inputs.yamltree import parse_tree, to_list, to_python
 
-from tests.report.stores import axis, done, made_up
+from tests.extensions.sweeps.stores import axis, done, made_up
 
 BASE = to_list(
     to_python(parse_tree(Path(shipped("quickstart.yaml")).read_text(), "quickstart.yaml"))

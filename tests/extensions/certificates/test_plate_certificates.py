@@ -1,0 +1,122 @@
+"""`certificate` and `adjust` as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import ballplate as bp
+import pytest
+import yaml
+from ballplate.cli import main
+
+from tests.extensions.certificates.campaigns import IN_SPACE
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """An experiment, its readings, and the map that they give."""
+    sections = {**IN_SPACE, "error_model": {"kind": "metric"}, "coverage_factor": 3}
+    (tmp_path / "e.yaml").write_text(yaml.safe_dump(sections))
+    experiment = bp.load(tmp_path / "e.yaml")
+    bp.simulate(experiment, 1).to_csv(tmp_path / "r.csv", index=False)
+    bp.simulate(experiment, 2).to_csv(tmp_path / "r2.csv", index=False)
+    return tmp_path
+
+
+def test_tables_come_in_two_and_neither_is_overwritten(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ["certificate", str(folder / "e.yaml"), str(folder / "r.csv"), "-o"]
+    (folder / "plate-covariance.csv").write_text("mine")
+    assert main([*line, str(folder / "plate.csv")]) == 3
+    assert "plate-covariance.csv: exists already" in capsys.readouterr().err
+    assert not (folder / "plate.csv").exists()
+    assert main([*line, str(folder / "plate.csv"), "--force"]) == 0
+    out, err = capsys.readouterr()
+    assert out == "" and err.count(" written") == 2
+    assert (folder / "plate-covariance.csv").read_text().startswith("covariance_um2,r1c1 x,")
+    # What is read is not written, not even with --force.
+    shutil.copy(folder / "r.csv", folder / "plate-covariance.csv")
+    line = ["certificate", str(folder / "e.yaml"), str(folder / "plate-covariance.csv"), "-o"]
+    assert main([*line, str(folder / "plate.csv"), "--force"]) == 2
+    assert "which is read" in capsys.readouterr().err
+
+
+def test_printed_and_written_are_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["certificate", str(folder / "e.yaml"), str(folder / "r.csv")]
+    assert main([*line, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["coverage_factor"] == 3.0
+    assert main([*line, "--json", "-o", str(folder / "p.json")]) == 0
+    assert json.loads(capsys.readouterr().out) == told
+    archive = json.loads((folder / "p.json").read_text())
+    place = told["balls"]["r3c3"]["y"]["value"]
+    assert archive["tagged_real"]["r3c3 y"]["x"] == place
+    assert main(line) == 0
+    text = capsys.readouterr().out
+    assert "U = 3 u" in text and "not a calibration certificate" in text
+
+
+def test_wrong_usage_is_told_in_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    experiment, readings = str(folder / "e.yaml"), str(folder / "r.csv")
+    for more, told in (
+        (["certificate", "--datum", "r1c1,r9c9,r1c3"], 'no ball "r9c9"'),
+        (["certificate", "--about", "datum=x"], "nothing is stated about"),
+        (["certificate", "-o", str(folder / "p.xml")], "when the plate was measured"),
+        (["adjust"], "--scale or --turn"),
+        (["adjust", "--scale", "x=1 um"], "a ratio is expected"),
+    ):
+        assert main([more[0], experiment, readings, *more[1:]]) == 2
+        assert told in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_plate_without_a_calibration_has_no_certificate(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sections = yaml.safe_load((folder / "e.yaml").read_text())
+    sections |= {"calibration": [], "probes": {"down": sections["probes"]["down"]}}
+    sections["positions"] = [one | {"probes": ["down"]} for one in sections["positions"][:3]]
+    (folder / "u.yaml").write_text(yaml.safe_dump(sections))
+    readings = bp.simulate(bp.load(folder / "u.yaml"))
+    readings.to_csv(folder / "u.csv", index=False)
+    line = ["certificate", str(folder / "u.yaml"), str(folder / "u.csv")]
+    assert main([*line, "-o", str(folder / "u.html")]) == 3
+    assert "nothing to certify" in capsys.readouterr().err
+    assert not (folder / "u.html").exists()
+
+
+def test_adjust_takes_maps_and_experiments(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    experiment, first, second = (str(folder / name) for name in ("e.yaml", "r.csv", "r2.csv"))
+    maps = [str(folder / name) for name in ("1.yaml", "2.npz")]
+    for readings, name in zip((first, second), maps, strict=True):
+        assert main(["fit", experiment, readings, "-o", name]) == 0
+    capsys.readouterr()
+    results = []
+    for line in (
+        [experiment, first, "--after", second],
+        [maps[0], "--after", maps[1]],
+        [experiment, first, "--after", maps[1]],
+    ):
+        assert main(["adjust", *line, "--scale", "x=0 ppm", "--json"]) == 0
+        results.append(json.loads(capsys.readouterr().out))
+    one = results[0]
+    assert one["coverage_factor"] == 3.0 and one["within"] is True
+    for other in results[1:]:
+        assert other["overall"] == pytest.approx(one["overall"], rel=1e-6)
+    # A machine that was not adjusted as stated.
+    line = ["adjust", maps[0], "--after", maps[1], "--turn", "y-x=0.1 turns of 1 mm at 1 m"]
+    assert main([*line, "-o", str(folder / "after.yaml")]) == 1
+    assert "not as predicted" in capsys.readouterr().out
+    assert main(["adjust", str(folder / "after.yaml"), "--turn", "y+x=100 urad"]) == 0
+    out = capsys.readouterr().out
+    assert "as predicted after adjustment" not in out and "1 change, predicted" in out
+    for wrong, told in (
+        ([maps[0], first], "is a map, which needs no readings"),
+        ([maps[0], "--after", second], "is no map file"),
+    ):
+        assert main(["adjust", *wrong, "--scale", "x=1 ppm"]) == 2
+        assert told in capsys.readouterr().err

@@ -1,0 +1,307 @@
+"""The uncertainty budget: contributions of the sources, against a dense computation and against
+fits with one stated value changed at a time.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+import yaml
+from ballplate.cli import main
+from ballplate.extensions.judgement.budget import UncertaintyBudget
+from ballplate.extensions.judgement.source_sums import source_sums, sources_of
+from ballplate.simulator.estimation.corrections import corrected_points
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.readings.certificate_files import certified_values, with_values
+from numpy.typing import NDArray
+
+from tests.reference import dense
+
+TOP = Path(__file__).parents[3]
+Real = NDArray[np.float64]
+
+
+def small(**changed: Any) -> Experiment:
+    """Nine balls in the six positions of the first example, and tasks."""
+    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
+    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    told["evaluation"] = {
+        "points": {"random": 12, "seed": 3},
+        "probe": "right",
+        "tasks": [
+            {"name": "U6", "from": ["50 mm", "200 mm", "90 mm"], "to": ["550 mm", "0 mm", "0 mm"]}
+        ],
+    }
+    return bp.experiment(told | changed)
+
+
+def sides(uncertainty: str, pairs: Any = "corner sides") -> dict[str, Any]:
+    return {"kind": "distances", "pairs": pairs, "standard_uncertainty": uncertainty}
+
+
+def shares(found: UncertaintyBudget, name: str, k: int = 0) -> dict[str, float]:
+    """Contributions by source of the k-th figure of a name."""
+    chosen = [one for one in found.figures if one.name == name][k]
+    return dict(zip(found.sources, chosen.contributions, strict=True))
+
+
+def test_contributions_are_those_of_a_dense_computation() -> None:
+    """Readings by position, two items of calibration of the same kind, coordinates, and a bar whose
+    readings and certificate share the rows: every figure is the root of the sum of squares of its
+    derivatives by the source's own errors.
+    """
+    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    poses = [
+        {"origin": [f"{x} mm" for x in origin], "rotation": [f"{angle} deg" for angle in angles]}
+        for origin, angles in (
+            ((200, 400, 500), (0, 0, 0)),
+            ((300, 200, 400), (0, 0, 75)),
+            ((400, 500, 100), (0, -60, 20)),
+        )
+    ]
+    placed = [
+        {"name": f"bar {k}", "artefact": "bar", "pose": pose, "probes": ["down"]}
+        for k, pose in enumerate(poses)
+    ]
+    experiment = small(
+        artefacts={
+            "plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]},
+            "bar": {"kind": "two_spheres", "length": "600 mm", "role": "length_standard"},
+        },
+        positions=[one | {"artefact": "plate"} for one in told["positions"]] + placed,
+        calibration=[
+            sides("0.2 um") | {"artefact": "plate"},
+            sides("0.7 um", [["r1c1", "r3c3"], ["r1c2", "r3c2"]]) | {"artefact": "plate"},
+            sides("0.3 um", "all") | {"artefact": "bar"},
+            {
+                "kind": "coordinates",
+                "artefact": "plate",
+                "balls": ["r1c1", "r2c2"],
+                "standard_uncertainty": "1 um",
+            },
+        ],
+    )
+    found = bp.budget(experiment, by="position")
+    design = lay_out(experiment)
+    problem = dense.planned(design, 3, 3)
+    rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
+    size = np.linalg.norm(rows, axis=0)
+    inverse = np.linalg.pinv(rows / size, rcond=1e-11) / size[:, None]
+    readings = design.readings.select(design.plate_readings)
+    ends = np.cumsum([3 * len(readings), 4 + 2, 6]).tolist()
+    raw = inverse[:, ends[2] :] @ problem.length_root
+    given = dense.known(design, "length")
+    assert len(given.certificate) == 3 and len(set(given.certificate.tolist())) == 1
+    certificate = raw @ given.uncertainty
+    noise = dense.length_covariance(design) - np.outer(given.uncertainty, given.uncertainty)
+    functions = dense.quantities(problem)
+    for symbol in ("U4", "U6"):
+        linear = dense.jacobian(functions[symbol], problem.parameters)
+        by_row = (linear @ inverse) ** 2
+        expected = {
+            f"readings in {name}": by_row[:, : ends[0]][
+                :, np.repeat(readings.position == k, 3)
+            ].sum(1)
+            for k, name in enumerate(design.positions.names[:6])
+        }
+        expected |= {
+            "calibration[0]: distances of plate": by_row[:, ends[0] : ends[0] + 4].sum(1),
+            "calibration[1]: distances of plate": by_row[:, ends[0] + 4 : ends[1]].sum(1),
+            "calibration[3]: coordinates of plate": by_row[:, ends[1] : ends[2]].sum(1),
+            "readings of length standards": np.einsum(
+                "ma,ab,mb->m", linear @ raw, noise, linear @ raw
+            ),
+            "certificate of bar": (linear @ certificate) ** 2,
+        }
+        own = shares(found, symbol)
+        assert set(own) == set(expected)
+        for name, values in expected.items():
+            assert own[name] == pytest.approx(np.sqrt(values.mean()), rel=1e-7), (symbol, name)
+        whole = dense.linearised(problem).of(linear)
+        total = next(one for one in found.figures if one.name == symbol)
+        assert total.standard_uncertainty == pytest.approx(np.sqrt((whole**2).mean()), rel=1e-8)
+
+
+def test_contributions_are_those_of_fits_with_other_values() -> None:
+    """Each value that is stated changed by its standard uncertainty, and the readings fitted again:
+    the changes of the task's length add in squares to the contributions.
+    """
+    right = {"offset": ["50 mm", "0 mm", "0 mm"], "standard_uncertainty": "2 um"}
+    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
+    experiment = small(
+        calibration=[sides("0.2 um"), sides("0.7 um", [["r1c1", "r3c3"]])],
+        priors=[
+            {"parameter": "EXX[2]", "value": "0 um", "standard_uncertainty": "0.3 um"},
+            {"parameter": "x low: rotation x", "value": "0 rad", "standard_uncertainty": "1 urad"},
+        ],
+        probes=told["probes"] | {"right": right},
+        sigma="given",
+    )
+    readings = bp.simulate(experiment, seed=4)
+    fit = bp.fit(experiment, readings)
+    found = shares(bp.budget(fit), "U6", 1)
+    stated = certified_values(experiment)
+    values = np.array([one.value for one in stated])
+    squares: dict[str, float] = {}
+    length = fit.functions.choose(["task"]).values[0]
+    for k, one in enumerate(stated):
+        moved = values.copy()
+        moved[k] += one.standard_uncertainty
+        design = lay_out(with_values(experiment, moved))
+        state = estimate(design, fit.observed.x).state
+        given = design.tasks
+        ends = corrected_points(design, state, given.points[0], given.probes[0])
+        change = np.linalg.norm(ends[1] - ends[0]) - length
+        source = {
+            "calibration[0]": "calibration[0]: distances of plate",
+            "calibration[1]": "calibration[1]: distances of plate",
+            "probes.right": "offsets of probes",
+            "priors[0]": "priors of the error model",
+            "priors[1]": "priors of poses",
+        }[one.item]
+        squares[source] = squares.get(source, 0.0) + change**2
+    assert len(squares) == 5
+    for source, square in squares.items():
+        # The fits stop a few picometres from where they go.
+        assert found[source] == pytest.approx(np.sqrt(square), rel=1e-4, abs=1e-12), source
+    u = fit.tasks[0].standard_uncertainty
+    assert found["readings"] ** 2 + sum(squares.values()) == pytest.approx(u**2, rel=1e-4)
+
+
+def test_influence_quantities_are_sources() -> None:
+    """An expansion whose stated value is wrong changes the task's length by its contribution."""
+    influences = [
+        {
+            "kind": "temperature",
+            "artefact_temperature": {"value": "21.5 degC", "standard_uncertainty": "0 mK"},
+            "artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "0.6 um/m/K"},
+        }
+    ]
+    experiment = small(influences=influences, sigma="given")
+    readings = bp.simulate(experiment, seed=4)
+    fits = [
+        bp.fit(
+            experiment.with_({"influences[0].artefact_expansion.value": f"{value} um/m/K"}),
+            readings,
+        )
+        for value in (11.5, 12.1, 10.9)
+    ]
+    task = [fit.functions.choose(["task"]).values[0] for fit in fits]
+    found = shares(bp.budget(fits[0]), "U6", 1)
+    assert found["influences[0]: temperature"] == pytest.approx(
+        0.5 * abs(task[1] - task[2]), rel=1e-4
+    )
+    assert found["influences[0]: temperature"] > 1e-8
+
+
+def test_sources_add_up_in_every_design() -> None:
+    """The sums of all sources are the identity, whatever designs are: two dimensions, deficient
+    ones, gauges with radii, unknown offsets of probes, stars, priors much tighter than readings.
+    """
+    for name in ("deficient", "unknown-offsets", "two-dimensions", "bryan-gauge", "weak"):
+        for experiment in bp.load_all(TOP / f"designs/certified/{name}.yaml"):
+            at = linearise(lay_out(experiment))
+            found = source_sums(at, None, sources_of(at.design, experiment))
+            assert np.abs(found.sums.sum(axis=0) - np.eye(at.rank)).max() < 1e-10, name
+            assert all(np.linalg.eigvalsh(one).min() > -1e-10 for one in found.sums)
+
+
+def test_what_is_undetermined_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(TOP / "designs/certified/deficient.yaml")
+    found = bp.budget(file)
+    whole = bp.run(file).quantities
+    for one in found.figures[:2]:
+        assert (one.count, one.undetermined) == (
+            whole[one.name].count,
+            whole[one.name].undetermined,
+        )
+    assert main(["budget", file]) == 0
+    line = next(
+        line for line in capsys.readouterr().out.splitlines() if line.startswith("together")
+    )
+    assert line.split()[-5] == "undetermined" and np.isnan(found.figures[1].standard_uncertainty)
+
+
+def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> None:
+    experiment = small(sigma="estimated")
+    readings = bp.simulate(experiment, seed=4)
+    fit = bp.fit(experiment, readings)
+    found = bp.budget(fit, by="axis")
+    given = bp.budget(bp.fit(experiment, readings, sigma="given"), by="axis")
+    assert found.sigma == fit.sigma != 1.0 and found.notes == ()
+    for one, other in zip(found.figures, given.figures, strict=True):
+        assert one.contributions == pytest.approx(fit.sigma * np.array(other.contributions))
+    assert found.to_dict()["figures"][0]["expanded_uncertainty"] == pytest.approx(
+        2.0 * found.figures[0].standard_uncertainty
+    )
+
+
+def test_options_without_readings_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["budget", str(TOP / "designs/quickstart.yaml"), "--sigma", "given"]) == 2
+    assert "--sigma goes with readings" in capsys.readouterr().err
+
+
+def test_a_certificate_counts_whatever_is_said_of_the_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A certificate whose lengths are a millimetre off leaves residuals hundreds of times as large,
+    and a table without a unit in its headings is the same table.
+    """
+    design = str(TOP / "designs" / "quickstart.yaml")
+    table, plain, values = tmp_path / "r.csv", tmp_path / "plain.csv", tmp_path / "c.csv"
+    assert main(["simulate", design, "-o", str(table), "--certificate", str(values)]) == 0
+    plain.write_text(table.read_text().replace("_mm", "", 3))
+    lines = values.read_text().splitlines()
+    item, first, second, _ = lines[2].split(",")
+    values.write_text("\n".join([*lines[:2], f"{item},{first},{second},751 mm", *lines[3:], ""]))
+    told = {}
+    capsys.readouterr()
+    for name, options in (
+        ("without", [str(table)]),
+        ("with", [str(table), "--certificate", str(values)]),
+        ("plain", [str(plain), "--unit", "mm", "--certificate", str(values)]),
+    ):
+        assert main(["budget", design, *options, "--json"]) == (name != "without")
+        told[name] = json.loads(capsys.readouterr().out)
+    assert told["with"] == told["plain"]
+    assert told["with"]["sigma"] > 100.0 * told["without"]["sigma"]
+
+
+def test_sources_stand_in_the_order_of_what_they_contribute() -> None:
+    for name, by in (
+        ("quickstart", "position"),
+        ("certified/three-planes", "probe"),
+        ("quickstart", "axis"),
+    ):
+        path = TOP / "designs" / f"{name}.yaml"
+        found = bp.budget(bp.load(path), by=by)
+        figure = next(one for one in found.figures if one.name == "U6")
+        parts = np.array(figure.contributions)
+        assert (np.diff(parts) <= 1e-6 * parts.max()).all() and len(parts) > 2
+        assert found.lines()[1].endswith("sources by their part of U6, the largest first")
+        shown = [line.split("  ")[0].strip() for line in found.lines()[4 : 4 + len(parts)]]
+        assert shown == list(found.sources)
+
+
+def test_usage_shows_readings_in_brackets_where_they_may_be_left_out(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for command, ending in (
+        ("budget", "FILE [READINGS ...]"),
+        ("next", "FILE [READINGS ...]"),
+        ("fit", "FILE [READINGS ...]"),
+        ("import", "REPORT [REPORT ...]"),
+    ):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        usage = capsys.readouterr().out.partition("\n\n")[0]
+        assert usage.endswith(ending), command

@@ -1,0 +1,178 @@
+"""How often differences are found: where nothing has changed, and where something has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.extensions.maps.compared_maps import map_of_fit
+from ballplate.extensions.maps.comparison import ComparisonSettings, MapComparison, compared
+from ballplate.extensions.maps.normalised_errors import FigureGroup
+from ballplate.extensions.maps.shared_certificates import (
+    NothingSharedError,
+    with_shared_certificates,
+)
+from ballplate.results.study import fit as fit_observed
+from ballplate.simulator.machines.protocol import Array
+from scipy.stats import chi2, norm
+
+from tests.extensions.maps.campaigns import simulated_fit, simulated_map
+
+SETTINGS = ComparisonSettings()
+
+
+def pairs_of_campaigns(count: int, is_shared: bool = False) -> list[MapComparison]:
+    """Comparisons of a machine with itself, each of two campaigns with one plate."""
+    experiment, found = bp.quickstart(), []
+    for k in range(count):
+        certificate = 10**5 + k if is_shared else None
+        maps = [simulated_map(experiment, 100 + 2 * k + i, certificate) for i in (0, 1)]
+        if is_shared:
+            maps = list(with_shared_certificates(maps[0], maps[1])[:2])
+        found.append(compared(maps[0], maps[1], SETTINGS))
+    return found
+
+
+def shares(comparisons: Sequence[MapComparison]) -> tuple[float, float]:
+    """Mean share of |E_n| > 1 over all figures of a pair, and the standard deviation of the mean:
+    figures of a pair are correlated, pairs are not.
+    """
+    each = [
+        sum(group.exceeding for group in one.groups) / sum(group.count for group in one.groups)
+        for one in comparisons
+    ]
+    return float(np.mean(each)), float(np.std(each, ddof=1) / np.sqrt(len(each)))
+
+
+def assert_joint_tests_are_right(comparisons: Sequence[MapComparison]) -> None:
+    """Sums of independent chi-squared are chi-squared, whatever the number of pairs."""
+    for tests in (
+        [one.test for one in comparisons],
+        [one.plates[0].test for one in comparisons],
+    ):
+        total = sum(test.statistic for test in tests if test is not None)
+        dimensions = sum(test.dimensions for test in tests if test is not None)
+        assert dimensions == 69 * len(comparisons)
+        assert 1e-4 < chi2.cdf(total, dimensions) < 1.0 - 1e-4
+
+
+def test_a_machine_does_not_differ_from_itself() -> None:
+    assert_joint_tests_are_right(pairs_of_campaigns(2))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_one_figure_in_twenty_exceeds_by_chance(is_shared: bool) -> None:
+    found = pairs_of_campaigns(200, is_shared)
+    assert_joint_tests_are_right(found)
+    share, spread = shares(found)
+    by_chance = found[0].groups[0].by_chance
+    assert by_chance == pytest.approx(0.0455, abs=5e-4)
+    assert abs(share - by_chance) < 3.0 * spread
+    p = np.array([one.test.p for one in found if one.test is not None])
+    assert abs(np.mean(p < 0.05) - 0.05) < 3.0 * np.sqrt(0.05 * 0.95 / len(p))
+
+
+# Lengths that are changed: an edge, and all body diagonals, by their kind and name.
+LENGTHS = [
+    ("edges", "(0, 0, 0) mm to (1000, 0, 0) mm"),
+    ("body diagonals", "(0, 0, 0) mm to (1000, 1000, 1000) mm"),
+    ("body diagonals", "(0, 1000, 1000) mm to (1000, 0, 0) mm"),
+]
+
+
+def length(found: MapComparison, kind: str, name: str) -> tuple[FigureGroup, int]:
+    group = next(one for one in found.lengths if one.kind == kind)
+    return group, group.names.index(name)
+
+
+def length_change(kind: str, name: str, size: float) -> tuple[Array, float]:
+    """A change of the machine's parameters that makes a length longer by `size` times U of that
+    difference, and U.
+
+    U is that of readings that scatter as stated: the scatter found in one pair of campaigns is some
+    per cent more or less, and a change in proportion to it would be found more or less often.
+    """
+    fits = [simulated_fit(bp.quickstart(), seed) for seed in (1, 2)]
+    maps = [map_of_fit(one) for one in fits]
+    stated = [replace(one, root=one.root / fit.sigma) for one, fit in zip(maps, fits, strict=True)]
+    group, place = length(compared(stated[0], stated[1], SETTINGS), kind, name)
+    expanded = float(2.0 * group.standard_uncertainties[place])
+    ends = np.array(
+        [
+            [1e-3 * float(one) for one in part.split("(")[1].split(")")[0].split(",")]
+            for part in name.split(" to ")
+        ]
+    )
+    along = np.diff(ends, axis=0)[0] / np.linalg.norm(np.diff(ends, axis=0))
+    rows = maps[0].rows(ends, maps[0].offsets["down"]).reshape(2, 3, -1)
+    effect = along @ (rows[1] - rows[0])
+    squares = np.array([1.0 / one.effect for one in maps[0].model.parameters]) ** 2
+    return size * expanded * squares * effect / (effect @ (squares * effect)), expanded
+
+
+@pytest.mark.parametrize(("kind", "name"), LENGTHS[:2])
+def test_a_change_is_what_it_is(kind: str, name: str) -> None:
+    change, expanded = length_change(kind, name, 2.0)
+    first, second = (simulated_map(bp.quickstart(), seed) for seed in (1, 2))
+    group, place = length(compared(first, second, SETTINGS), kind, name)
+    other = replace(second, values=second.values + change)
+    changed, _ = length(compared(first, other, SETTINGS), kind, name)
+    grown = changed.differences[place] - group.differences[place]
+    # Lines through a machine with errors are not quite straight.
+    assert grown == pytest.approx(2.0 * expanded, rel=1e-4)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("kind", "name"), LENGTHS)
+def test_a_change_of_twice_the_denominator_is_found(kind: str, name: str) -> None:
+    """As often as a normal variable with the mean 4 is beyond 2 in size: the scatter of some 1,160
+    degrees of freedom makes a difference of a tenth of a per cent.
+    """
+    change, _ = length_change(kind, name, 2.0)
+    found = []
+    for k in range(200):
+        first = simulated_map(bp.quickstart(), 5000 + 2 * k)
+        second = simulated_map(bp.quickstart(), 5001 + 2 * k, changed=change)
+        group, place = length(compared(first, second, SETTINGS), kind, name)
+        found.append(abs(group.normalised[place]) > 1.0)
+    power = norm.sf(2.0, 4.0) + norm.cdf(-2.0, 4.0)
+    assert power == pytest.approx(0.977, abs=5e-4)
+    assert abs(np.mean(found) - power) < 3.0 * np.sqrt(power * (1.0 - power) / len(found))
+
+
+def test_what_a_certificate_does_is_what_another_value_of_it_would() -> None:
+    experiment = bp.quickstart()
+    fits = [simulated_fit(experiment, seed, 7) for seed in (1, 2)]
+    maps = [simulated_map(experiment, seed, 7) for seed in (1, 2)]
+    first, second, count = with_shared_certificates(maps[0], maps[1])
+    assert count == 4
+    certified = next(
+        one for one in fits[0].design.observations if len(one) == 4 and one.word == "distance"
+    )
+    for k in range(2):
+        value = certified.value.copy()
+        value[k] += certified.uncertainty[k]
+        design = fits[0].design.observed(certified.given(value=value))
+        moved = fit_observed(experiment, replace(fits[0].observed, design=design))
+        change = moved.functions.at.state.a - fits[0].functions.at.state.a
+        assert first.shared[:, k] == pytest.approx(fits[0].sigma * change, rel=1e-3, abs=1e-12)
+    # Scale rests on the certificate alone: what is common to both cancels.
+    apart = compared(maps[0], maps[1], SETTINGS).lengths[0].standard_uncertainties
+    together = compared(first, second, SETTINGS).lengths[0].standard_uncertainties
+    assert (together < apart).all()
+    for before, one in zip(maps, (first, second), strict=True):
+        covariance = one.root @ one.root.T + one.shared @ one.shared.T
+        assert covariance == pytest.approx(before.root @ before.root.T, rel=1e-9, abs=1e-24)
+
+
+def test_other_certificates_are_not_shared() -> None:
+    experiment = bp.quickstart()
+    maps = [simulated_map(experiment, seed) for seed in (1, 2)]
+    with pytest.raises(NothingSharedError, match="no certified value in common"):
+        with_shared_certificates(maps[0], maps[1])
+    with pytest.raises(NothingSharedError, match="does not hold what certificates do"):
+        with_shared_certificates(replace(maps[0], fit=None), maps[1])

@@ -1,0 +1,66 @@
+"""The page in a browser: it opens without errors, asks no network for anything, and fits small
+screens.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.extensions.pages.browser import assert_quiet, browser, program
+
+CHROMIUM = program()
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(
+        CHROMIUM is None,
+        reason="no Chromium on this machine; install it, or name it in BALLPLATE_CHROMIUM",
+    ),
+]
+
+# Elements that stick out of the page, other than inside parts that scroll by themselves.
+OUTSIDE = """[...document.querySelectorAll('body *')].filter(one => !one.closest('.scroll, svg, .skip') &&
+one.getBoundingClientRect().right > document.documentElement.clientWidth + 1).map(one => one.outerHTML.slice(0, 80))"""
+
+# Labels of pictures that stand out of these.
+CUT = """[...document.querySelectorAll('svg')].flatMap(svg => {
+  const box = svg.getBoundingClientRect();
+  return [...svg.querySelectorAll('text')].filter(text => {
+    const one = text.getBoundingClientRect();
+    return one.width && (one.left < box.left - 1 || one.right > box.right + 1
+      || one.top < box.top - 1 || one.bottom > box.bottom + 1);
+  }).map(text => text.textContent);
+})"""
+
+
+def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
+    assert CHROMIUM is not None
+    with browser(CHROMIUM, tmp_path) as tab:
+        for width in (360, 400, 900, 1400):
+            tab.resize(width)
+            tab.open(plate_sizes_page)
+            assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
+        assert tab.value("document.title") == "size of the plate and number of its balls"
+        assert tab.value("document.querySelectorAll('svg').length") == 15
+        assert (
+            tab.value("getComputedStyle(document.querySelector('svg path[style*=stroke]')).stroke")
+            != "none"
+        )
+        colours = []
+        for scheme in ("light", "dark"):
+            tab.ask(
+                "Emulation.setEmulatedMedia",
+                features=[{"name": "prefers-color-scheme", "value": scheme}],
+            )
+            colours.append(tab.value("getComputedStyle(document.body).backgroundColor"))
+        assert colours[0] == "rgb(255, 255, 255)" and colours[1] != colours[0]
+        # The skip link is the first thing that the keyboard reaches, and shows itself then.
+        tab.value("document.querySelector('.skip').focus()")
+        assert tab.value("document.querySelector('.skip').getBoundingClientRect().left") >= 0
+        tab.ask("Emulation.setEmulatedMedia", media="print", features=[])
+        assert (
+            tab.value("getComputedStyle(document.querySelector('.scroll')).overflowX") == "visible"
+        )
+        assert_quiet(tab)

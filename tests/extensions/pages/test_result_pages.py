@@ -1,0 +1,291 @@
+"""Pages of fits and designs: every figure is that of the commands' JSON, whatever a person wrote is
+escaped, and a page needs nothing else.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.cli import main
+from ballplate.extensions.pages.design_contents import page_of_design
+
+from tests.extensions.pages.pages_read import ResultPage, assert_quoted
+
+# Names that mean something in HTML.
+NAMES = ("z <low> & \"a\" 'b'", "</script><img src=x>", "--> <svg onload=x>", "right")
+FOUR: list[dict[str, Any]] = [
+    {"name": "low", "plane": "z", "level": "250 mm", "corner": {"x": "0 mm", "y": "0 mm"}},
+    {"name": "front", "plane": "y", "level": "0 mm", "corner": {"z": "0 mm", "x": "0 mm"}},
+    {"name": "left", "plane": "x", "level": "0 mm", "corner": {"y": "0 mm", "z": "0 mm"}},
+    {
+        "name": "right",
+        "plane": "x",
+        "level": "900 mm",
+        "corner": {"y": "300 mm", "z": "300 mm"},
+        "quarter_turns": 1,
+    },
+]
+CHANGED: dict[str, dict[str, Any]] = {
+    # Nothing tells how long the plate is, since all offsets are the same.
+    "deficient": {
+        "calibration": None,
+        "probes": {"down": ["0 mm", "0 mm", "0 mm"]},
+        "positions": FOUR,
+    },
+    "no target": {"target_uncertainty": None},
+    "k = 2": {"target_uncertainty": "1.8 um + L/200000", "coverage_factor": 2},
+}
+
+
+def small(**changes: Any) -> bp.Experiment:
+    """The experiment of a small plate in six positions."""
+    sections: dict[str, Any] = {
+        "artefacts": {"plate": {"kind": "grid", "balls": [3, 3], "size": ["500 mm", "500 mm"]}}
+    }
+    sections["error_model"] = {
+        "kind": "kinematic",
+        "arrangement": "MB2",
+        "position_coefficients": 3,
+        "rotation_coefficients": 2,
+    }
+    sections["evaluation"] = {"points": {"random": 12, "seed": 1}, "probe": "down"}
+    return bp.quickstart().with_(**{**sections, **changes})
+
+
+@pytest.fixture(scope="module")
+def fitted() -> bp.Fit:
+    return bp.fit(small(), bp.simulate(small(), seed=5), components="position")
+
+
+@pytest.fixture(scope="module")
+def reliability() -> dict[str, Any]:
+    return bp.reliability(small()).to_dict()
+
+
+@pytest.fixture(scope="module")
+def page(fitted: bp.Fit) -> str:
+    return fitted.page()
+
+
+def test_every_figure_of_a_fits_page_is_that_of_the_json(
+    fitted: bp.Fit, page: str, reliability: dict[str, Any]
+) -> None:
+    found = {"fit": fitted.to_dict(), "reliability": reliability}
+    assert assert_quoted(page, found) > 400
+    words = ResultPage(page)
+    quoted = {one.attributes["data-path"] for one in words.shown}
+    for path in ("sigma", "quantities/U6/within_target", "variance_components/groups/0/ratio"):
+        assert f"/fit/{path}" in quoted
+    for name in fitted.to_dict()["estimates"]:
+        assert f"/fit/estimates/{name}/value" in quoted
+
+
+def test_a_figure_that_is_not_the_jsons_is_noticed(
+    fitted: bp.Fit, page: str, reliability: dict[str, Any]
+) -> None:
+    data = {"fit": fitted.to_dict(), "reliability": reliability}
+    assert_quoted(page, data)
+    wrong = re.sub(r'(data-path="/fit/sigma"[^>]*>)[\d.]+', r"\g<1>9.87", page)
+    assert wrong != page
+    with pytest.raises(AssertionError):
+        assert_quoted(wrong, data)
+    with pytest.raises(AssertionError):
+        assert_quoted(page.replace("<tbody>", "<tbody><tr><td>1.5</td></tr>", 1), data)
+    data["fit"]["quantities"]["U6"]["maximum"] *= 1.0 + 1e-12
+    with pytest.raises(AssertionError):
+        assert_quoted(page, data)
+
+
+def test_a_page_in_two_dimensions_has_plates_and_no_curves() -> None:
+    experiment = bp.load("designs/certified/two-dimensions.yaml")
+    fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
+    page = fit.page()
+    assert_quoted(page, {"fit": fit.to_dict(), "reliability": bp.reliability(experiment).to_dict()})
+    assert 'id="plate"' in page and 'id="curves"' not in page
+
+
+@pytest.mark.parametrize("variant", ["deficient", "no target", "k = 2", "plane"])
+def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> None:
+    experiment = small(**CHANGED.get(variant, {}))
+    if variant == "plane":
+        experiment = bp.load("designs/certified/two-dimensions.yaml")
+    prediction = bp.run(experiment)
+    is_deficient = variant == "deficient"
+    assert bool(prediction.verdict.deficiency) == is_deficient
+    page = page_of_design(experiment, prediction)
+    data = {"run": prediction.to_dict(), "reliability": bp.reliability(experiment).to_dict()}
+    data["check"] = bp.check(experiment, suggest=is_deficient).to_dict()
+    has_target = experiment.target_uncertainty is not None
+    grid = 7 if variant == "plane" else 5
+    data["lengths"] = bp.lengths(experiment, None if has_target else "1 um", grid).to_dict()
+    data["sheet"] = bp.sheet(experiment).to_dict()
+    assert assert_quoted(page, data) > 100
+    assert ('class="verdict bad"' in page) == is_deficient
+    assert ("view moving" in page) == is_deficient
+    shown = {one.text for one in ResultPage(page).shown}
+    assert shown.issuperset(data["run"]["undetermined"])
+
+
+@pytest.mark.parametrize("met", ["some", "all", "none"])
+def test_ratios_have_steps_of_colour_on_either_side_of_the_target(met: str) -> None:
+    """Eight equal parts of what is met, from the smallest ratio on, and eight of what is missed, up
+    to the largest.
+    """
+    experiment = small()
+    points = bp.lengths(experiment, "1 um", 5).to_dict()["by_point"]
+    ratios = np.array([one["maximum_ratio"] for one in points])
+    limit = {
+        "some": 1.001 * np.quantile(ratios, 0.6),
+        "all": 2 * ratios.max(),
+        "none": ratios.min() / 2,
+    }
+    target = {"target_uncertainty": f"{limit[met]:.6g} um", "coverage_factor": 1}
+    changed = experiment.with_(**target)
+    page = page_of_design(changed, bp.run(changed))
+    places = r'<rect class="(\w+)-(\d)"[^>]*/><text class="place"[^>]*data-value="([^"]+)"'
+    found = re.findall(places, page)
+    shown = np.array([float(value) for _, _, value in found])
+    assert len(found) == len(points) and "in either colour darker is larger" in page
+    assert {name for name, _, _ in found} == {
+        "some": {"heat", "over"},
+        "all": {"heat"},
+        "none": {"over"},
+    }[met]
+    for kind, low, high in (
+        ("heat", shown.min(), min(shown.max(), 1.0)),
+        ("over", max(shown.min(), 1.0), shown.max()),
+    ):
+        chosen = np.array([name == kind for name, _, _ in found])
+        assert (chosen == ((shown > 1.0) == (kind == "over"))).all()
+        steps = np.array([int(step) for _, step, _ in found])[chosen]
+        edges = np.linspace(low, high, 9)[1:-1]
+        assert steps.tolist() == np.searchsorted(edges, shown[chosen], side="right").tolist()
+        assert len(set(steps.tolist())) > 2 or not chosen.any()
+
+
+def test_what_a_person_wrote_is_escaped(tmp_path: Path) -> None:
+    grid = {"kind": "grid", "balls": [3, 3], "size": ["500 mm", "500 mm"]}
+    positions = [
+        {**one, "name": name, "probes": ["down", "<s>"]}
+        for one, name in zip(FOUR, NAMES, strict=True)
+    ]
+    experiment = small(
+        title="a <i>title</i> & \"more\" 'of it'",
+        description="<u>one</u>\n& two",
+        artefacts={"<b>&amp;": grid},
+        positions=positions,
+        probes={"down": {"offset": ["0 mm"] * 3}, "<s>": {"offset": ["-50 mm", "0 mm", "0 mm"]}},
+    )
+    table = tmp_path / "<em>.csv"
+    readings = bp.simulate(experiment, seed=1)
+    readings.loc[3, "x_mm"] += 0.01
+    readings.to_csv(table, index=False)
+    pages = bp.fit(experiment, table).page(), page_of_design(experiment, bp.run(experiment))
+    for page in pages:
+        found = ResultPage(page)
+        assert not {tag for tag, _ in found.tags} & {"b", "i", "u", "s", "em", "img", "iframe"}
+        scripts = [attributes for tag, attributes in found.tags if tag == "script"]
+        assert sum("type" not in one for one in scripts) == 1
+        assert not any(name.startswith("on") for _, one in found.tags for name in one)
+        assert "a &lt;i&gt;title&lt;/i&gt; &amp; &quot;more&quot; &#x27;of it&#x27;" in page
+        assert "z &lt;low&gt; &amp;" in page and "&lt;u&gt;one&lt;/u&gt; &amp; two" in page
+    assert "&lt;em&gt;.csv" in pages[0]
+
+
+def test_a_page_runs_its_own_script_only_and_asks_for_nothing(page: str) -> None:
+    script = re.search(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert script is not None
+    digest = base64.b64encode(hashlib.sha256(script[1].encode()).digest()).decode()
+    policy = re.search(r'Content-Security-Policy" content="([^"]+)"', page)
+    assert policy is not None and policy[1].startswith("default-src 'none'")
+    assert policy[1].endswith(f"script-src 'sha256-{digest}'")
+    asked = [one.get("src") or one.get("href", "") for _, one in ResultPage(page).tags]
+    assert all(one.startswith(("#", "data:,")) for one in asked if one)
+    assert "url(" not in page and "@import" not in page
+    for stored in re.findall(r'<script type="application/json">(.*?)</script>', page):
+        assert "<" not in stored and json.loads(stored)["layers"]
+
+
+def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:
+    status = replace(fitted.solution, status="diverged")
+    failed = replace(fitted, solution=status, quantities={}, estimates=(), largest=(), plates=())
+    page = failed.page()
+    assert_quoted(page, {"fit": failed.to_dict()})
+    assert 'class="verdict bad"' in page and "there are no results" in page
+    with pytest.raises(ValueError, match="fit it anew"):
+        replace(fitted, experiment=None).page()
+
+
+def test_a_page_does_not_call_good_what_was_not_tested(fitted: bp.Fit) -> None:
+    assert 'class="verdict"' in fitted.page() and "no test of the residuals" in fitted.page()
+    untested = replace(fitted, untested="too many entries").page()
+    assert "Not tested: too many entries." in untested
+    exact = replace(fitted, degrees_of_freedom=0, sigma_is_estimated=False, sigma=1.0)
+    page = exact.page()
+    assert "no test of the residuals" not in page and "no larger than stated" not in page
+    assert 'class="verdict bad"' in page and "there is no redundancy" in page
+
+
+def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, readings = "designs/certified/two-dimensions.yaml", tmp_path / "readings.csv"
+    bp.simulate(path, seed=1).to_csv(readings, index=False)
+    assert main(["fit", path, str(readings), "--report", str(tmp_path / "fit.html")]) == 0
+    assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 0
+    results = {"fit": bp.fit(path, readings), "design": path}
+    moment = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC")
+    for name, result in results.items():
+        page = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        assert page.startswith("<!DOCTYPE html>") and "two-dimensions.yaml" in page
+        own = bp.page(result, tmp_path / "own.html")
+        assert moment.sub("", own) == moment.sub("", page)
+        assert (tmp_path / "own.html").read_text(encoding="utf-8") == own
+    assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 3
+    assert "exists already" in capsys.readouterr().err
+    other = ["fit", path, str(readings), "--estimator", "distances", "--report"]
+    other += [str(tmp_path / "a.html")]
+    assert main(other) == 2
+    assert main(["run", "designs/npl/6.1.1.yaml", "--report", str(tmp_path / "a.html")]) == 2
+    assert "--variant" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["run", path, "--report", "a.pdf"])
+
+
+def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
+    prediction = bp.run(small())
+    with pytest.raises(ValueError, match="predict it anew"):
+        bp.page(replace(prediction, experiment=None))
+    with pytest.raises(ValueError, match="go with sweeps only"):
+        bp.page(prediction, run_modules=True)
+    with pytest.raises(TypeError, match="neither an experiment nor the path"):
+        bp.page(3)  # type: ignore[arg-type]
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        bp.page(bp.fit(small(), bp.simulate(small())), tmp_path / "none" / "a.html")
+
+
+@pytest.mark.long
+def test_a_page_of_four_hundred_balls_in_twelve_positions_is_below_three_megabytes() -> None:
+    positions = [
+        {
+            "name": f"P{k}",
+            "plane": "zxy"[k % 3],
+            "level": f"{100 + 37 * k % 800} mm",
+            "corner": {axis: f"{53 * k % 250} mm" for axis in ("xy", "yz", "zx")[k % 3]},
+            "quarter_turns": k % 4,
+            "probes": [("down", "right", "back")[k % 3]],
+        }
+        for k in range(12)
+    ]
+    plate = {"plate": {"kind": "grid", "balls": [20, 20], "size": ["750 mm", "750 mm"]}}
+    experiment = bp.quickstart().with_(positions=positions, artefacts=plate)
+    fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
+    assert len(fit.page()) < 3e6
+    assert len(page_of_design(experiment, bp.run(experiment))) < 3e6

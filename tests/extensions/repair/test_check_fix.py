@@ -1,0 +1,251 @@
+"""`check --fix` and `check --diff`: files are mended as a whole or left as they were."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import stat
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import pytest
+import yaml
+from ballplate.cli import main
+from ballplate.results.study import check
+from ballplate.simulator.experiment.load import load
+
+from tests.reference.copies import copy_file
+
+SYMMETRICAL = Path("designs/npl/6.1.1.yaml").resolve()
+QUICKSTART = Path("designs/quickstart.yaml").resolve()
+GAUGE = Path("designs/hurt_foss/bryan-gauge.yaml").resolve()
+
+SHIFTED = """\
+# two positions, half a turn missing
+title: a plate that is only shifted
+machine: {volume: [900 mm, 900 mm], repeatability: 0.2 um}
+error_model: {kind: metric, scale: x}
+artefacts: {plate: {kind: square, balls: 4, size: 360 mm}}
+positions:
+  - name: straight
+    corner: {x: 250 mm, y: 250 mm}   # the corner of the table
+  - {name: shifted, corner: {x: 350 mm, y: 300 mm}}
+"""
+# Where a pool is, no other positions are added, and one that is there is turned.
+COMMENTED = (
+    SHIFTED.replace("corner: {x: 250 mm, y: 250 mm}   #", "pose: {origin: [250 mm, 250 mm]}   #")
+    + "pool: {}\n"
+)
+
+
+def run(*arguments: str | Path) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "shifted.yaml").write_text(SHIFTED, encoding="utf-8")
+    (tmp_path / "commented.yaml").write_text(COMMENTED, encoding="utf-8")
+    copy_file(QUICKSTART, tmp_path / "good.yaml")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def deficiencies(path: Path) -> list[int]:
+    return [check(one).verdict.deficiency for one in load(path)]
+
+
+def test_deficient_variants_are_mended_and_the_others_left(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = folder / "6.1.1.yaml"
+    copy_file(SYMMETRICAL, path)
+    assert deficiencies(path) == [0, 2, 0, 2]
+    assert run("check", "--fix", path) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\nfull rank, as expected") == 4
+    notes = [line for line in err.splitlines() if line.startswith(str(path))]
+    assert [line.split(": ")[1:3] for line in notes] == [
+        ["6.1.1[A]", "nothing to repair"],
+        ["6.1.1[B]", "repaired"],
+        ["6.1.1[C]", "nothing to repair"],
+        ["6.1.1[D]", "repaired"],
+    ]
+    assert deficiencies(path) == [0, 0, 0, 0]
+    mended = path.read_bytes()
+    before = yaml.safe_load(SYMMETRICAL.read_text(encoding="utf-8"))
+    after = yaml.safe_load(mended)
+    for said in (before, after):
+        del said["variants"]["B"], said["variants"]["D"]
+    assert before == after
+    assert run("check", "--fix", path, "--variant", "B") == 0
+    assert path.read_bytes() == mended
+    assert capsys.readouterr().err.endswith("6.1.1[B]: nothing to repair\n")
+
+
+def test_a_difference_is_shown_and_can_be_applied(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in {
+        "plain": SHIFTED,
+        "crlf": SHIFTED.replace("\n", "\r\n"),
+        "open": SHIFTED.rstrip("\n") + "   # µm",
+        "mark": "\ufeff" + SHIFTED,
+    }.items():
+        path = folder / f"{name}.yaml"
+        path.write_bytes(text.encode())
+        for option in (["--diff"], ["--fix", "--diff"]):
+            assert run("check", *option, path.name) == 1
+            shown, err = capsys.readouterr()
+            assert path.read_bytes() == text.encode()
+            assert "would be repaired: " in err
+        patched = folder / "patched.yaml"
+        patched.write_bytes(text.encode())
+        new = bp.repair(path)
+        assert run("check", "--fix", "-q", path.name) == 0
+        assert capsys.readouterr().err == ""
+        assert path.read_bytes().decode("utf-8-sig") == new != text.removeprefix("\ufeff")
+        assert path.read_bytes().startswith("\ufeff".encode()) == (name == "mark")
+        assert shown.startswith(f"--- {path.name}\n+++ {path.name}\n@@ ")
+        if shutil.which("patch"):
+            command = ["patch", "--binary", "-s", patched.name]
+            subprocess.run(command, input=shown.encode(), check=True, cwd=folder)
+            assert patched.read_bytes() == path.read_bytes()
+        # Nothing is left to change.
+        assert run("check", "--diff", path.name) == 0
+        assert capsys.readouterr().out == ""
+
+
+def test_each_file_is_mended_by_itself(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (folder / "good.yaml").read_bytes()
+    assert run("check", "--fix", "commented.yaml", "shifted.yaml", "good.yaml") == 3
+    out, err = capsys.readouterr()
+    column = COMMENTED.split("\n")[7].index("#") + 1
+    refused = [line for line in err.splitlines() if line.startswith("commented.yaml")]
+    assert refused == [
+        f"commented.yaml:8:{column}: positions[0].pose: a comment here would be lost by the"
+        " change; change it by hand"
+    ]
+    # What is not mended is told as by --suggest.
+    assert "rank deficiency 2" in out and "repair 1, in the file: positions[straight]: " in out
+    assert (folder / "commented.yaml").read_text(encoding="utf-8") == COMMENTED
+    assert deficiencies(folder / "shifted.yaml") == [0]
+    assert (folder / "good.yaml").read_bytes() == before
+    assert sorted(os.listdir(folder)) == ["commented.yaml", "good.yaml", "shifted.yaml"]
+
+
+def test_what_cannot_be_repaired_is_told_as_it_is_suggested(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = folder / "gauge.yaml"
+    copy_file(GAUGE, path)
+    text = path.read_bytes()
+    found = []
+    for option in ("--suggest", "--fix"):
+        status = run("check", option, path, "--variant", "one height")
+        found.append((status, capsys.readouterr().out))
+    assert found[0] == found[1] and "no changes were found" in found[0][1]
+    assert path.read_bytes() == text
+    with pytest.raises(bp.ExperimentError, match="no changes were found"):
+        bp.repair(path, "one height")
+    assert run("check", "--diff", path, "--variant", "one height") == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_data_of_a_mended_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import json
+
+    assert run("check", "--fix", "--format", "json", "shifted.yaml") == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["rank_deficiency"] == 0 and data["repairs"] is None
+    assert run("check", "--diff", "--json", "shifted.yaml") == 2
+    assert "--diff does not go with --format json" in capsys.readouterr().err
+
+
+def test_links_and_permissions_stay(folder: Path) -> None:
+    path, link = folder / "shifted.yaml", folder / "link.yaml"
+    link.symlink_to(path)
+    path.chmod(0o640)
+    assert run("check", "--fix", link) == 0
+    assert link.is_symlink() and stat.S_IMODE(path.stat().st_mode) == 0o640
+    assert deficiencies(path) == [0]
+
+
+@pytest.mark.parametrize("failing", ["fsync", "replace"])
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left"), KeyboardInterrupt()])
+def test_a_failure_loses_nothing(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    failing: str,
+    error: BaseException,
+) -> None:
+    def fail(*arguments: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(os, failing, fail)
+    status = run("check", "--fix", "shifted.yaml")
+    out, err = capsys.readouterr()
+    assert (folder / "shifted.yaml").read_text(encoding="utf-8") == SHIFTED
+    assert sorted(os.listdir(folder)) == ["commented.yaml", "good.yaml", "shifted.yaml"]
+    assert "repaired: " not in err and "\nfull rank" not in out
+    if isinstance(error, OSError):
+        assert status == 3 and "the file there is as it was" in err
+    else:
+        assert status == 130 and err == "interrupted; no file was written\n"
+
+
+def test_an_interruption_tells_of_what_is_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "twice.yaml").write_text(SHIFTED, encoding="utf-8")
+    replace, calls = os.replace, []
+
+    def once(*paths: Any) -> None:
+        calls.append(paths)
+        if len(calls) > 1:
+            raise KeyboardInterrupt
+        replace(*paths)
+
+    monkeypatch.setattr(os, "replace", once)
+    assert run("check", "--fix", "[st]*.yaml") == 130
+    assert capsys.readouterr().err.endswith("interrupted; written: shifted.yaml\n")
+    assert deficiencies(folder / "shifted.yaml") == [0]
+    assert (folder / "twice.yaml").read_text(encoding="utf-8") == SHIFTED
+
+
+def test_a_file_that_changes_meanwhile_is_left(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from ballplate.extensions.repair import mending_command as mending
+
+    path = folder / "shifted.yaml"
+    mended = mending.mended
+
+    def slow(*arguments: Any) -> str:
+        new = mended(*arguments)
+        path.write_text("title: other\n", encoding="utf-8")
+        return new
+
+    monkeypatch.setattr(mending, "mended", slow)
+    assert run("check", "--fix", path) == 3
+    assert "the file has changed meanwhile; nothing was written" in capsys.readouterr().err
+    assert path.read_text(encoding="utf-8") == "title: other\n"
+
+
+def test_a_weak_design_is_mended_where_weak_ones_fail(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = folder / "weak.yaml"
+    copy_file(Path(__file__).parents[3] / "designs/certified/weak.yaml", path)
+    before = path.read_bytes()
+    assert run("check", "--fix", path) == 0
+    assert capsys.readouterr().err.endswith("weak: nothing to repair\n")
+    assert path.read_bytes() == before
+    assert run("check", "--fail-weak", path) == 1
+    assert run("check", "--fail-weak", "--fix", path) == 0
+    (found,) = load(path)
+    assert not check(found).verdict.weak

@@ -1,0 +1,375 @@
+"""A planner's hour in the studio: what a person does with the mouse and the keyboard, in a real
+browser.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+import ballplate as bp
+import pytest
+from ballplate.designs import shipped
+
+from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
+pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
+]
+
+# Nothing sticks out of the page, other than inside parts that scroll by themselves.
+OUTSIDE = """[...document.querySelectorAll('body *')].filter(one =>
+!one.closest('pre, .balls, dialog, textarea') && one.getClientRects().length &&
+one.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
+.map(one => one.outerHTML.slice(0, 90))"""
+
+
+@pytest.fixture
+def design(tmp_path: Path) -> Path:
+    """The quickstart's plate in too few positions."""
+    path = tmp_path / "plate.yaml"
+    lines = Path(shipped("quickstart.yaml")).read_text().splitlines(keepends=True)
+    left_out = ("z high", "x low", "x high", "y high")
+    kept = [line for line in lines if not any(f"name: {name}," in line for name in left_out)]
+    path.write_text("".join(kept))
+    return path
+
+
+def drag(page, name: str, by: tuple[int, int], steps: int = 5) -> None:
+    x, y = page.evaluate(f"window.studio.view.screen({name!r})")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(1, steps + 1):
+        page.mouse.move(x + by[0] * k / steps, y + by[1] * k / steps)
+        page.wait_for_timeout(30)
+    page.mouse.up()
+
+
+# In one piece: an hour in its order.
+def test_an_hour(design: Path) -> None:
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        assert "rank deficiency" in page.inner_text("#verdict")
+        # What is undetermined moves: the picture changes by itself.
+        page.wait_for_selector("[data-motion='0'][aria-pressed='true']")
+        canvas = page.locator("#view")
+        pictures = set()
+        for _ in range(3):
+            pictures.add(canvas.screenshot())
+            page.wait_for_timeout(400)
+        assert len(pictures) == 3
+        # And rests when it is stopped.
+        page.click("[data-motion='0']")
+        page.wait_for_timeout(300)
+        assert len({canvas.screenshot() for _ in range(2)}) == 1
+        # A suggestion is shown where it would stand, and applied.
+        page.click("[data-job=suggest]")
+        page.wait_for_selector("#suggestions li")
+        page.click("#suggestions [data-apply] >> nth=0")
+        settled(page, 1)
+        assert "full rank" in page.inner_text("#verdict")
+        # A plate is dragged, and one is added.
+        before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
+        page.click("#positions button.name >> nth=0")
+        drag(page, "z low", (20, -45))
+        after = settled(page, 2)["design"]["scene"]["positions"][0]["origin"]
+        assert after != before and after[2] == before[2]
+        count = len(page.evaluate("window.studio.state().design.scene.positions"))
+        page.click("[data-job=next]")
+        page.wait_for_selector("#suggestions li")
+        page.click("#suggestions [data-apply] >> nth=0")
+        state = settled(page, 3)
+        assert len(state["design"]["scene"]["positions"]) == count + 1
+        # A wrong value in a form is told beside it; undo takes it back.
+        page.click("#forms summary >> text=machine")
+        field = page.locator('#forms input[data-path=\'["machine","repeatability"]\']')
+        field.fill("0.2 furlongs")
+        field.press("Enter")
+        settled(page, 4)
+        page.wait_for_selector("#forms .field-error")
+        assert page.locator("#forms .field-error").count() == 1
+        assert "text is wrong" in page.inner_text("#verdict")
+        page.click("#undo")
+        settled(page, 5)
+        assert "full rank" in page.inner_text("#verdict")
+        # Saved, the file says what the page says.
+        page.keyboard.press("Control+s")
+        until(page, "window.studio.state().saved")
+        lengths = next(
+            one
+            for one in page.evaluate("window.studio.state().design.quantities")
+            if one["symbol"] == "U6"
+        )
+        predicted = bp.run(design).quantities["U6"]
+        assert lengths["average"] == predicted.average
+        command = [sys.executable, "-m", "ballplate", "check", str(design)]
+        checked = subprocess.run(command, capture_output=True, text=True)
+        assert checked.returncode == 0 and "full rank" in checked.stdout, checked
+        # What another program writes meanwhile is not overwritten.
+        page.click("#positions button.name >> nth=0")
+        page.click("#turn")
+        until(page, "!window.studio.state().saved")
+        written = design.read_bytes() + b"# another hand\n"
+        design.write_bytes(written)
+        page.click("#save")
+        page.wait_for_selector("#notice.bad")
+        assert "has changed on disk" in page.inner_text("#notice")
+        assert design.read_bytes() == written
+        # Nor is the other window's design: this one shows it, and asks again.
+        with page.context.new_page() as other:
+            other.goto(f"http://127.0.0.1:{studio.port}/")
+            until(other, "!!window.studio?.state()?.design")
+            seen = other.evaluate("window.studio.state().revision")
+            other.click("#positions button.name >> nth=1")
+            other.click("#turn")
+            theirs = settled(other, seen + 1)
+        page.evaluate("window.studio.act({do: 'turn', position: 'z low'})")
+        assert "another window" in page.inner_text("#notice")
+        assert page.evaluate("window.studio.state()")["text"] == theirs["text"]
+        page.reload()
+        until(page, "!!window.studio?.state()?.design")
+        page.click("#undo")
+        unsaved = settled(page, theirs["revision"] + 1)["text"]
+        assert unsaved != theirs["text"]
+        # The server is killed: the page says so, and nothing that was done is lost.
+        studio.end(9)
+        page.click("#positions button.name >> nth=0")
+        page.click("#turn")
+        until(page, "document.querySelector('#notice').textContent.includes('Start it again')")
+        assert all("ERR_CONNECTION" in one for one in page.errors)
+        with Studio(design, studio.port) as again:
+            page.wait_for_timeout(2500)
+            # It is another studio, which knows this page no more until its address is opened.
+            assert "with its token" in page.inner_text("#notice")
+            page.errors.clear()
+            page.goto(again.address)
+            until(page, "!!window.studio?.state()?.design")
+            assert "full rank" in page.inner_text("#verdict")
+            assert "not saved in an earlier session" in page.inner_text("#notice")
+            assert page.evaluate("window.studio.state().text") == unsaved
+            page.click("#save")
+            page.wait_for_selector("#notice.bad")
+            assert "has changed on disk" in page.inner_text("#notice")
+            page.click("#toggle-text")
+            page.click("#reopen")
+            until(page, "window.studio.state().saved")
+            assert page.evaluate("window.studio.state().text").endswith("# another hand\n")
+            assert page.errors == [] and "token" not in page.url
+            home = again.address.split("?")[0]
+        assert all(url.startswith((home, "data:")) for url in page.asked)
+
+
+@pytest.mark.long
+def test_twenty_moves_of_seven_by_seven_balls_are_answered(design: Path) -> None:
+    text = Path(shipped("quickstart.yaml")).read_text()
+    design.write_text(text.replace("balls: [5, 5]", "balls: [7, 7]"))
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        first = page.evaluate("window.studio.state()")
+        page.click("#positions button.name >> nth=0")
+        page.evaluate("window.studio.latency.length = 0")
+        engine, states = [], []
+        for k in range(20):
+            page.focus("#view")
+            page.keyboard.press("PageUp" if k % 2 == 0 else "PageDown")
+            states.append(settled(page, first["revision"] + k + 1))
+            engine.append(1e3 * states[-1]["design"]["engine"])
+        latency = page.evaluate("window.studio.latency")
+        assert len(latency) == 20 and page.errors == []
+        # Two moves undo one another; each is answered with figures of its own.
+        for state in states[1::2]:
+            assert state["text"] == first["text"]
+            assert state["design"]["quantities"] == first["design"]["quantities"]
+        moved = states[0]["design"]["quantities"]
+        assert moved != first["design"]["quantities"]
+        design.write_text(states[0]["text"])
+        expected = bp.run(design).quantities
+        assert [(one["symbol"], one["average"]) for one in moved] == [
+            (symbol, one.average) for symbol, one in expected.items()
+        ]
+    middle = {key: statistics.median(one[key] for one in latency) for key in latency[0]}
+    print(
+        f"median of twenty moves: answered {middle['answered']:.0f} ms, shown"
+        f" {middle['shown']:.0f} ms, engine {statistics.median(engine):.0f} ms"
+    )
+
+
+@pytest.mark.long
+def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> None:
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+
+        def sweep(values: str) -> None:
+            page.click("#sweep")
+            page.fill("[data-axis=values]", values)
+            page.click("#more-axes")
+            page.fill(
+                "[data-axis=paths] >> nth=1", "artefacts.plate.size[0], artefacts.plate.size[1]"
+            )
+            page.fill("[data-axis=values] >> nth=1", "600 mm; 750 mm")
+            page.click("#ok")
+
+        sweep("; ".join(f"{k} nm" for k in range(100, 600)))
+        page.wait_for_selector("#jobs li[data-state=running] >> text=of 1000 cells")
+        page.click("#jobs button >> text=stop")
+        until(page, "!document.querySelector('#jobs li')")
+        sweep("0.1 um; 0.2 um; 0.4 um")
+        page.wait_for_selector("#jobs li:not([data-state=running])", timeout=200_000)
+        assert page.locator("[data-page]").count() == 1, page.inner_text("#jobs")
+        assert page.locator("#jobs tbody tr").count() == 6
+        assert "rank deficiency" in page.inner_text("#jobs thead")
+        with page.context.expect_page() as opened:
+            page.click("[data-page]")
+        swept = opened.value
+        failures = []
+        swept.on("console", lambda said: failures.append(said.text))
+        swept.on("pageerror", lambda error: failures.append(str(error)))
+        swept.reload()
+        assert "6 of 6 cells done" in swept.inner_text("body")
+        assert failures == [] and page.errors == []
+
+
+@pytest.mark.long
+def test_the_keyboard_is_enough(design: Path) -> None:
+    """Who works without a mouse stays where he was, though parts of the page are made anew."""
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+
+        def reach(selector: str) -> None:
+            for _ in range(150):
+                page.keyboard.press("Tab")
+                if page.evaluate("([s]) => document.activeElement.matches(s)", [selector]):
+                    return
+            raise AssertionError(f"no {selector} by the Tab key")
+
+        def press(key: str) -> dict:
+            revision = page.evaluate("window.studio.state().revision")
+            page.keyboard.press(key)
+            return settled(page, revision + 1)
+
+        at = "document.activeElement.getAttribute('aria-label') || document.activeElement.id"
+        reach("#positions button.name")
+        page.keyboard.press("Enter")
+        assert page.evaluate(at) == "choose z low"
+        reach("#turn")
+        turned = press("Enter")["text"]
+        assert page.evaluate(at) == "turn"
+        assert press("Enter")["text"] != turned and page.evaluate(at) == "turn"
+        reach("#position .balls button")
+        press("Space")
+        assert page.evaluate(at) == "r1c1"
+        reach("[data-section=machine] > summary")
+        page.keyboard.press("Enter")
+        path = '["machine","repeatability"]'
+        reach(f"#forms [data-path='{path}']")
+        page.keyboard.press("Control+a")
+        page.keyboard.type("0.3 um")
+        assert press("Enter")["data"]["machine"]["repeatability"] == "0.3 um"
+        assert page.evaluate("document.activeElement.dataset.path") == path
+        reach("#view")
+        before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
+        after = press("PageUp")["design"]["scene"]["positions"][0]["origin"]
+        assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+        assert page.evaluate(at).startswith("The volume")
+        state = press("Control+s")
+        assert state["saved"] and page.errors == []
+
+
+def test_a_machine_of_its_own_from_an_empty_folder(tmp_path: Path) -> None:
+    """A machine of 1200 x 900 x 700 mm that meets 0.9 + L/400 µm (L in mm), by the browser alone."""
+    design = tmp_path / "machine.yaml"
+    actions = 0
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+
+        def fill(path: str, value: str) -> None:
+            nonlocal actions
+            field = page.locator(f"#forms [data-path='{path}']")
+            revision = page.evaluate("window.studio.state().revision")
+            field.fill(value)
+            field.press("Enter")
+            settled(page, revision + 1)
+            actions += 1
+
+        for section in ("machine", "artefacts", "positions", "target uncertainty", "title"):
+            page.click(f"#forms summary >> text=/^{section}$/")
+            actions += 1
+        fill('["title"]', "plate in a machine of 1200 x 900 x 700 mm")
+        fill('["artefacts","plate","size"]', "[500 mm, 500 mm]")
+        fill('["machine","volume"]', "[1200 mm, 900 mm, 700 mm]")
+        places = {
+            1: {"level": "550 mm", "corner,x": "650 mm", "corner,y": "350 mm"},
+            2: {"corner,y": "50 mm"},
+            3: {"level": "950 mm", "corner,y": "350 mm", "corner,z": "150 mm"},
+            4: {"corner,x": "50 mm"},
+            5: {"level": "650 mm", "corner,z": "150 mm", "corner,x": "650 mm"},
+        }
+        for k, changes in places.items():
+            for key, value in changes.items():
+                steps = ",".join(f'"{step}"' for step in key.split(","))
+                fill(f'["positions",{k},{steps}]', value)
+        fill('["target_uncertainty"]', "(0.9 + L/400) um with L in mm")
+        page.keyboard.press("Control+s")
+        actions += 1
+        until(page, "window.studio.state().saved")
+        assert page.errors == []
+        page.screenshot(path=str(tmp_path / "machine.png"))
+    assert actions <= 60
+    prediction = bp.run(design)
+    assert prediction.verdict.deficiency == 0
+    assert prediction.quantities["U6"].within_target == 1.0
+    volume = prediction.design.machine.volume
+    assert (volume.upper - volume.lower).tolist() == [1.2, 0.9, 0.7]
+    print(f"{actions} actions")
+
+
+@pytest.mark.parametrize("width", [400, 900, 1400])
+def test_the_page_fits_small_screens(design: Path, width: int) -> None:
+    with Studio(design) as studio, tab(width) as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        page.click("#positions button.name >> nth=0")
+        for summary in page.locator("#forms > details > summary").all():
+            summary.click()
+        assert page.evaluate(OUTSIDE) == []
+        assert page.errors == []
+
+
+def test_results_of_an_earlier_design_are_marked_and_a_refused_sweep_says_where(
+    design: Path,
+) -> None:
+    with Studio(design) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        page.click("#sweep")
+        page.click("#more-axes")
+        page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.size[0]")
+        page.fill("[data-axis=values] >> nth=1", "750 mm; 400")
+        page.click("#ok")
+        page.wait_for_selector("#fields fieldset:nth-of-type(2) >> text=has no unit")
+        # What was typed is there still.
+        page.fill("[data-axis=values] >> nth=1", "750 mm; 400 mm")
+        page.click("#ok")
+        page.wait_for_selector("#jobs li[data-state=done]", timeout=200_000)
+        heads = page.locator("#jobs th").all_inner_texts()
+        assert heads[:2] == ["repeatability", "size[0]"] and "U6 max. µm" in heads
+        assert page.locator("#jobs li >> text=of an earlier design").count() == 0
+        page.click("#positions button.name >> nth=0")
+        page.click("#turn")
+        page.wait_for_selector("#jobs li >> text=of an earlier design")
+        page.click("#undo")
+        until(page, "!document.querySelector('#jobs').innerText.includes('of an earlier')")
+        assert page.errors == []

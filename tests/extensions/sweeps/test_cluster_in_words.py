@@ -1,0 +1,178 @@
+"""A cluster that cannot be used, or not any longer, is told in one line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from ballplate.extensions.sweeps import cluster
+from ballplate.extensions.sweeps.cluster import (
+    ClusterError,
+    OtherVersionError,
+    _on_worker,
+    _refuse,
+)
+from ballplate.extensions.sweeps.task import CellTask
+
+from tests.extensions.sweeps.support import ROOT, command, small_sweep, stored
+
+Start = Callable[..., subprocess.Popen[bytes]]
+
+# A worker whose Python has everything but ballplate.
+WITHOUT = """
+import importlib.metadata, sys
+real = importlib.metadata.version
+def version(name):
+    if name == "ballplate":
+        raise importlib.metadata.PackageNotFoundError(name)
+    return real(name)
+importlib.metadata.version = version
+"""
+# One with another version.
+OTHER = """
+import importlib.metadata
+real = importlib.metadata.version
+importlib.metadata.version = lambda name: "0.0.7" if name == "ballplate" else real(name)
+"""
+# One with the same version but other code.
+OTHER_CODE = """
+import ballplate.extensions.sweeps.cluster
+ballplate.extensions.sweeps.cluster.code_digest = lambda: "other"
+"""
+SERVE = """
+import asyncio, sys
+from distributed import Worker
+async def serve():
+    async with Worker(sys.argv[1], nthreads=1, dashboard=False) as worker:
+        await worker.finished()
+asyncio.run(serve())
+"""
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    processes = []
+
+    def begin(*arguments: str) -> subprocess.Popen[bytes]:
+        with (tmp_path / "log").open("ab") as log:
+            process = subprocess.Popen(
+                [sys.executable, *arguments], stdout=log, stderr=log, cwd=ROOT
+            )
+        processes.append(process)
+        return process
+
+    yield begin
+    for process in reversed(processes):
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path, start: Start) -> tuple[str, subprocess.Popen[bytes]]:
+    """Address and process of a scheduler without workers."""
+    file = tmp_path / "scheduler.json"
+    options = [
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    ]
+    process = start("-m", "distributed.cli.dask_scheduler", *options)
+    end = time.monotonic() + 60
+    while not file.exists():
+        assert time.monotonic() < end and process.poll() is None
+        time.sleep(0.05)
+    return json.loads(file.read_text(encoding="utf-8"))["address"], process
+
+
+def ended(path: Path, address: str) -> str:
+    """What a sweep that ends with status 3 says."""
+    arguments = command("sweep", path, "--scheduler", address)
+    done = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 3 and done.stdout == "" and done.stderr.count("\n") == 1, done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize(
+    ("worker", "words"),
+    [
+        (WITHOUT, "no ballplate"),
+        (OTHER, "ballplate 0.0.7"),
+        (OTHER_CODE, "other code of ballplate 0.1.0"),
+    ],
+    ids=["no ballplate", "another version", "other code"],
+)
+def test_workers_with_other_code_are_refused(
+    worker: str,
+    words: str,
+    tmp_path: Path,
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    start: Start,
+) -> None:
+    address, _ = scheduler
+    start("-c", worker + SERVE, address)
+    err = ended(small_sweep(tmp_path, 2), address)
+    assert (
+        f" has {words}, and this is ballplate 0.1.0; install the same wherever a worker runs" in err
+    )
+    assert err.startswith("the worker tcp://127.0.0.1:")
+    assert stored(tmp_path / "small.sqlite") == 0
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_ends(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+) -> None:
+    address, process = scheduler
+    start("-c", SERVE, address)
+    path, store = small_sweep(tmp_path, 100, "trials: 50\n"), tmp_path / "small.sqlite"
+    arguments = command("sweep", path, "--scheduler", address)
+    with subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as sweep:
+        end = time.monotonic() + 100
+        while sweep.poll() is None and stored(store) < 2 and time.monotonic() < end:
+            time.sleep(0.02)
+        process.kill()
+        out, err = sweep.communicate(timeout=100)
+    last = err.splitlines()[-1]
+    assert sweep.returncode == 3 and "Traceback" not in err and out == "", err
+    assert last.startswith(f"the scheduler at {address} has ended; finished cells are stored"), err
+    assert 2 <= stored(store) < 200
+
+
+def test_no_worker(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from distributed import Client
+
+    monkeypatch.setattr(cluster, "PATIENCE", 0.2)
+    with (
+        cluster._quiet(),
+        Client(scheduler[0], set_as_default=False) as client,
+        pytest.raises(
+            ClusterError, match="the cluster has no workers; start some with: dask worker"
+        ),
+    ):
+        cluster._check_versions(client)
+
+
+def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
+    with pytest.raises(OtherVersionError):
+        _on_worker(cluster.Bundle("", "", ()), "other", CellTask(0))
+
+
+def test_all_workers_that_differ_are_counted() -> None:
+    with pytest.raises(
+        ClusterError,
+        match="the worker b has no ballplate, and this is ballplate 1, and 1 more differ;",
+    ):
+        _refuse({"a": "ballplate 1", "b": "no ballplate", "c": "ballplate 2"}, "ballplate 1")

@@ -1,0 +1,617 @@
+"""Whatever stands in the place of a store, or in it: one line that says so, and what can be read is
+not lost.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import shutil
+import sqlite3
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from ballplate.cli import main
+from ballplate.extensions.sweeps import store_file
+from ballplate.extensions.sweeps.model import Sweep
+from ballplate.extensions.sweeps.store import (
+    Store,
+    StoreError,
+    add_rows,
+    add_sweep,
+    open_store,
+    results,
+)
+from ballplate.extensions.sweeps.task import CellResult, CellTask, compute
+
+from tests.extensions.sweeps.odd_stores import (
+    DAMAGED,
+    NO_STORES,
+    by_sql,
+    of_the_first_format,
+    page_of,
+    settled,
+)
+from tests.extensions.sweeps.support import assert_same, rows, small_sweep
+from tests.reference.tables import read_table
+
+NO_TIME = ["duration_s"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small sweep and of its store."""
+    folder = tmp_path_factory.mktemp("made")
+    path = small_sweep(folder, 2, "record: [U4]\n")
+    assert main(["sweep", str(path), "--workers", "1"]) == 1
+    settled(folder / "small.sqlite")
+    return folder
+
+
+@pytest.fixture
+def store(made: Path, tmp_path: Path) -> Path:
+    """A copy of the store, with the sweep file beside it."""
+    for name in ("small.yaml", "quickstart.yaml", "small.sqlite"):
+        shutil.copy(made / name, tmp_path)
+    return tmp_path / "small.sqlite"
+
+
+def commands(store: Path, *kinds: str) -> list[list[str]]:
+    """Command lines that take a store."""
+    folder = store.parent
+    every = {
+        "sweep": ["sweep", str(folder / "small.yaml"), "--workers", "1"],
+        "csv": ["export", str(store), "-o", str(folder / "table.csv")],
+        "parquet": ["export", str(store), "-o", str(folder / "table.parquet")],
+        **{
+            name: ["report", str(store), "--format", name, "-o", str(folder / f"report.{name}")]
+            for name in ("html", "text", "markdown", "latex")
+        },
+    }
+    return [every[kind] for kind in kinds or every]
+
+
+def assert_told_in_lines(err: str, store: Path) -> None:
+    """Each line begins with the store, or goes on about failed cells, and none holds a control
+    character.
+    """
+    assert err.endswith("\n") and "Traceback" not in err
+    assert err.startswith(f"{store}: "), err
+    assert all(line.isprintable() for line in err.splitlines()), err
+
+
+@pytest.mark.parametrize("name", NO_STORES)
+def test_what_is_no_store_is_refused_in_one_line(
+    name: str, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    NO_STORES[name](store)
+    before = store.read_bytes() if store.is_file() else b""
+    for arguments in commands(store):
+        assert main(arguments) == 3, arguments
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1
+        assert_told_in_lines(err, store)
+    # What belongs to somebody else is left as it is.
+    assert before == (store.read_bytes() if store.is_file() else b"")
+    assert not [*store.parent.glob("table.*"), *store.parent.glob("report.*")]
+
+
+@pytest.mark.parametrize("first", [False, True], ids=["digests", "first format"])
+@pytest.mark.parametrize("name", DAMAGED)
+def test_what_can_be_read_of_a_damaged_store_is_right(
+    name: str, first: bool, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = rows(store)
+    if first:
+        of_the_first_format(store)
+    DAMAGED[name](store)
+    for arguments in commands(store, *(["csv"] if first else ["csv", "text"])):
+        status = main(arguments)
+        out, err = capsys.readouterr()
+        assert status in (0, 3) and out == ""
+        if status or err:
+            assert_told_in_lines(err, store)
+    table = store.parent / "table.csv"
+    if table.exists():
+        assert_subset(read_table(table), right, exact=not first)
+    # Computed anew, or refused.
+    status = main(commands(store, "sweep")[0])
+    out, err = capsys.readouterr()
+    if status == 3:
+        assert out == ""
+        assert_told_in_lines(err, store)
+    else:
+        assert status == 1 and "4 cells, 2 done, 2 failed" in out and "Traceback" not in err
+        if not first:
+            assert_same(rows(store), right)
+
+
+def assert_subset(table: pandas.DataFrame, right: pandas.DataFrame, exact: bool) -> None:
+    """Every row of a table is that of its cell."""
+    assert set(table["cell"]) <= {0, 1, 2, 3}
+    if not exact:
+        return
+    for name in set(table.columns) - set(NO_TIME):
+        expected = right.set_index("cell").loc[table["cell"]].reset_index()[name]
+        if expected.dtype.kind == table[name].dtype.kind == "f":
+            np.testing.assert_array_equal(table[name], expected)
+        else:
+            assert as_texts(table[name]) == as_texts(expected), name
+
+
+def as_texts(column: pandas.Series) -> list[str]:
+    """Values of a column in words, none where there are none."""
+    return ["" if pandas.isna(value) else str(value) for value in column]
+
+
+def test_names_of_tables_that_are_no_text(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """SQLite quotes them in what it says, as they are."""
+    content = store.read_bytes()
+    assert b"CREATE TABLE result" in content
+    store.write_bytes(
+        content.replace(b"CREATE TABLE result", b"CREATE TABLX\xf1result").replace(
+            b"resultresult", b"resu\xf1tresult"
+        )
+    )
+    for arguments in commands(store):
+        assert main(arguments) == 3
+        assert_told_in_lines(capsys.readouterr().err, store)
+
+
+def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    connection = sqlite3.connect(store)
+    (figures,) = connection.execute("SELECT figures FROM result WHERE rowid = 2").fetchone()
+    connection.close()
+    content = store.read_bytes()
+    place = content.index(figures[:64])
+    store.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+    assert main(commands(store, "csv")[0]) == 3
+    err = capsys.readouterr().err
+    assert "1 of 4 cells could not be read: 1 (its content is not what was stored)" in err
+    assert read_table(store.parent / "table.csv")["cell"].tolist() == [0, 2, 3]
+    assert main(commands(store, "html")[0]) == 3
+    page = (store.parent / "report.html").read_text(encoding="utf-8")
+    assert "1 could not be read from the damaged store" in page
+    capsys.readouterr()
+    assert main(commands(store, "sweep")[0]) == 1
+    captured = capsys.readouterr()
+    assert "1 of 4 cells could not be read" in captured.err and "(3 of them before)" in captured.out
+
+
+def many(path: Path, count: int) -> Store:
+    """A store of made-up rows on many pages."""
+    axis = {"name": "k", "column": "k", "unit": "1", "labels": [str(k) for k in range(count)]}
+    definition = {
+        "title": "t", "source": "s.yaml", "base": "b.yaml", "sweep": {}, "experiment": {}, "files": {},
+        "axes": [{**axis, "values": [float(k) for k in range(count)]}], "cells": [[k] for k in range(count)],
+        "trials": None, "seed": 1, "record": ["U4"],
+    }  # fmt: skip
+    store = open_store(path, create=True)
+    made_up = (
+        CellResult(
+            k,
+            0,
+            f"2 {k:040d}",
+            "done",
+            figures={"U4_average_m": k / 7, "U4_undetermined": 0.0},
+            versions=(("a", "b"),),
+        )
+        for k in range(count)
+    )
+    add_rows(store, add_sweep(store, definition, []), made_up)
+    return store
+
+
+@pytest.mark.parametrize("what", ["a page", "the end"])
+def test_all_but_the_rows_of_the_damaged_pages_survive(
+    what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "many.sqlite"
+    many(path, 1000).close()
+    settled(path)
+    content = path.read_bytes()
+    size = int.from_bytes(content[16:18], "big")
+    place = content.index(f"2 {777:040d}".encode() + b"done")
+    if what == "a page":
+        start = place // size * size
+        path.write_bytes(content[:start] + b"\xa5" * size + content[start + size :])
+    else:
+        path.write_bytes(content[: len(content) - size])
+    assert main(["export", str(path), "-o", str(tmp_path / "t.csv")]) == 3
+    err = capsys.readouterr().err
+    told = re.search(r"(\d+) of 1000 cells could not be read", err)
+    table = read_table(tmp_path / "t.csv")
+    assert told is not None and int(told[1]) == 1000 - len(table)
+    # Of those on one page, not of any other.
+    assert 1 <= int(told[1]) <= size // 40
+    assert (table["U4_average_m"] == table["cell"] / 7).all() and (
+        table["k"] == table["cell"]
+    ).all()
+    assert main(["report", str(path), "--format", "text", "-o", str(tmp_path / "t.txt")]) == 3
+    assert "unreadable" in (tmp_path / "t.txt").read_text() or len(table) > 200
+
+
+@pytest.mark.parametrize("first", [False, True], ids=["digests", "first format"])
+@pytest.mark.parametrize("block", ["'a\nb'", "x'00'", "0.5", "-1", "NULL"])
+def test_rows_whose_block_is_none_are_told(
+    block: str, first: bool, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if first:
+        of_the_first_format(store)
+    with sqlite3.connect(store) as connection:
+        changed = connection.execute(f"UPDATE result SET block = {block}").rowcount
+    connection.close()
+    for arguments in commands(store, "csv", "text", "html"):
+        assert main(arguments) == 3
+        out, err = capsys.readouterr()
+        assert out == "" and f"{changed} entries belong to no cell" in err
+        assert_told_in_lines(err, store)
+
+
+def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with sqlite3.connect(store) as connection:
+        connection.execute("DELETE FROM result")
+    connection.close()
+    for arguments in commands(store, "text", "html"):
+        assert main(arguments) == 0
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1 and "none of its 4 cells is done" in err
+        assert_told_in_lines(err, store)
+
+
+def test_names_of_figures_are_found_in_the_index(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = rows(store)
+    page_of("text")(store)
+    assert main(commands(store, "csv")[0]) == 3
+    assert "SQLite finds: " in capsys.readouterr().err
+    assert_subset(table := read_table(store.parent / "table.csv"), right, exact=True)
+    assert len(table) == 4
+
+
+def test_rows_of_the_first_format_are_read_and_go_on(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = rows(store)
+    of_the_first_format(store)
+    content = store.read_bytes()
+    assert_same(rows(store), right)
+    for arguments in commands(store, "csv", "parquet", "html", "text"):
+        assert main(arguments) == 0
+    assert store.read_bytes() == content
+    capsys.readouterr()
+    connection = sqlite3.connect(store)
+    connection.execute("DELETE FROM result WHERE rowid = 1")
+    connection.commit()
+    connection.close()
+    assert main(commands(store, "sweep")[0]) == 1
+    assert "(3 of them before)" in capsys.readouterr().out
+    assert_same(rows(store), right)
+    connection = sqlite3.connect(store)
+    assert connection.execute("SELECT value FROM about").fetchall() == [
+        ("ballplate sweep store 2",)
+    ]
+    assert connection.execute(
+        "SELECT count(*) FROM result WHERE digest IS NOT NULL"
+    ).fetchone() == (1,)
+    connection.close()
+
+
+def test_an_unreadable_definition_costs_no_figure(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = rows(store)
+    by_sql("UPDATE sweep SET definition = 'lost'")(store)
+    assert main(commands(store, "csv")[0]) == 3
+    assert "the definition of sweep 1 cannot be read" in capsys.readouterr().err
+    table = read_table(store.parent / "table.csv")
+    assert_subset(table, right, exact=True)
+    assert len(table) == 4 and "size_m" not in table
+    assert main(commands(store, "sweep")[0]) == 3
+    assert "--beside" in capsys.readouterr().err
+    assert main([*commands(store, "sweep")[0], "--beside"]) == 1
+    assert "4 cells of sweep 2, 2 done, 2 failed (" in capsys.readouterr().out
+    assert_same(rows(store)[right.columns], right)
+
+
+@pytest.mark.parametrize("what", ["deleted", "replaced", "moved", "a pipe"])
+def test_a_store_that_vanishes_while_a_sweep_runs(
+    what: str, store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    original = store.with_name("kept.sqlite")
+    shutil.move(store, original)
+    other = b"somebody else's"
+
+    def vanishing(loaded: Sweep, task: CellTask) -> CellResult:
+        if task.number == 2:
+            if what == "moved":
+                store.rename(store.with_name("elsewhere.sqlite"))
+            else:
+                store.unlink()
+            if what == "replaced":
+                store.write_bytes(other)
+            if what == "a pipe":
+                os.mkfifo(store)
+        return compute(loaded, task)
+
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", vanishing)
+    assert main(commands(store, "sweep")[0]) == 3
+    out, err = capsys.readouterr()
+    assert "done" not in out
+    line = err.splitlines()[-1]
+    assert (
+        line.startswith(f"{store}: has been ")
+        and "while the sweep ran" in line
+        and "Traceback" not in err
+    )
+    if what == "replaced":
+        assert store.read_bytes() == other
+    if what == "moved":
+        # With all rows that were computed before.
+        assert rows(store.with_name("elsewhere.sqlite"))["cell"].tolist() == [0, 1]
+
+
+def test_a_store_that_vanishes_at_the_end_is_not_called_done(
+    store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from ballplate.extensions.sweeps import execute
+
+    with monkeypatch.context() as patched:
+        real = execute.run_sweep
+        patched.setattr(
+            "ballplate.extensions.sweeps.running.run_sweep",
+            lambda *a, **o: _gone(real(*a, **o), store),
+        )
+        assert main(commands(store, "sweep")[0]) == 3
+    out, err = capsys.readouterr()
+    assert out == "" and "has been deleted or moved" in err
+
+
+def _gone(found: object, store: Path) -> object:
+    store.unlink()
+    return found
+
+
+def test_another_process_that_writes_is_told(
+    store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(store_file, "PATIENCE", 0.2)
+    connection = sqlite3.connect(store, isolation_level=None)
+    connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+    connection.execute("BEGIN EXCLUSIVE")
+    try:
+        for arguments in commands(store):
+            assert main(arguments) == 3
+            err = capsys.readouterr().err
+            assert err == f"{store}: another process is writing to it; wait for it, or end it\n"
+    finally:
+        connection.close()
+
+
+def test_what_a_killed_sweep_left_in_its_log_is_read(store: Path, tmp_path: Path) -> None:
+    """Rows are in the write-ahead log until SQLite moves them."""
+    right = rows(store)
+    open_one = open_store(store, create=True)
+    with open_one.connection as connection:
+        connection.execute("UPDATE result SET seconds = 17")
+    (tmp_path / "killed").mkdir()
+    for path in tmp_path.glob("small.sqlite*"):
+        shutil.copy(path, tmp_path / "killed")
+    open_one.close()
+    copy = tmp_path / "killed/small.sqlite"
+    assert (tmp_path / "killed/small.sqlite-wal").stat().st_size > 0
+    found = open_store(copy)
+    assert all(row.seconds == 17 for row in results(found, 1).rows)
+    found.close()
+    assert_same(rows(copy), right)
+
+
+@pytest.mark.parametrize("log", [b"", b"x" * 10_000, b"\x37\x7f\x06\x82" + bytes(5000)])
+def test_a_log_of_something_else_is_left_out(log: bytes, store: Path) -> None:
+    right = rows(store)
+    store.with_name("small.sqlite-wal").write_bytes(log)
+    assert_same(rows(store), right)
+
+
+def test_a_folder_that_cannot_be_written() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o555)
+        is_root = os.geteuid() == 0
+        if is_root:
+            # Nothing is forbidden to root.
+            os.seteuid(65534)
+        try:
+            with pytest.raises(
+                StoreError, match="its folder cannot be written; name another with --store"
+            ):
+                open_store(folder / "s.sqlite", create=True)
+        finally:
+            if is_root:
+                os.seteuid(0)
+        assert not list(folder.iterdir())
+
+
+HOSTILE = "\x1b[31m\x07<script>alert(1)</script>::error::\u202eevil"
+
+
+def test_text_of_a_store_is_escaped(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of_the_first_format(store)
+    by_sql(
+        f"UPDATE result SET reason = '{HOSTILE}'",
+        f"UPDATE sweep SET definition = replace(definition, 'many small cells', 'T {HOSTILE}')".replace(
+            "\x1b", "\\u001b"
+        ).replace("\x07", "\\u0007"),
+        f"UPDATE text SET value = '{{\"ballplate\": \"{HOSTILE}\"}}' WHERE value LIKE '{{%'".replace(
+            "\x1b", "\\u001b"
+        ).replace("\x07", "\\u0007"),
+    )(store)
+    for arguments in commands(store):
+        assert main(arguments) in (0, 1)
+        out, err = capsys.readouterr()
+        assert "\x1b" not in out + err and "\x07" not in out + err and "\u202e" not in out + err
+    assert main(["export", str(store), "-o", "-"]) == 0
+    assert main(["report", str(store), "--format", "text"]) == 0
+    out = capsys.readouterr().out
+    assert "\x1b" not in out and "\\x1b" in out
+    for path in store.parent.glob("report.*"):
+        text = path.read_text(encoding="utf-8")
+        assert "\x1b" not in text and "\u202e" not in text, path
+    assert "<script" not in (store.parent / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../out.yaml",
+        "/tmp/out.yaml",
+        "C:out.yaml",
+        "C:\\out.yaml",
+        "a\0b",
+        "",
+        ".",
+        "x" * 300,
+        "quickstart.yaml/in",
+    ],
+)
+def test_names_of_files_in_a_store_lead_nowhere(
+    name: str, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path for path in store.parent.parent.rglob("*")}
+    connection = sqlite3.connect(store)
+    connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, ?, x'00')", [name])
+    connection.commit()
+    connection.close()
+    assert main(commands(store, "html")[0]) == 0
+    page = (store.parent / "report.html").read_text(encoding="utf-8")
+    assert "the store cannot be trusted" in page or "cannot be unpacked" in page
+    assert {path for path in store.parent.parent.rglob("*")} - before <= {
+        store.parent / "report.html"
+    }
+
+
+@pytest.mark.parametrize("where", ["base", "axis", "machine"])
+@pytest.mark.parametrize("target", ["/dev/zero", "../../../../../../etc/passwd", "~/x.csv"])
+def test_a_report_reads_no_file_outside_the_store(where: str, target: str, store: Path) -> None:
+    connection = sqlite3.connect(store)
+    files = dict(connection.execute("SELECT path, content FROM bundle").fetchall())
+    base, sweep = files["quickstart.yaml"].decode(), files["small.yaml"].decode()
+    if where == "base":
+        base = base.replace(
+            "{random: 200, seed: 1}",
+            f"{{file: {target}}}",
+        )
+        assert target in base
+    elif where == "axis":
+        sweep = sweep.replace(
+            "axes:\n", f"axes:\n  f: {{path: artefacts.plate.file, values: ['{target}', b.csv]}}\n"
+        )
+    else:
+        machine = f"tables: {{file: '{target}'}}\n"
+        connection.execute(
+            "INSERT INTO bundle (sweep, path, content) VALUES (1, 'm.yaml', ?)", [machine.encode()]
+        )
+    for name, text in (("quickstart.yaml", base), ("small.yaml", sweep)):
+        connection.execute(
+            "UPDATE bundle SET content = ?, digest = NULL WHERE path = ?", [text.encode(), name]
+        )
+    connection.commit()
+    connection.close()
+    assert main(commands(store, "html")[0]) == 0
+    page = (store.parent / "report.html").read_text(encoding="utf-8")
+    words = {
+        "base": (
+            "outside the folder that files are read from here",
+            "~/x.csv: there is no such file",
+        ),
+        "axis": (
+            "the stored files make other cells than those stored",
+            "outside the folders of the sweep",
+        ),
+        # What nothing names is not read.
+        "machine": ("</svg>",),
+    }
+    drawn = page[page.index('id="designs"') :]
+    assert any(one in drawn for one in words[where])
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "html", "text", "markdown", "latex"])
+def test_no_code_of_a_store_is_run(kind: str, store: Path) -> None:
+    mark = store.parent / "ran"
+    code = f"open({str(mark)!r}, 'w')\n".encode()
+    connection = sqlite3.connect(store)
+    (base,) = connection.execute(
+        "SELECT content FROM bundle WHERE path = 'quickstart.yaml'"
+    ).fetchone()
+    model = b"error_model: {kind: python, object: 'evil:build'}\n"
+    base = re.sub(rb"error_model:\n(  .*\n)+", model, base)
+    assert model in base
+    connection.execute(
+        "UPDATE bundle SET content = ?, digest = NULL WHERE path = 'quickstart.yaml'", [base]
+    )
+    for name in ("evil.py", "sitecustomize.py", "conftest.py"):
+        connection.execute(
+            "INSERT INTO bundle (sweep, path, content) VALUES (1, ?, ?)", [name, code]
+        )
+    connection.commit()
+    connection.close()
+    assert main(commands(store, kind)[0]) == 0
+    assert not mark.exists()
+    if kind == "html":
+        assert "add --run-modules" in (store.parent / "report.html").read_text(encoding="utf-8")
+
+
+def flipped(store: Path, chance: random.Random) -> None:
+    """Change some bits somewhere."""
+    content = bytearray(store.read_bytes())
+    for _ in range(chance.choice([1, 1, 2, 8, 64])):
+        # The header and the first page hold what SQLite believes most.
+        end = chance.choice([100, 4096, len(content), len(content), len(content)])
+        content[chance.randrange(min(end, len(content)))] ^= 1 << chance.randrange(8)
+    if chance.random() < 0.15:
+        del content[chance.randrange(len(content)) :]
+    store.write_bytes(content)
+
+
+def assert_survives(made: Path, folder: Path, seed: int, right: pandas.DataFrame) -> str:
+    """Flip bits of a store: whatever is read of it is right, and everything else is told; the
+    status by itself.
+    """
+    chance = random.Random(seed)
+    store = folder / "small.sqlite"
+    for path in folder.iterdir():
+        path.unlink()
+    for name in ("small.yaml", "quickstart.yaml", "small.sqlite"):
+        shutil.copy(made / name, folder)
+    flipped(store, chance)
+    kind = chance.choice(["csv", "csv", "csv", "text", "sweep"])
+    status = main(commands(store, kind)[0])
+    assert status in ((1, 3) if kind == "sweep" else (0, 3)), seed
+    table = folder / "table.csv"
+    if table.exists():
+        found = read_table(table)
+        assert_subset(found, right, exact=True)
+        assert status == 3 or len(found) == 4, seed
+    if kind == "sweep" and status == 1:
+        assert_same(rows(store), right)
+    return f"{kind} {status}"
+
+
+def test_flipped_bits(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    right = rows(made / "small.sqlite")
+    seen = {assert_survives(made, tmp_path, seed, right) for seed in range(40)}
+    assert {"csv 0", "csv 3", "sweep 1", "sweep 3"} <= seen
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_many_flipped_bits(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    right = rows(made / "small.sqlite")
+    seen = [assert_survives(made, tmp_path, 1000 + seed, right) for seed in range(4000)]
+    assert seen.count("csv 3") > 100
+    assert "Traceback" not in capsys.readouterr().err

@@ -1,0 +1,532 @@
+"""What a store keeps: every cell once, with its reasons, seeds and versions; what it refuses."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import sqlite3
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from ballplate.cli import main
+from ballplate.extensions.sweeps.fingerprint import METHOD, fingerprint
+from ballplate.extensions.sweeps.load import experiment_of, load_sweep
+from ballplate.extensions.sweeps.model import Sweep
+from ballplate.extensions.sweeps.store import definitions, files, keys, open_store, results
+from ballplate.extensions.sweeps.task import BLOCK, CellResult, CellTask, compute
+from ballplate.montecarlo.experiments import trials
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+
+from tests.extensions.sweeps.support import (
+    ROOT,
+    assert_same,
+    command,
+    rows,
+    run,
+    small_sweep,
+)
+from tests.reference.copies import copy_file
+
+
+def sweep(path: Path, *options: str) -> int:
+    return main(["sweep", str(path), "--workers", "1", *options])
+
+
+def test_figures_are_those_of_the_experiments(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = small_sweep(tmp_path, 4, "trials: 64\nrecord: [U4, U5]\n")
+    assert sweep(path) == 1
+    out, err = capsys.readouterr()
+    assert out == f"{tmp_path}/small.sqlite: 8 cells, 6 done, 2 failed\n"
+    assert (
+        "cell 6 failed: " in err
+        and "quickstart.yaml" in err
+        and str(tmp_path / "quickstart.yaml") not in err
+    )
+    table = rows(tmp_path / "small.sqlite")
+    loaded = load_sweep(path)
+    assert table["size_m"].tolist() == [choice[0].value for choice in map(loaded.choices, range(8))]
+    assert table["balls"].tolist() == [4, 5] * 4
+    assert table["status"].tolist() == ["done"] * 6 + ["failed"] * 2
+    for k in (0, 5):
+        experiment = experiment_of(loaded, k)
+        expected = predict(experiment).quantities
+        assert table["U4_maximum_m"][k] == expected["U4"].maximum
+        assert table["U5_average_m"][k] == expected["U5"].average
+        outcome = trials(experiment, 64, int(table["data_set_seed"][k])).outcome
+        assert outcome is not None
+        assert table["U4_spread_ratio"][k] == outcome.comparisons["U4"].spread.value
+        assert table["U4_spread_ratio_standard_error"][k] == outcome.comparisons["U4"].spread.error
+        assert table["trials"][k] == 64
+    assert not [name for name in table if name.startswith(("U1", "U6"))]
+    assert table["data_set_seed"][:6].nunique() == 6
+    assert (table["ballplate_version"] == "0.1.0").all() and (table["blas_version"] != "").all()
+
+
+def test_a_second_run_computes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path) == 1
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", None)
+    capsys.readouterr()
+    assert sweep(path) == 1
+    assert (
+        capsys.readouterr().out
+        == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
+    )
+
+
+def made_by_the_first_method(path: Path) -> None:
+    """Make of a store one of the first method, whose keys are the fingerprints alone; its figures
+    are 17.
+    """
+    connection = sqlite3.connect(path, isolation_level=None)
+    for table in ("cell", "result"):
+        assert connection.execute(
+            f"UPDATE {table} SET key = substr(key, instr(key, ' ') + 1)"
+        ).rowcount
+    for key, figures in connection.execute("SELECT key, figures FROM result").fetchall():
+        wrong = np.full(len(figures) // 8, 17.0, "<f8").tobytes()
+        connection.execute("UPDATE result SET figures = ? WHERE key = ?", [wrong, key])
+    for table in ("cell", "result"):
+        # Of that time there are no digests.
+        connection.execute(f"UPDATE {table} SET digest = NULL")
+    connection.close()
+
+
+def test_rows_of_an_earlier_method_are_computed_anew_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, store = small_sweep(tmp_path, 2, "trials: 50\n"), tmp_path / "small.sqlite"
+    assert sweep(path) == 1
+    right = rows(store)
+    made_by_the_first_method(store)
+    capsys.readouterr()
+
+    # Still to be read, with a warning.
+    assert main(["export", str(store), "-o", str(tmp_path / "old.csv")]) == 0
+    told = "4 rows were computed by method 1, before corrections to lengths of standards"
+    assert told in capsys.readouterr().err
+    old = pandas.read_csv(tmp_path / "old.csv")
+    assert (old["U6_average_m"].dropna() == 17.0).all() and len(old) == 4
+
+    assert sweep(path) == 1
+    captured = capsys.readouterr()
+    assert (
+        told in captured.err
+        and f"this version computes by method {METHOD}, and computes these cells anew"
+        in captured.err
+    )
+    assert captured.out == f"{store}: 4 cells, 2 done, 2 failed\n"
+    # With the same seeds, so that only what was corrected differs.
+    assert_same(rows(store), right)
+
+    assert main(["export", str(store), "-o", str(tmp_path / "new.csv")]) == 0
+    assert sweep(path) == 1
+    assert "method" not in capsys.readouterr().err
+
+
+def test_an_interrupted_run_leaves_no_rows_of_two_methods(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, store = small_sweep(tmp_path, 2), tmp_path / "small.sqlite"
+    sweep(path)
+    right = rows(store)
+    made_by_the_first_method(store)
+
+    def second_fails(loaded: Sweep, task: CellTask) -> CellResult:
+        if task.block == 0 and task.number == 1:
+            raise KeyboardInterrupt
+        return compute(loaded, task)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("ballplate.extensions.sweeps.local.compute", second_fails)
+        assert sweep(path) == 130
+    assert_same(rows(store), right[:1].reset_index(drop=True))
+    sweep(path)
+    assert_same(rows(store), right)
+
+
+def test_failed_cells_are_tried_again_when_asked(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path) == 1
+    before = rows(tmp_path / "small.sqlite")
+    assert sweep(path, "--retry-failed") == 1
+    assert_same(rows(tmp_path / "small.sqlite"), before)
+
+
+def test_the_first_failure_ends_a_run_when_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path, "--fail-fast") == 1
+    assert "2 done, 1 failed, 1 left" in capsys.readouterr().out
+
+
+def test_a_changed_base_is_refused_with_what_changed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    base = tmp_path / "quickstart.yaml"
+    text = base.read_text(encoding="utf-8")
+    base.write_text("# Only a remark.\n" + text, encoding="utf-8")
+    assert sweep(path) == 1
+    base.write_text(
+        text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8"
+    )
+    capsys.readouterr()
+    assert sweep(path) == 3
+    err = capsys.readouterr().err
+    assert (
+        "quickstart.yaml: machine.repeatability: '0.2 um' has become '0.3 um'" in err
+        and "--beside" in err
+    )
+    assert sweep(path, "--beside") == 1
+    store = open_store(tmp_path / "small.sqlite")
+    assert len(definitions(store)[0]) == 2
+    assert keys(store, 1)[0] != keys(store, 2)[0]
+    one, two = (results(store, k).figures["U1_average_m"][0] for k in (1, 2))
+    assert two > 1.1 * one
+    store.close()
+
+
+def test_a_change_while_a_sweep_runs_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, base = small_sweep(tmp_path, 2), tmp_path / "quickstart.yaml"
+    text = base.read_text(encoding="utf-8")
+
+    def changing(loaded: Sweep, task: CellTask) -> CellResult:
+        if task.number == 1:
+            base.write_text(
+                text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8"
+            )
+        return compute(loaded, task)
+
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", changing)
+    assert sweep(path) == 3
+    assert "were changed while it ran" in capsys.readouterr().err
+    # What was computed before the change is there, and nothing else.
+    assert rows(tmp_path / "small.sqlite")["cell"].tolist() == [0]
+    monkeypatch.undo()
+    base.write_text(text, encoding="utf-8")
+    assert sweep(path) == 1
+    assert len(rows(tmp_path / "small.sqlite")) == 4
+
+
+def test_what_two_sweeps_share_is_computed_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("[4, 5]", "[4, 5, 6]"), encoding="utf-8"
+    )
+    done = []
+
+    def counted(loaded: Sweep, task: CellTask) -> CellResult:
+        done.append(task)
+        return compute(loaded, task)
+
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", counted)
+    sweep(path, "--beside")
+    # What is no valid experiment is judged anew.
+    assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
+
+
+def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    copy_file("tests/extensions/sweeps/balls.csv", tmp_path)
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    plate = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
+    text = text.replace(plate, "{kind: balls, file: balls.csv}").replace(
+        "corner sides ", "[[a, b], [b, c]]  "
+    )
+    (tmp_path / "quickstart.yaml").write_text(text, encoding="utf-8")
+    path.write_text(
+        "title: t\nbase: quickstart.yaml\naxes: {a: {path: seed, values: [1, 2]}}\n",
+        encoding="utf-8",
+    )
+    assert sweep(path) == 0
+    store = open_store(tmp_path / "small.sqlite")
+    assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
+    assert "undetermined" in results(store, 1).rows[0].details
+    store.close()
+    (tmp_path / "balls.csv").write_text(
+        "ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8"
+    )
+    assert sweep(path) == 3
+
+
+def test_replicates_in_blocks_are_the_same_replicates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
+    assert BLOCK % 512 == 0
+    monkeypatch.setattr("ballplate.extensions.sweeps.task.BLOCK", 512)
+    assert sweep(path) == 1
+    split = rows(tmp_path / "small.sqlite")
+    monkeypatch.undo()
+    assert sweep(path, "--store", str(tmp_path / "whole.sqlite")) == 1
+    whole = rows(tmp_path / "whole.sqlite")
+    assert split["trials"][0] == whole["trials"][0] == 1100
+    for name in ("U5_spread_ratio", "U5_coverage_sigma_given", "U5_actual_average_m"):
+        np.testing.assert_allclose(split[name][:2], whole[name][:2], rtol=1e-12)
+    store = open_store(tmp_path / "small.sqlite")
+    assert store.connection.execute(
+        "SELECT count(*) FROM result WHERE block > 0 AND status = 'done'"
+    ).fetchone() == (0,)
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "differs"),
+    [
+        ("title: ", "title: another ", False),
+        ("750 mm", "0.75 m", False),
+        ("probes: [down]", "probes: [down], repeats: 1", False),
+        ("seed: 7", "seed: 8", True),
+        ("0.2 um ", "0.21 um ", True),
+        ("z low", "z lower", True),
+        ("[5, 5]", "[5, 6]", True),
+        ("random: 200", "random: 201", True),
+    ],
+)
+def test_a_fingerprint_tells_what_matters(
+    tmp_path: Path, old: str, new: str, differs: bool
+) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "b.yaml").write_text(text.replace(old, new), encoding="utf-8")
+    one, other = (fingerprint(load(tmp_path / name)[0]) for name in ("a.yaml", "b.yaml"))
+    assert (one != other) == differs
+
+
+def test_axes_of_a_plate_are_told_later(tmp_path: Path) -> None:
+    """Stored cells and the seeds made of their fingerprints stay what they are."""
+    text = Path("designs/hocken_borchardt/angles.yaml").read_text(encoding="utf-8")
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "b.yaml").write_text(text.replace("x: r1c4", "y: r3c1"), encoding="utf-8")
+    one, other = (
+        [fingerprint(found) for found in load(tmp_path / name)] for name in ("a.yaml", "b.yaml")
+    )
+    assert one == other and len(set(one)) == len(one)
+
+
+def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path, "--dry-run") == 1
+    out, err = capsys.readouterr()
+    # The last of the cells that were tried does not fit.
+    assert "judged by 3 of them\ncell 3 fails: " in err
+    assert out.splitlines()[1] == "1: size 600 mm, balls 5" and len(out.splitlines()) == 4
+    assert err.startswith("4 cells, about ") and not (tmp_path / "small.sqlite").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\0" * 5000])
+def test_no_store(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x.sqlite").write_bytes(content)
+    assert main(["export", str(tmp_path / "x.sqlite"), "-o", "-"]) == 3
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith(f"{tmp_path}/x.sqlite: ") and "Traceback" not in err
+
+
+def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import pandas
+
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
+    for name in ("t.csv", "t.parquet"):
+        assert main(["export", str(store), "-o", str(tmp_path / name)]) == 0
+    # Not with pandas, some versions of which do not read every number to the last bit.
+    with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
+        written = list(csv.DictReader(stream))
+    parquet = pandas.read_parquet(tmp_path / "t.parquet")
+    for name in table.select_dtypes("float"):
+        np.testing.assert_array_equal([float(row[name] or "nan") for row in written], table[name])
+        np.testing.assert_array_equal(parquet[name], table[name])
+    assert main(["export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
+    assert main(["export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
+    assert main(["export", str(store), "--sweep", "5", "-o", "-"]) == 3
+    assert main(["export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
+    assert "there is no such store" in capsys.readouterr().err
+
+
+MODEL = """
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+from NAME_helper import SIZE
+
+
+def build(lower, upper, fails=False):
+    model = kinematic_model(ARRANGEMENTS["MB2"], SIZE, 3, lower, upper)
+    return Failing(model) if fails else model
+
+
+class Failing:
+    def __init__(self, model):
+        self.model, self.calls = model, 0
+
+    def __getattr__(self, name):
+        return getattr(self.model, name)
+
+    def error(self, x, a, p):
+        if len(x) > 30:
+            raise ValueError("no more than thirty")
+        return self.model.error(x, a, p)
+"""
+
+
+def with_own_model(folder: Path, name: str, values: str) -> Path:
+    """A sweep of an error model that imports another module."""
+    (folder / f"{name}.py").write_text(MODEL.replace("NAME", name), encoding="utf-8")
+    (folder / f"{name}_helper.py").write_text("SIZE = 3\n", encoding="utf-8")
+    path = small_sweep(folder, 2)
+    text = (folder / "quickstart.yaml").read_text(encoding="utf-8")
+    before, _, after = text.partition("error_model:\n")
+    model = f"error_model: {{kind: python, object: '{name}:build', options: {{fails: false}}}}"
+    (folder / "quickstart.yaml").write_text(
+        before + model + after[after.index("\n\n") :], encoding="utf-8"
+    )
+    axes = f"axes: {{fails: {{path: error_model.options.fails, values: {values}}}}}"
+    path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\n", encoding="utf-8")
+    return path
+
+
+def test_what_a_users_model_imports_counts(tmp_path: Path) -> None:
+    path = with_own_model(tmp_path, "imports_another", "[false]")
+    assert run("sweep", path, "--workers", 1).returncode == 0
+    (tmp_path / "imports_another_helper.py").write_text("SIZE = 4\n", encoding="utf-8")
+    changed = run("sweep", path)
+    assert (
+        changed.returncode == 3 and "imports_another_helper.py: another content" in changed.stderr
+    )
+    assert run("sweep", path, "--beside", "--workers", 1).returncode == 0
+    store = open_store(tmp_path / "small.sqlite")
+    few, more = (results(store, k).figures["parameters"][0] for k in (1, 2))
+    store.close()
+    assert more > few
+
+
+def test_what_a_users_model_raises_is_the_rows_reason(tmp_path: Path) -> None:
+    path = with_own_model(tmp_path, "raises_late", "[true, false]")
+    for workers in (1, 2):
+        done = run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
+        assert done.returncode == 1 and "2 cells, 1 done, 1 failed" in done.stdout, done.stderr
+        place = re.search(r"raises_late\.py:[0-9]+: in error, code of your own: (.*)", done.stderr)
+        assert place and place[1] == "ValueError: no more than thirty"
+    assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))
+
+
+def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    (tmp_path / "sweeps").mkdir()
+    text = path.read_text(encoding="utf-8").replace(
+        "base: quickstart.yaml", "base: ../quickstart.yaml"
+    )
+    (tmp_path / "sweeps" / "s.yaml").write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for workers, name, where in (
+        (1, "s.yaml", tmp_path / "sweeps"),
+        (2, "s.yaml", tmp_path / "sweeps"),
+    ):
+        command_line = [
+            *command("sweep", name, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
+        ]
+        subprocess.run(command_line, cwd=where, env=environment, capture_output=True, check=False)
+    elsewhere = ("--store", tmp_path / "3.sqlite", "--workers", 1)
+    assert run("sweep", tmp_path / "sweeps" / "s.yaml", *elsewhere).returncode == 1
+    first = rows(tmp_path / "1.sqlite")
+    assert first["reason"][2].startswith("../quickstart.yaml:41:5: positions[1]: ")
+    for k in (2, 3):
+        assert_same(first, rows(tmp_path / f"{k}.sqlite"))
+
+
+def test_a_store_is_read_where_nothing_can_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    before = sorted(file.name for file in tmp_path.iterdir())
+    assert main(["export", str(tmp_path / "small.sqlite"), "-o", "-"]) == 0
+    assert {file.name for file in tmp_path.iterdir()} <= {*before}
+    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        open_store(tmp_path / "small.sqlite").connection.execute("DELETE FROM result")
+    assert (
+        main(["export", str(tmp_path / "small.sqlite"), "-o", str(tmp_path / "small.sqlite")]) == 2
+    )
+
+
+def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    values = [3, 9007199254740993, 18446744073709551616]
+    axes = f"axes: {{noise: {{path: seed, values: {values}}}}}"
+    path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\nrecord: [U5]\n", encoding="utf-8")
+    assert sweep(path) == 0
+    assert rows(tmp_path / "small.sqlite")["noise"].tolist() == [str(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("place", "size", "told"),
+    [
+        (
+            "predict",
+            (1 << 58,),
+            "it needs more memory than is available: there is no room for another 2.00 EiB; ",
+        ),
+        ("experiment_of", (), "it needs more memory than is available; "),
+        (
+            "trials",
+            (1 << 58,),
+            "it needs more memory than is available: there is no room for another 2.00 EiB; ",
+        ),
+    ],
+)
+def test_a_cell_that_finds_no_memory_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, size: tuple[int, ...], told: str
+) -> None:
+    loaded = load_sweep(small_sweep(tmp_path, 2, "trials: 10\n"))
+
+    def finds_none(*_: object) -> None:
+        for each in size:
+            np.empty(each)
+        raise MemoryError
+
+    monkeypatch.setattr(f"ballplate.extensions.sweeps.task.{place}", finds_none)
+    row = compute(loaded, CellTask(0))
+    assert row.status == "failed"
+    assert (
+        row.reason
+        == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"
+    )
+
+
+def test_the_errors_of_a_cell_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a file that is wrong in two places, and of an error of a user's own in two lines."""
+    loaded = load_sweep(small_sweep(tmp_path, 2))
+    several = [Message("f.yaml", k, 1, "positions", "is wrong") for k in (3, 4)]
+    for error, expected in (
+        (
+            ExperimentError(several),
+            "f.yaml:3:1: positions: is wrong; f.yaml:4:1: positions: is wrong",
+        ),
+        (ValueError("one\ntwo"), "ValueError: one; two (test_sweep_store.py, line "),
+    ):
+
+        def fails(*_: object, error: Exception = error) -> None:
+            raise error
+
+        monkeypatch.setattr("ballplate.extensions.sweeps.task.predict", fails)
+        row = compute(loaded, CellTask(0))
+        assert row.status == "failed" and row.reason.startswith(expected)

@@ -1,0 +1,270 @@
+"""A sweep that is killed, starved or interrupted goes on, and ends with exactly the rows of an
+undisturbed one.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import shutil
+import signal
+import sqlite3
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.cuts import COMMIT, remains
+from tests.cli.test_outputs import BALLS, DESIGN
+from tests.extensions.sweeps.support import (
+    ROOT,
+    assert_same,
+    command,
+    hearing_interruptions,
+    rows,
+    run,
+    small_sweep,
+    stored,
+)
+
+Change = Callable[[], None]
+
+
+def children(process: int) -> list[int]:
+    """Processes started by another that compute."""
+    path = Path(f"/proc/{process}/task/{process}/children")
+    found = []
+    # Each of them may end at any moment.
+    with suppress(OSError):
+        for word in path.read_text(encoding="ascii").split():
+            if b"popen_loky" in Path(f"/proc/{word}/cmdline").read_bytes():
+                found.append(int(word))
+    return found
+
+
+def wait_until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> bool:
+    """Whether a condition came true before the process ended."""
+    end = time.monotonic() + 120
+    while process.poll() is None:
+        assert time.monotonic() < end, "hangs"
+        if condition():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    processes: list[subprocess.Popen[str]] = []
+
+    def start(path: Path, *options: str, **how: object) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            command("sweep", path, "--workers", "2", *options),
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **how,  # type: ignore[call-overload]
+        )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+CUT = """\
+title: cut short
+base: design.yaml
+axes: {read: {path: machine.repeatability, values: [1 um, 2 um]}}
+trials: 6
+"""
+
+
+def row_seconds(store: Path) -> dict[tuple[str, int], float]:
+    """How long each row took, by key and block; none before there are rows."""
+    with closing(sqlite3.connect(store)) as connection:
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        found = connection.execute("SELECT key, block, seconds FROM result") if any(tables) else []
+        return {(key, block): seconds for key, block, seconds in found}
+
+
+# At each commit, or at each statement.
+@pytest.mark.parametrize("every", [10**6, pytest.param(1, marks=pytest.mark.long)])
+def test_killed_before_a_statement(tmp_path: Path, every: int) -> None:
+    """No row that was stored is lost or computed twice, that of a replicate block neither."""
+    for name, text in (("design.yaml", DESIGN), ("balls.csv", BALLS), ("cut.yaml", CUT)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+
+    def laid_out(left: dict[str, Any]) -> Path:
+        folder = tmp_path / "left"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for name, content in left["there"].items():
+            (folder / name).write_bytes(content.encode("latin-1"))
+        return folder / "store.sqlite"
+
+    store = tmp_path / "cut" / "store.sqlite"
+    line = ["sweep", str(tmp_path / "cut.yaml"), "--store", str(store), "--workers", "1"]
+    task = {"lines": {"sweep": line}, "before": {"sweep": {}}, "folder": str(store.parent)}
+    how = {"signals": [signal.SIGKILL], "every": every, "slow": False, "blocks": 4}
+    whole, *found = remains(**task, **how)
+    expected, commits = rows(laid_out(whole)), whole["met"].count(COMMIT)
+    assert list(expected["status"]) == ["done", "done"] and len(found) >= 2 * commits
+    for killed, continued in zip(found[::2], found[1::2], strict=True):
+        assert (killed["status"], continued["status"]) == (-signal.SIGKILL, 0)
+        before = row_seconds(laid_out(killed))
+        path = laid_out(continued)
+        assert_same(rows(path), expected)
+        after, cut = row_seconds(path), killed["cut"]
+        assert all(after[one] == spent for one, spent in before.items() if one[1] == 0)
+        # Of the three before the rows, the last, which looks for damage, is there each time.
+        left = whole["met"][cut - 1 :].count(COMMIT)
+        assert continued["met"].count(COMMIT) == left + (left < commits - 2), cut
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [1, pytest.param(4, marks=pytest.mark.long)])
+def test_killed_at_random_moments(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]], times: int
+) -> None:
+    """The command itself, one of its workers, or a disk that takes no more."""
+    count = 12 * times
+    path, store = small_sweep(tmp_path, count, "trials: 16\n"), tmp_path / "small.sqlite"
+    undisturbed = tmp_path / "undisturbed.sqlite"
+    assert run("sweep", path, "--store", undisturbed).returncode == 1
+    chance = random.Random(5)
+    killed = {"command": 0, "worker": 0, "disk": 0}
+    kinds = ["command", "worker", "disk"] * times
+    chance.shuffle(kinds)
+    process: subprocess.Popen[str] | None = None
+    for kind in kinds:
+        if kind == "disk":
+            if process is not None:
+                process.kill()
+                process.wait()
+            process = None
+            used = sum(file.stat().st_size for file in tmp_path.glob("small.sqlite*"))
+            room = used // 2 + chance.randrange(1, 40_000)
+
+            def starve(room: int = room) -> None:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+            starved = started(path, preexec_fn=starve)
+            out, err = starved.communicate(timeout=120)
+            if starved.returncode == 3:
+                assert "make room" in err and "Traceback" not in err, err
+                killed[kind] += 1
+            continue
+        if process is None or process.poll() is not None:
+            process = started(path)
+        before, wait = stored(store), chance.uniform(0.0, 0.3)
+        if not wait_until(lambda before=before: stored(store) > before, process):  # type: ignore[misc]
+            continue
+        time.sleep(wait)
+        if kind == "command":
+            process.kill()
+            process.wait()
+            killed[kind] += 1
+        else:
+            for worker in children(process.pid)[:1]:
+                os.kill(worker, signal.SIGKILL)
+                killed[kind] += 1
+    if process is not None and process.poll() is None:
+        process.communicate(timeout=240)
+    last = run("sweep", path)
+    assert last.returncode == 1 and "Traceback" not in last.stderr, last.stderr
+    assert f"{2 * count} cells" in last.stdout and "left" not in last.stdout
+    assert_same(rows(store), rows(undisturbed))
+    assert sum(killed.values()) >= 2 * times and all(killed.values()), killed
+
+
+def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> None:
+    """An error model that ends its process, as one that takes all memory would."""
+    path = small_sweep(tmp_path, 2)
+    (tmp_path / "deadly.py").write_text(
+        "import multiprocessing, os\n"
+        "from ballplate.simulator.machines.kinematic import kinematic_model\n"
+        "from ballplate.simulator.machines.arrangement import ARRANGEMENTS\n"
+        "def build(lower, upper, deadly=False):\n"
+        "    if deadly and multiprocessing.current_process().name != 'MainProcess':\n"
+        "        os.kill(os.getpid(), 9)\n"
+        "    return kinematic_model(ARRANGEMENTS['MB2'], 3, 3, lower, upper)\n",
+        encoding="utf-8",
+    )
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    before, _, after = text.partition("error_model:\n")
+    after = after[after.index("\n\n") :]
+    model = "error_model: {kind: python, object: 'deadly:build', options: {deadly: false}}"
+    (tmp_path / "quickstart.yaml").write_text(before + model + after, encoding="utf-8")
+    axes = "deadly: {path: error_model.options.deadly, values: [false, true]}"
+    path.write_text(f"title: t\nbase: quickstart.yaml\naxes: {{{axes}}}\n", encoding="utf-8")
+    done = run("sweep", path, "--workers", "2")
+    assert done.returncode == 1, done.stderr
+    assert "2 cells, 1 done, 1 failed" in done.stdout
+    assert (
+        "the process that computed it was ended" in done.stderr and "Traceback" not in done.stderr
+    )
+
+
+def test_interrupted_and_resumed(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
+    path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
+    process = started(path, preexec_fn=hearing_interruptions)
+    assert wait_until(lambda: stored(store) > 2, process)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "the same command continues from there" in err and "Traceback" not in err
+    assert 2 < stored(store) < 80
+
+
+def test_interrupted_while_workers_start(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
+    """The keyboard reaches the workers too, which are still loading modules."""
+    # Without data sets the sweep may be done before a busy machine comes to interrupt it.
+    path = small_sweep(tmp_path, 40, "trials: 16\n")
+    process = started(path, preexec_fn=hearing_interruptions, start_new_session=True)
+    assert wait_until(lambda: len(children(process.pid)) == 2, process)
+    time.sleep(0.1)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.startswith("interrupted; finished cells are in") and err.count("\n") == 1, err
+
+
+def test_one_writer_at_a_time(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
+    path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
+    process = started(path, "--workers", "1")
+    assert wait_until(lambda: stored(store) > 0, process)
+    second = run("sweep", path)
+    assert second.returncode == 3 and "another process is computing into it" in second.stderr
+    # Reading goes on meanwhile.
+    assert run("export", store, "-o", tmp_path / "t.csv").returncode == 0
+
+
+def test_the_number_of_workers_changes_no_bit(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 3, "trials: 16\n")
+    for workers in (1, 2):
+        assert (
+            run(
+                "sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite"
+            ).returncode
+            == 1
+        )
+    assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))
