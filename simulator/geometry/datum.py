@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..inputs.settings import hint
 from .axes import PlateAxes, axes_words, plate_axes
@@ -79,7 +80,7 @@ def chosen_datum(
     return Datum(axes, plane)
 
 
-def _is_apart(drawn: Array, axes: PlateAxes) -> Array:
+def _is_apart(drawn: Array, axes: PlateAxes) -> NDArray[np.bool_]:
     """Which balls (n,) are off the line of the two on an axis."""
     across, along = _across(drawn, axes)
     return np.asarray(across > IN_LINE * np.maximum(along, across))
