@@ -197,21 +197,17 @@ class Columns:
         g, q = index.shape
         scaled = common[index] / self.size[index][:, :, None]
         found = -scaled @ scaled.transpose(0, 2, 1)
-        plain, private = (
-            [self.rows[column] for column in index.T],
-            [own[column] for column in index.T],
-        )
-        for i in range(q):
-            for j in range(i, q):
-                product = plain[i].multiply(plain[j]).sum(axis=1) - private[i].multiply(
-                    private[j]
-                ).sum(axis=1)
-                value = np.asarray(product).ravel() / (
-                    self.size[index[:, i]] * self.size[index[:, j]]
-                )
-                found[:, i, j] += value
-                if i != j:
-                    found[:, j, i] += value
+        first, second = np.triu_indices(q)
+        one, other = index[:, first], index[:, second]
+
+        def products(of: csr_array) -> Array:
+            both = of[one.ravel()].multiply(of[other.ravel()])
+            return np.asarray(both.sum(axis=1)).reshape(one.shape)
+
+        values = (products(self.rows) - products(own)) / (self.size[one] * self.size[other])
+        found[:, first, second] += values
+        is_beside = first != second
+        found[:, second[is_beside], first[is_beside]] += values[:, is_beside]
         return found
 
     def explained(self, number: int) -> Explained:

@@ -190,7 +190,9 @@ def module_source(name: str, folder: Path | None) -> Path | None:
 
         points = entry_points(name=name)
         module = next((one.module for one in points if one.group.startswith("ballplate.")), "")
-    beside = None if folder is None or not module else module_file(folder.resolve(), module)
+    if not module:
+        return None
+    beside = None if folder is None else module_file(folder.resolve(), module)
     if beside is not None:
         return beside
     places: Sequence[str] | None = None

@@ -212,8 +212,8 @@ def test_the_file_of_a_module_is_found_without_running_it(tmp_path: Path) -> Non
     (tmp_path / "apart" / "own.py").write_text("raise SystemExit", encoding="utf-8")
     assert custom.module_source("apart.own:build", tmp_path) == tmp_path / "apart" / "own.py"
     assert custom.module_source("json.decoder:JSONDecoder", tmp_path) == Path(json.decoder.__file__)
-    # A module without a file, and one that is nowhere.
-    for name in ("sys:exit", "nobody_has_this:at_all", "json.nothing:here"):
+    # A module without a file, one that is nowhere, and an entry point that nobody has.
+    for name in ("sys:exit", "nobody_has_this:at_all", "json.nothing:here", "nobody"):
         for folder in (tmp_path, None):
             assert custom.module_source(name, folder) is None
 

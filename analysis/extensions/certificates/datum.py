@@ -20,6 +20,7 @@ from ballplate.simulator.geometry.motions import (
     without_rigid_motion,
 )
 from ballplate.simulator.inputs.settings import hint
+from numpy.typing import NDArray
 
 # A ball nearer to the line of two others than this fraction of how far it is along fixes no plane.
 IN_LINE = 1e-3
@@ -83,7 +84,7 @@ def chosen_datum(
     return Datum(axes, plane)
 
 
-def _is_apart(drawn: Array, axes: PlateAxes) -> Array:
+def _is_apart(drawn: Array, axes: PlateAxes) -> NDArray[np.bool_]:
     """Which balls (n,) are off the line of the two on an axis."""
     across, along = _across(drawn, axes)
     return np.asarray(across > IN_LINE * np.maximum(along, across))
