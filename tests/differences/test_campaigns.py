@@ -9,9 +9,10 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.differences.compared_maps import map_of_fit
+from ballplate.results.campaign_tests import EstimatedSigma
+from ballplate.results.differences.compared_maps import MappedValues, map_of_fit
 from ballplate.results.differences.comparison import ComparisonSettings, MapComparison, compared
-from ballplate.results.differences.normalised_errors import FigureGroup
+from ballplate.results.differences.normalised_errors import FigureGroup, ValueDifference
 from ballplate.results.differences.shared_certificates import (
     NothingSharedError,
     with_shared_certificates,
@@ -211,6 +212,28 @@ def test_correlated_values_do_what_other_values_of_them_would(tmp_path: Path) ->
     for before, one in zip(maps, (first, second), strict=True):
         whole = one.root @ one.root.T + one.shared @ one.shared.T
         assert whole == pytest.approx(before.root @ before.root.T, rel=1e-9, abs=1e-24)
+
+
+def test_only_what_undetermined_directions_change_is_left_out_of_a_test() -> None:
+    """Against the sum of squares of the others; what rounding leaves of a direction, beside what
+    such directions may change at all, is none.
+    """
+    rng = np.random.default_rng(3)
+    values, sizes = rng.normal(size=5), np.array([0.3, 0.5, 0.7, 0.9, 1.1])
+    for null, kept in (
+        (np.zeros((5, 0)), range(5)),
+        (np.eye(5)[:, :1], range(1, 5)),
+        (1e-13 * rng.normal(size=(5, 2)), range(5)),
+        (np.eye(5)[:, :1] + 1e-13 * rng.normal(size=(5, 1)), range(1, 5)),
+    ):
+        size, none = np.ones(5), np.zeros((5, 0))
+        first = MappedValues(np.zeros(5), np.diag(sizes), null, size, none)
+        second = MappedValues(values, np.diag(sizes), np.zeros((5, 0)), size, none)
+        known = EstimatedSigma(1.0, np.inf)
+        test = ValueDifference(first, second, (known, known)).joint_test("errors")
+        assert test is not None and test.dimensions == len(kept)
+        squares = sum(values[k] ** 2 / (2.0 * sizes[k] ** 2) for k in kept)
+        assert test.statistic == pytest.approx(squares, rel=1e-9)
 
 
 def test_other_certificates_are_not_shared() -> None:
