@@ -226,7 +226,9 @@ def test_names_in_the_volume_are_on_their_outlines_and_cover_no_first_ball(sheet
         for points in re.findall(r'<polygon points="(.*?)"', drawing)
     ]
     dots = np.array(re.findall(r'<circle cx="(.*?)" cy="(.*?)" r="4"', drawing), float)
-    form = r'<rect x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)" rx="3".*?/><text.*?>(.*?)</text>'
+    form = (
+        r'<rect x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)" rx="3".*?/><text.*?>(.*?)</text>'
+    )
     names = {name: np.array(box, float) for *box, name in re.findall(form, drawing)}
     assert list(names) == [step.name for step in sheet.sheet.steps]
     assert len(corners) == len(dots) == len(names) == 4
