@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import ballplate as bp
 import numpy as np
@@ -23,53 +23,58 @@ def found() -> MapComparison:
     return compared(maps[0], maps[1], ComparisonSettings(grid=3))
 
 
-def drawn(found: MapComparison) -> tuple[Array, float, Array, Array, float]:
-    """Starts and tips (m, 2, 2) of the vectors in metres of the paper, how much larger than life
-    the picture says that they are, the limits (2, 2) of its axes, the ends (m, 2) of all that is
-    drawn of the volume, and the length of the scale bar over what it says.
+@dataclass(frozen=True)
+class Drawn:
+    """Vectors (m, 2, 2) from start to tip on the paper, all `places` (k, 2) where something of them
+    or of the volume is drawn, and the `limits` (2, 2) of the axes; the length of the `bar`, what it
+    stands for in micrometres, and how many `times` vectors are magnified, by the words beside it.
     """
+
+    vectors: Array
+    places: Array
+    limits: Array
+    bar: float
+    micrometres: float
+    times: float
+
+
+def drawn(found: MapComparison) -> Drawn:
     axes = draw_difference(found, "changes").axes[0]
-    lines = [np.column_stack(line.get_data()).astype(float) for line in axes.get_lines()]
-    vectors = [
-        one.reshape(-1, 3, 2)[:, :2]
-        for one, line in zip(lines, axes.get_lines(), strict=True)
-        if line.get_marker() in ("o", "s")
-    ]
+    vectors, places, bars = [], [], []
+    for line in axes.get_lines():
+        ends = np.column_stack(line.get_data()).astype(float)
+        if line.get_transform() != axes.transData:
+            bars.append(float(np.ptp(ends[:, 0])))
+            continue
+        places.append(ends[np.isfinite(ends).all(axis=1)])
+        if line.get_marker() in ("o", "s"):
+            vectors.append(ends.reshape(-1, 3, 2)[:, :2])
+    (bar,) = bars
     (text,) = (one.get_text() for one in axes.texts if "magnified" in one.get_text())
-    told = re.match(r"(\S+) µm, magnified ([0-9,.]+) times", text)
-    assert told is not None
-    (bar,) = (
-        np.ptp(one[:, 0])
-        for one, line in zip(lines, axes.get_lines(), strict=True)
-        if line.get_transform() != axes.transData
-    )
-    box = [
-        one[np.isfinite(one).all(axis=1)]
-        for one, line in zip(lines, axes.get_lines(), strict=True)
-        if line.get_transform() == axes.transData
-    ]
+    words = re.match(r"(\S+) µm, magnified ([0-9,.]+) times", text)
+    assert words is not None
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
-    times = float(told[2].replace(",", ""))
-    return np.concatenate(vectors), times, limits, np.concatenate(box), bar / float(told[1])
+    micrometres, times = float(words[1]), float(words[2].replace(",", ""))
+    return Drawn(np.concatenate(vectors), np.concatenate(places), limits, bar, micrometres, times)
 
 
 @pytest.mark.parametrize("factor", [1.0, 37.0, 0.004])
 def test_vectors_are_as_large_as_the_picture_says(found: MapComparison, factor: float) -> None:
-    """Whatever their size, the longest is a few hundredths of the volume."""
+    """In a cube of one metre, drawn to scale, the longest is at most 0.15 m, whatever it is."""
     places = replace(found.places, differences=factor * found.places.differences)
-    vectors, times, limits, ends, bar = drawn(replace(found, places=places))
-    moved = places.differences.reshape(-1, 3)
-    longest = np.linalg.norm(moved, axis=1).max()
-    assert len(vectors) == len(moved)
-    # A cube of one metre is drawn to scale; magnification is 1, 2, 5, 10 and so on.
-    assert 0.15 / 2.5 < times * longest <= 0.15 * (1.0 + 1e-9)
-    # On the paper none is longer than it is, and of vectors everywhere some lie in the paper.
-    lengths = np.linalg.norm(vectors[:, 1] - vectors[:, 0], axis=1)
-    magnified = np.sort(times * np.linalg.norm(moved, axis=1))
-    assert (np.sort(lengths) <= magnified * (1.0 + 1e-9)).all()
-    assert lengths.sum() > 0.5 * magnified.sum()
-    assert bar == pytest.approx(1e-6 * times)
-    # Everything is inside of the axes, in the middle from left to right.
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    assert (limits[:, 0] < low).all() and (high < limits[:, 1]).all()
-    assert low[0] - limits[0, 0] == pytest.approx(limits[0, 1] - high[0])
+    picture = drawn(replace(found, places=places))
+    sizes = picture.times * np.linalg.norm(places.differences.reshape(-1, 3), axis=1)
+    # Of magnifications of 1, 2, 5, 10 and so on, the next is up to two and a half times as large.
+    assert 0.15 / 2.5 < sizes.max() <= 0.15 * (1.0 + 1e-9)
+    # Seen from the side, a vector is no longer than it is, and most are not much shorter.
+    seen = np.linalg.norm(picture.vectors[:, 1] - picture.vectors[:, 0], axis=1)
+    assert len(seen) == len(sizes)
+    assert (np.sort(seen) <= np.sort(sizes) * (1.0 + 1e-9)).all()
+    assert seen.sum() > 0.5 * sizes.sum()
+    assert picture.bar == pytest.approx(1e-6 * picture.micrometres * picture.times)
+    # All of it is inside of the axes, in the middle from left to right.
+    low, high = picture.places.min(axis=0), picture.places.max(axis=0)
+    left, below = picture.limits[:, 0]
+    right, above = picture.limits[:, 1]
+    assert left < low[0] and below < low[1] and high[0] < right and high[1] < above
+    assert low[0] - left == pytest.approx(right - high[0])
