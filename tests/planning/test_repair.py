@@ -4,7 +4,6 @@ again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -18,7 +17,7 @@ from ballplate.planning.checked_files import Wanted, check_files
 from ballplate.planning.repair import repair_search
 from ballplate.planning.repair.changes import Change, ChangeKind, apply_all
 from ballplate.planning.repair.covering import different
-from ballplate.planning.repair.judging import Judged, examine, judge
+from ballplate.planning.repair.judging import examine, judge
 from ballplate.planning.repair.mending import mended, to_write
 from ballplate.planning.repair.offers import offers
 from ballplate.planning.repair.repair_search import Repair, Repairs, repairs
@@ -430,19 +429,16 @@ def test_what_cannot_be_repaired_says_what_was_tried() -> None:
     assert line.startswith("repair: no changes were found that determine everything; ")
 
 
-def test_sets_that_were_tried_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    judged: list[frozenset[Change]] = []
-
-    def counted(experiment: Experiment, changes: Sequence[Change]) -> Judged | None:
-        judged.append(frozenset(changes))
-        return judge(experiment, changes)
-
-    monkeypatch.setattr(repair_search, "judge", counted)
-    for one in (("npl/6.1.1", "B"), ("hurt_foss/bryan-gauge", "one plane")):
-        judged.clear()
-        found = repairs(design(*one), most=1)
-        assert found is not None and len(set(judged)) == len(judged)
-        assert found.sets == sum(len(changes) > 1 for changes in judged)
+def test_sets_that_were_tried_are_counted_once() -> None:
+    experiment = design("npl/6.1.1", "B")
+    first, second, third = offers(experiment)[ChangeKind.CERTIFICATE][:3]
+    search = repair_search._Search(examine(experiment), 1)
+    counts = []
+    for some in ((first,), (first, second), (second, first), (second, third), (third,)):
+        search.judge(some)
+        counts.append(search.sets)
+    assert counts == [0, 1, 1, 2, 2]
+    assert search.tried == {ChangeKind.CERTIFICATE: {first, third}}
 
 
 def test_changes_that_lead_out_of_the_volume_do_not_go_together() -> None:
