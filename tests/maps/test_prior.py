@@ -227,6 +227,25 @@ def test_a_map_with_another_sigma_keeps_its_own(tmp_path: Path) -> None:
     assert "they differ" in told and "against a level of 0.25: the map is scaled with that" in told
 
 
+@pytest.mark.parametrize("kind", ["plane", "spatial metric"])
+def test_readings_that_leave_directions_open_have_the_freedom_of_a_fit_of_them(
+    kind: str, tmp_path: Path
+) -> None:
+    """One position does not determine the machine without the map."""
+    campaigns = Campaigns(kind, tmp_path)
+    campaigns.map_of_first(sigma="estimated")
+    positions = campaigns.second[:1]
+    readings = campaigns.readings[campaigns.readings["position"] == positions[0]["name"]]
+    priors = [{"kind": "map", "file": "first.yaml"}]
+    known = campaigns.experiment("B", positions, sigma="estimated", priors=priors)
+    told = bp.fit(known, readings).to_dict()["campaigns"]
+    alone: Any = bp.fit(campaigns.experiment("B", positions, sigma="estimated"), readings)
+    assert alone.verdict.deficiency > 0
+    assert told["degrees_of_freedom_without_maps"] == alone.degrees_of_freedom > 0
+    # To second order of the errors, by which a direction may be left open or not.
+    assert told["sigma_without_maps"] == pytest.approx(alone.sigma, rel=1e-3)
+
+
 def test_stated_uncertainties_cancel(tmp_path: Path) -> None:
     """Where sigma is estimated, all of them may be wrong by one factor: of the campaign of the map
     too.

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from ballplate.planning.changeover import kind_of
 from ballplate.planning.drift_in_orders import drift_effect
-from ballplate.planning.least_drift import least_drift
+from ballplate.planning.least_drift import _Drift, _Ways, least_drift
 from ballplate.planning.orders import ORDERS, ReadingOrder, in_order, with_probes
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.planning.selection import Campaign
@@ -253,6 +253,48 @@ def test_no_order_has_less_drift_of_the_scales(campaign: Campaign) -> None:
     # The probes that leave the fewest changes are not those with the least drift.
     least = min(effect(with_probes(one, campaign.pool.changes)) for one in permutations(own))
     assert every[chosen] < 0.99 * least and max(every.values()) > 1.5 * least
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_order_of_the_least_drift_is_that_of_all_orders_computed_one_by_one(seed: int) -> None:
+    """Four positions, two of which can be read in two ways, with effects at random; some of the
+    orders are equal but for what is changed between positions.
+    """
+    rng = np.random.default_rng(seed)
+    each = (
+        (0, ("a",)),
+        (1, ("a", "b")),
+        (1, ("b", "a")),
+        (2, ("b",)),
+        (3, ("a", "b")),
+        (3, ("b", "a")),
+    )
+    of_block = np.array([0, 1, 1, 2, 3, 3])
+    is_own = of_block == np.array([k for k, _ in each])[:, None]
+    middles = np.where(is_own, rng.uniform(0.0, 0.5, is_own.shape), 0.0)
+    takes, change = rng.uniform(0.5, 1.0, len(each)), rng.choice([0.0, 0.25], (6, 6))
+    weight, effects = rng.uniform(1.0, 3.0, 6), rng.normal(size=(30, 7))
+    if seed % 2:
+        # Only what lies within blocks counts, so that all orders do the same.
+        effects[:, :-1] = 0.0
+    ways = ((0,), (1, 2), (3,), (4, 5))
+    every = [one for order in permutations(range(4)) for one in product(*(ways[k] for k in order))]
+    sizes, changes = [], []
+    for sequence in every:
+        hours, start = np.zeros(6), 0.0
+        for way, following in zip(sequence, (*sequence[1:], None), strict=True):
+            hours[is_own[way]] = start + middles[way, is_own[way]]
+            start += takes[way] + (0.0 if following is None else change[way, following])
+        hours -= (weight @ hours) / weight.sum()
+        sizes.append(np.abs(effects[:, :-1] @ hours + effects[:, -1]).max())
+        changes.append(sum(change[one] for one in zip(sequence, sequence[1:], strict=False)))
+    drift = _Drift(_Ways(each, middles, is_own, takes, change), weight, effects)
+    found, size = drift.least(np.array(every))
+    assert size == pytest.approx(min(sizes), rel=1e-8)
+    equal = [k for k, one in enumerate(sizes) if one <= min(sizes) * (1.0 + 1e-9)]
+    assert len(equal) == (len(every) if seed % 2 else 1)
+    at = every.index(tuple(found))
+    assert at in equal and changes[at] == min(changes[k] for k in equal)
 
 
 def test_exchanges_find_an_order_near_the_least(

@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from ballplate.planning.bound import bound
-from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.bound import _Tangent, _whole, bound
+from ballplate.planning.campaign import Request, _budgets, campaign
 from ballplate.planning.constraints import HOUR, Budget, Constraints, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
@@ -214,6 +214,43 @@ def test_gains_are_what_a_selection_is_without_and_with() -> None:
     assert after == sorted(after) and all(
         gain.without == found.value >= gain.with_ for gain in found.left_out
     )
+
+
+def test_where_nothing_keeps_to_the_limits_nothing_is_known_of_the_best() -> None:
+    """One of each of three pairs takes two positions, beside which both certificates are free; each
+    candidate has the slope 1.
+    """
+    base = problem_of("U6").constraints
+    for count, wanted in ((1, 0.0), (2, (1.0 + 2 + 2) ** -0.5), (5, (1.0 + 5 + 2) ** -0.5)):
+        limits = replace(base, budget=Budget(positions=count), at_least=((0, 1), (1, 2), (0, 2)))
+        found = _whole(limits.linear(), _Tangent(1.0, np.ones(SIZE), 1.0))
+        assert found == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "budget",
+    [
+        Budget(3.0 * HOUR, None, None),
+        Budget(None, 100, None),
+        Budget(None, 4, 12),
+        Budget(2.0, 3, 9),
+        # Rounding leaves several of as many readings.
+        Budget(None, 3, 20),
+        Budget(None, None, 4),
+    ],
+)
+def test_budgets_of_a_curve_grow_in_everything(budget: Budget) -> None:
+    problem = problem_of("U6")
+    problem = replace(problem, constraints=replace(problem.constraints, budget=budget))
+    found = _budgets(problem)
+    assert budget in found and len(set(found)) == len(found) > 4
+    for name in ("seconds", "readings", "positions"):
+        asked, every = getattr(budget, name), [getattr(one, name) for one in found]
+        if asked is None:
+            assert every == [None] * len(found)
+        else:
+            assert every == sorted(every)
+            assert every[0] < asked < every[-1]
 
 
 def test_limits_that_nothing_keeps_to_are_told() -> None:

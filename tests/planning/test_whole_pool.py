@@ -203,3 +203,40 @@ def test_a_pool_that_determines_nothing_is_refused_with_what_it_lacks(
     assert (
         "positions: empty; add positions, or choose some from the pool" in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize(
+    ("balls", "pairs", "open_"),
+    [
+        # Alone, it turns about the line of the two corners from which its distances are known.
+        ("[r3c3]", "corner sides", 1),
+        ("[r3c3]", "[[r1c1, r1c3]]", 3),
+        # A distance is read besides; of a ball in the plane of the others none shows how high it is.
+        ("[r3c3, r1c1]", "[[r1c1, r1c3]]", 2),
+        ("[r3c3, r1c1]", "corner sides", 1),
+        ("[r3c3, r1c1, r1c2]", "[[r1c1, r1c3]]", 1),
+        ("[r3c3, r1c1, r2c1, r1c2]", "[[r1c1, r1c3]]", 0),
+    ],
+)
+def test_a_ball_that_nothing_ties_to_its_plate_is_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, balls: str, pairs: str, open_: int
+) -> None:
+    monkeypatch.setattr(repair_search, "repairs", lambda *_, **__: None)
+    path = written(tmp_path, "[down, right]")
+    text = path.read_text("utf-8").replace("corner sides", pairs)
+    others = "probes: [[down, right]], balls: [r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, r3c1, r3c2]"
+    text = text.replace("probes: [[down, right]]", others)
+    last = "plane: z, level: 200 mm, corner: {x: 100 mm, y: 50 mm}, probes: [down]"
+    text += f"    - {{name: last, artefact: plate, {last}, balls: {balls}}}\n"
+    path.write_text(text, "utf-8")
+    experiment = load(path, planning=True)[0]
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    information = pool_information(experiment, candidates)
+    assert information.balls_open == open_
+    found = pool_gap(experiment, candidates, information)
+    assert found is not None
+    wanted = information.deficiency + open_ + sum(information.pose_open)
+    assert (
+        found.verdict.deficiency == dense_deficiency(with_chosen(experiment, candidates)) == wanted
+    )

@@ -217,6 +217,35 @@ def test_the_drawing_of_an_artefact_has_its_balls_where_they_are(sheet: Sheet) -
     assert apart / step == pytest.approx(np.array(wanted), abs=0.01)
 
 
+def test_names_in_the_volume_are_on_their_outlines_and_cover_no_first_ball(sheet: Sheet) -> None:
+    page = sheet.text(".html")
+    drawing = page[page.index('<svg class="volume"') :]
+    drawing = drawing[: drawing.index("</svg>")]
+    corners = [
+        np.array([[float(x) for x in one.split(",")] for one in points.split()])
+        for points in re.findall(r'<polygon points="(.*?)"', drawing)
+    ]
+    dots = np.array(re.findall(r'<circle cx="(.*?)" cy="(.*?)" r="4"', drawing), float)
+    form = (
+        r'<rect x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)" rx="3".*?/><text.*?>(.*?)</text>'
+    )
+    names = {name: np.array(box, float) for *box, name in re.findall(form, drawing)}
+    assert list(names) == [step.name for step in sheet.sheet.steps]
+    assert len(corners) == len(dots) == len(names) == 4
+    for box in names.values():
+        away = np.abs(dots - (box[:2] + 0.5 * box[2:]))
+        assert (away > 0.5 * box[2:]).any(axis=1).all()
+    centres = [box[:2] + 0.5 * box[2:] for box in names.values()]
+    # Names stand a little inside of a corner, or of the middle of a side, of their own outline.
+    for outline, dot in zip(corners, dots, strict=True):
+        assert np.linalg.norm(outline - dot, axis=1).min() < 60.0
+        ends = np.concatenate([outline, 0.5 * (outline + np.roll(outline, -1, axis=0))])
+        middle = outline.mean(axis=0)
+        size = np.linalg.norm(ends - middle, axis=1).max()
+        near = [np.linalg.norm(ends - one, axis=1).min() for one in centres]
+        assert min(near) < 0.2 * size
+
+
 def test_points_are_the_centres_that_the_file_says(sheet: Sheet) -> None:
     rows = list(csv.DictReader(io.StringIO(sheet.points())))
     want = expected()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from html.parser import HTMLParser
+from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -132,6 +133,55 @@ def test_drawing_is_to_scale_and_right_handed(name: str, experiment: Experiment)
     moved = (circles - circles[0]) / scale
     assert moved[:, 0] == pytest.approx(sign * (balls[:, across] - balls[0, across]), abs=1e-3)
     assert moved[:, 1] == pytest.approx(-(balls[:, up] - balls[0, up]), abs=1e-3)
+
+
+# A plate in every corner of its plane, turned so that each of its own corners is the first ball's.
+CORNERS = """
+title: corners
+machine: {volume: [600 mm, 500 mm, 450 mm], repeatability: 1 um}
+error_model: {kind: metric}
+probes: {p: [0 mm, 0 mm, 0 mm]}
+artefacts: {plate: {kind: grid, balls: [3, 2], size: [200 mm, 150 mm]}}
+evaluation: {points: {random: 4, seed: 1}}
+positions: []
+pool:
+  candidates:
+    - {name: z, planes: [z], levels: [0 mm], corners: {x: [2 mm, 398 mm], y: [2 mm, 348 mm]}, quarter_turns: [0, 2], probes: [p]}
+    - {name: zt, planes: [z], levels: [0 mm], corners: {x: [2 mm, 448 mm], y: [2 mm, 298 mm]}, quarter_turns: [1, 3], probes: [p]}
+    - {name: x, planes: [x], levels: [0 mm], corners: {y: [2 mm, 298 mm], z: [2 mm, 298 mm]}, quarter_turns: [0, 2], probes: [p]}
+    - {name: y, planes: [y], levels: [0 mm], corners: {z: [2 mm, 248 mm], x: [2 mm, 448 mm]}, quarter_turns: [0, 2], probes: [p]}
+"""
+
+
+def test_words_across_a_drawing_keep_clear_of_each_other(tmp_path: Path) -> None:
+    """By the room that letters of ten points take: six across, eight above their line, two below."""
+    (tmp_path / "e.yaml").write_text(CORNERS, "utf-8")
+    (found,) = load(tmp_path / "e.yaml", planning=True)
+    assert found.pool is not None
+    outside = 0
+    for candidate in found.pool.candidates:
+        root = ElementTree.fromstring(place_drawing(candidate, found))
+        left, top, width, height = map(float, root.attrib["viewBox"].split())
+        (volume,) = root.iter("rect")
+        above = float(volume.attrib["y"])
+        below = above + float(volume.attrib["height"])
+        boxes = {}
+        for one in root.iter("text"):
+            x, y = float(one.attrib["x"]), float(one.attrib["y"])
+            half = 3.0 * len(one.text or "")
+            box = np.array([x - half, y - 8.0, x + half, y + 2.0])
+            if "transform" not in one.attrib:
+                boxes[one.text] = box
+            else:
+                box = np.array([x - 8.0, y - half, x + 2.0, y + half])
+            assert left <= box[0] and top <= box[1]
+            assert box[2] <= left + width and box[3] <= top + height
+        (seen,) = (box for text, box in boxes.items() if text and text.startswith("seen from"))
+        assert seen[3] < above
+        outside += not above < boxes["r1c1"][1] < boxes["r1c1"][3] < below
+        for one, other in combinations(boxes.values(), 2):
+            assert (one[2:] <= other[:2]).any() or (other[2:] <= one[:2]).any()
+    assert outside > 4
 
 
 def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.certificates.certificate_page import certificate_page
 from ballplate.extensions.certificates.datum import chosen_datum
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.experiment.layout import lay_out
@@ -22,7 +23,7 @@ from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.inputs.messages import ExperimentError
 from numpy.typing import NDArray
 
-from tests.extensions.certificates.campaigns import IN_PLANE, IN_SPACE
+from tests.extensions.certificates.campaigns import IN_PLANE, IN_SPACE, PLACES
 from tests.observations.test_joint_values import BALLS, constrained, distances, problem, written
 from tests.reference import dense
 
@@ -230,6 +231,21 @@ def test_page_has_every_figure_and_nothing_from_elsewhere(tmp_path: Path) -> Non
     assert float(row[1]) == pytest.approx(1e3 * found.to_dict()["balls"]["r3c3"]["x"]["value"])
 
 
+def test_the_scale_is_told_to_three_digits(tmp_path: Path) -> None:
+    found = certified(tmp_path)
+    for value in (1.23456e-6, 0.0712345e-6, 12.3456e-6):
+        words = replace(found, scale_uncertainty=value).facts["scale"]
+        assert f" {float(f'{1e6 * value:.3g}'):g} µm/m" in words
+
+
+def test_a_page_with_some_of_the_distances_says_so() -> None:
+    found = of_simulated().certificate()
+    # Of the eight balls of a square with three on each side.
+    assert len(found.distances) == 28 and "Some of the" not in certificate_page(found)
+    some = replace(found, distances=found.distances[:27])
+    assert "Some of the 28 distances" in certificate_page(some)
+
+
 def test_few_degrees_of_freedom_and_probability() -> None:
     found = of_simulated().certificate(coverage_factor=2.0)
     stated = replace(found, degrees_of_freedom=np.inf)
@@ -255,6 +271,25 @@ def test_reference_temperature() -> None:
     found = bp.fit(experiment, bp.simulate(experiment)).certificate(about=ABOUT)
     assert found.reference_temperature == 21.0 and "lengths are those at 21 °C" in found.temperature
     assert of_simulated().certificate().reference_temperature is None
+    # What is known of another plate, or of anything else, says nothing of this one.
+    other = {**IN_SPACE["artefacts"]["plate"], "size": "300 mm"}
+    positions = [
+        *IN_SPACE["positions"],
+        {**IN_SPACE["positions"][0], "name": "other", "artefact": "other"},
+    ]
+    positions[: len(PLACES)] = [{**one, "artefact": "plate"} for one in positions[: len(PLACES)]]
+    of_two = {
+        **sections,
+        "artefacts": {**IN_SPACE["artefacts"], "other": other},
+        "positions": positions,
+        "calibration": [{**IN_SPACE["calibration"][0], "artefact": "plate"}],
+    }
+    for first, wanted in ((None, None), ("other", None), ("plate", 21.0)):
+        heads = {"kind": "re-indexing", "standard_uncertainty": "0.1 um"}
+        stated = [heads, *([] if first is None else [{**influence, "artefact": first}])]
+        two = bp.experiment({**of_two, "influences": stated})
+        told = bp.fit(two, bp.simulate(two)).certificate("plate")
+        assert told.reference_temperature == wanted
 
 
 UNCALIBRATED = {

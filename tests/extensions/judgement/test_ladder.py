@@ -4,7 +4,8 @@ forms, its choice against simulated machines whose coefficients are known.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import ballplate as bp
@@ -12,7 +13,12 @@ import numpy as np
 import pytest
 import scipy.stats
 from ballplate.extensions.judgement.lack_of_fit import pure_error
-from ballplate.extensions.judgement.ladder import climb, fit_rung, ladder
+from ballplate.extensions.judgement.ladder import (
+    _richest_polynomials,
+    climb,
+    fit_rung,
+    ladder,
+)
 from ballplate.extensions.judgement.nested import NestedSums, nested_sums
 from ballplate.extensions.judgement.rung_choice import (
     Comparison,
@@ -21,6 +27,7 @@ from ballplate.extensions.judgement.rung_choice import (
     first_adequate,
 )
 from ballplate.extensions.judgement.rungs import (
+    POOREST,
     LadderModel,
     chain_of,
     kinematic_rung,
@@ -291,6 +298,52 @@ def test_what_the_design_cannot_determine_is_no_candidate() -> None:
     )
 
 
+@dataclass(frozen=True)
+class Plain:
+    """Stands for a model with numbers of coefficients, and for a design that determines some."""
+
+    determined: frozenset[tuple[int, int]]
+
+    def determines(self, model: tuple[int, int]) -> bool:
+        return model in self.determined
+
+
+@pytest.mark.parametrize(
+    "allowed",
+    [
+        lambda n, m: n + m <= 9,
+        lambda n, m: n + 2 * m <= 12,
+        lambda n, m: n <= 5 and m <= 3,
+        lambda n, m: n * m <= 20,
+        lambda n, m: (n, m) == POOREST,
+        lambda n, m: False,
+        lambda n, m: True,
+    ],
+)
+def test_the_richest_polynomials_leave_none_of_both_kinds_behind(
+    allowed: Callable[[int, int], bool],
+) -> None:
+    """By going through all numbers of coefficients: no determined model has more of one kind and as
+    many of the other, and where position and rotation may have as many, they have that.
+    """
+    most, tried = 10, 0
+    every = [(n, m) for n in range(POOREST[0], most + 1) for m in range(POOREST[1], most + 1)]
+    determined = frozenset(one for one in every if allowed(*one))
+
+    def make(n: int, m: int, own: dict[str, int]) -> tuple[int, int]:
+        nonlocal tried
+        tried += 1
+        assert tried < 1000
+        return n, m
+
+    (n, m), beyond = _richest_polynomials(make, Plain(determined), most)  # type: ignore[arg-type]
+    assert (n, m) in determined or (n, m) == POOREST and not determined
+    assert not determined & {(n + 1, m), (n, m + 1)}
+    even = max((k for k in range(most + 1) if (k, k) in determined), default=0)
+    assert min(n, m) >= even
+    assert bool(beyond) == ((n, m) != (most, most))
+
+
 def test_changes_of_lengths_are_those_between_fits() -> None:
     experiment = small()
     readings = bp.simulate(experiment)
@@ -390,5 +443,21 @@ def test_models_that_the_verdict_names_are_shown() -> None:
     found = ladder(experiment, simulated(experiment, 8))
     assert found.beaten.by in found.verdict()[0]
     assert found.beaten.by in {one.model for one in found.rungs}
+    # What a table says of the best richer model of each is the F-test of both.
+    rows = {row["model"]: row for row in found.rows()}
+    compared = 0
+    for row in rows.values():
+        by = row["best_richer_model"]
+        assert (by is None) == (row["richer_models"] == 0)
+        if by in rows:
+            rich = rows[by]
+            more = row["degrees_of_freedom"] - rich["degrees_of_freedom"]
+            left = rich["sum_of_squares"] / rich["degrees_of_freedom"]
+            ratio = (row["sum_of_squares"] - rich["sum_of_squares"]) / more / left
+            least = scipy.stats.f.sf(ratio, more, rich["degrees_of_freedom"])
+            expected = min(1.0, row["richer_models"] * least)
+            assert row["chance"] == pytest.approx(expected, rel=1e-3, abs=1e-12)
+            compared += 1
+    assert compared > 0
     counts = [one.parameters for one in found.rungs]
     assert counts == sorted(counts) and len(counts) == len(set(one.model for one in found.rungs))

@@ -4,22 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.maps.compared_maps import map_of_fit
+from ballplate.extensions.maps.compared_maps import MappedValues, map_of_fit
 from ballplate.extensions.maps.comparison import ComparisonSettings, MapComparison, compared
-from ballplate.extensions.maps.normalised_errors import FigureGroup
+from ballplate.extensions.maps.normalised_errors import FigureGroup, ValueDifference
 from ballplate.extensions.maps.shared_certificates import (
     NothingSharedError,
     with_shared_certificates,
 )
+from ballplate.results.campaign_tests import EstimatedSigma
 from ballplate.results.study import fit as fit_observed
+from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.machines.protocol import Array
 from scipy.stats import chi2, norm
 
 from tests.extensions.maps.campaigns import simulated_fit, simulated_map
+from tests.observations.test_joint_values import (
+    PAIRS,
+    covariance_file,
+    random_covariance,
+    written,
+)
 
 SETTINGS = ComparisonSettings()
 
@@ -167,6 +176,64 @@ def test_what_a_certificate_does_is_what_another_value_of_it_would() -> None:
     for before, one in zip(maps, (first, second), strict=True):
         covariance = one.root @ one.root.T + one.shared @ one.shared.T
         assert covariance == pytest.approx(before.root @ before.root.T, rel=1e-9, abs=1e-24)
+
+
+def test_correlated_values_do_what_other_values_of_them_would(tmp_path: Path) -> None:
+    """Two certificates with covariances of their own: the covariance that each campaign has from
+    them, by the derivatives of its estimates, one value after the other.
+    """
+    items, covariance = [], np.zeros((4, 4))
+    for k, part in enumerate((slice(0, 2), slice(2, 4))):
+        own = random_covariance(2, 5 + k)
+        pairs = PAIRS[part]
+        file = covariance_file(
+            tmp_path / f"{k}.csv", [f"{a} {b}" for a, b in pairs], own, "covariance_um2"
+        )
+        items.append(
+            {"kind": "distances", "pairs": [list(one) for one in pairs], "covariance": file}
+        )
+        covariance[part, part] = 1e-12 * own
+    experiment = written(tmp_path, *items)
+    fits = [simulated_fit(experiment, seed, 7) for seed in (1, 2)]
+    maps = [map_of_fit(one, "campaign") for one in fits]
+    first, second, count = with_shared_certificates(maps[0], maps[1])
+    assert count == 4
+    certified = next(one for one in fits[0].design.observations if isinstance(one, JointValues))
+    columns = []
+    for k in range(4):
+        value = certified.value.copy()
+        value[k] += 1e-6
+        design = fits[0].design.observed(certified.given(value=value))
+        moved = fit_observed(experiment, replace(fits[0].observed, design=design))
+        columns.append(1e6 * (moved.functions.at.state.a - fits[0].functions.at.state.a))
+    wanted = fits[0].sigma ** 2 * np.stack(columns, 1) @ covariance @ np.stack(columns)
+    size = np.abs(wanted).max()
+    assert first.shared @ first.shared.T == pytest.approx(wanted, abs=1e-3 * size)
+    for before, one in zip(maps, (first, second), strict=True):
+        whole = one.root @ one.root.T + one.shared @ one.shared.T
+        assert whole == pytest.approx(before.root @ before.root.T, rel=1e-9, abs=1e-24)
+
+
+def test_only_what_undetermined_directions_change_is_left_out_of_a_test() -> None:
+    """Against the sum of squares of the others; what rounding leaves of a direction, beside what
+    such directions may change at all, is none.
+    """
+    rng = np.random.default_rng(3)
+    values, sizes = rng.normal(size=5), np.array([0.3, 0.5, 0.7, 0.9, 1.1])
+    for null, kept in (
+        (np.zeros((5, 0)), range(5)),
+        (np.eye(5)[:, :1], range(1, 5)),
+        (1e-13 * rng.normal(size=(5, 2)), range(5)),
+        (np.eye(5)[:, :1] + 1e-13 * rng.normal(size=(5, 1)), range(1, 5)),
+    ):
+        size, none = np.ones(5), np.zeros((5, 0))
+        first = MappedValues(np.zeros(5), np.diag(sizes), null, size, none)
+        second = MappedValues(values, np.diag(sizes), np.zeros((5, 0)), size, none)
+        known = EstimatedSigma(1.0, np.inf)
+        test = ValueDifference(first, second, (known, known)).joint_test("errors")
+        assert test is not None and test.dimensions == len(kept)
+        squares = sum(values[k] ** 2 / (2.0 * sizes[k] ** 2) for k in kept)
+        assert test.statistic == pytest.approx(squares, rel=1e-9)
 
 
 def test_other_certificates_are_not_shared() -> None:

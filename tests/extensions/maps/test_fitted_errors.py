@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -418,6 +419,30 @@ def test_what_is_undetermined_is_said_everywhere(
     data = json.dumps(whole.to_dict())
     assert "NaN" not in data and "null" in data
     assert whole.plot() is not None
+
+
+def test_the_table_of_curves_says_where_each_runs(fitted: FittedMap, tmp_path: Path) -> None:
+    """By the names of the errors, the last letter of which is the axis, and by the ends of the
+    volume.
+    """
+    kinds.write_files(tmp_path)
+    edges = {
+        axis: [f"{1e3 * end:.6g}" for end in ends]
+        for axis, *ends in zip("XYZ", fitted.volume.lower, fitted.volume.upper, strict=True)
+    }
+    edges["X"] = ["-100", "1000"]
+    rows = [re.split(r"\s{2,}", line.strip()) for line in bp.curves(fitted).lines()]
+    found = {row[0]: row[2:5] for row in rows if re.fullmatch("E[XYZABC][XYZ]", row[0])}
+    assert set(found) == {f"E{error}{axis}" for error in "XYZABC" for axis in "XYZ"}
+    assert all(row == [name[2], *edges[name[2]]] for name, row in found.items())
+    # Where an error runs along several lines, each is told, in cubes of half a metre.
+    empirical = bp.curves(kinds.fit_of("empirical", tmp_path).to_map())
+    lines = [re.split(r"\s{2,}", line.strip()) for line in empirical.lines()]
+    told = [row[2:5] for row in lines if re.match("[XYZ] at [xyz] ", " ".join(row[2:3]))]
+    assert len(told) > 9 and all(ends == ["0", "500"] for _, *ends in told)
+    assert {line for line, *_ in told} <= {
+        row["line"].removeprefix("along ") for row in empirical.rows()
+    }
 
 
 def test_commands_print_what_results_say(

@@ -82,6 +82,14 @@ def test_without_a_curve_marks_stand_alone(found: Campaign, tmp_path: Path) -> N
     assert "1.00" in texts(replace(found, curve=(), target=1e-6), tmp_path)
 
 
+@pytest.mark.parametrize("bound", [4e-7, math.nan])
+def test_only_what_no_choice_reaches_is_shaded(found: Campaign, bound: float) -> None:
+    axes = draw_campaign(replace(found, curve=(), bound=bound)).axes[0]
+    shades = [one.get_extents().transformed(axes.transData.inverted()) for one in axes.patches]
+    wanted = [] if math.isnan(bound) else [(axes.get_xlim()[0], 1e6 * bound)]
+    assert [(one.x0, one.x1) for one in shades] == [pytest.approx(one) for one in wanted]
+
+
 def test_the_same_campaign_gives_the_same_bytes(found: Campaign, tmp_path: Path) -> None:
     draw_campaign(found, tmp_path / "one.svg")
     draw_campaign(found, tmp_path / "two.svg")

@@ -6,13 +6,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from ballplate.extensions.repair import repair_search
 from ballplate.extensions.repair.changes import Change, ChangeKind, apply_all
+from ballplate.extensions.repair.covering import different
 from ballplate.extensions.repair.judging import examine, judge
 from ballplate.extensions.repair.mending import mended, to_write
 from ballplate.extensions.repair.offers import offers
@@ -424,6 +427,61 @@ def test_what_cannot_be_repaired_says_what_was_tried() -> None:
     experiment = design("hurt_foss/bryan-gauge", "one plane")
     (line,) = repair_lines(repairs(experiment), check(experiment).verdict)
     assert line.startswith("repair: no changes were found that determine everything; ")
+
+
+def test_sets_that_were_tried_are_counted_once() -> None:
+    experiment = design("npl/6.1.1", "B")
+    first, second, third = offers(experiment)[ChangeKind.CERTIFICATE][:3]
+    search = repair_search._Search(examine(experiment), 1)
+    counts = []
+    for some in ((first,), (first, second), (second, first), (second, third), (third,)):
+        search.judge(some)
+        counts.append(search.sets)
+    assert counts == [0, 1, 1, 2, 2]
+    assert search.tried == {ChangeKind.CERTIFICATE: {first, third}}
+
+
+def test_changes_that_lead_out_of_the_volume_do_not_go_together() -> None:
+    """By the scale readings of every ball with every probe in the moved position."""
+    experiment = design("npl/6.1.1", "B")
+    found = offers(experiment)
+    search = repair_search._Search(examine(experiment), 1)
+    lower, upper = experiment.machine.volume.lower, experiment.machine.volume.upper
+    inside = {True: 0, False: 0}
+    for pair in product(found[ChangeKind.MOVE], found[ChangeKind.READ_MORE]):
+        changed = apply_all(pair, experiment)
+        scales = [
+            np.array(changed.layouts[one.artefact].coordinates)[group.ball_indices]
+            @ one.pose.rotation.T
+            + one.pose.origin
+            - changed.probes[probe].offset
+            for one in changed.positions
+            for group in one.readings
+            for probe in group.probes
+        ]
+        every = np.concatenate(scales)
+        fits = bool(((every >= lower - 1e-9) & (every <= upper + 1e-9)).all())
+        inside[fits] += 1
+        assert search.may_be(pair) == fits
+    assert min(inside.values()) > 10
+
+
+def test_additions_that_say_the_same_are_taken_once() -> None:
+    """What rows say does not depend on how they are turned, nor whether a number in them is small
+    and differs by rounding.
+    """
+    rng = np.random.default_rng(2)
+
+    def change(cost: float) -> Change:
+        return Change(ChangeKind.CERTIFICATE, "", cost, frozenset(), lambda one: one)
+
+    size = np.array([1e-3, 1e-1, 1e1, 1e3])
+    said = [rng.normal(size=(6, 4)) * size for _ in range(3)]
+    turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    first, turned, dearer, other, last = (change(cost) for cost in (1.0, 1.0, 2.0, 1.0, 1.0))
+    seen = {first: said[0], turned: turn @ said[0], dearer: said[0], other: said[1], last: said[2]}
+    every = [first, turned, dearer, other, last]
+    assert different(every, seen) == [first, dearer, other, last]
 
 
 def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost, ...] = ()) -> Pool:

@@ -95,6 +95,17 @@ def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(
     assert found.beside.startswith(f"{found.value - 1:g} is not enough: average U6 ")
 
 
+def test_more_repeats_than_a_file_may_have_are_told(tmp_path: Path) -> None:
+    """Two million readings are the most; 64 balls are read with each probe of a position."""
+    (experiment,) = load(written(tmp_path, TEXT, ("balls: [4, 4]", "balls: [8, 8]")))
+    (found,) = reach(experiment, parse_goal("U6 average 0.0001 um"), ("repeats",)).answers
+    most = 2_000_000 // (64 * sum(len(one.probes) for one in experiment.positions))
+    assert (found.status, found.value) == ("none", most)
+    (told,) = found.remarks
+    assert told.startswith(f"more than {most} are not possible: positions[5]")
+    assert "at most 2000000 are possible" in told
+
+
 def test_the_certificate_is_where_an_independent_root_finder_has_it(tmp_path: Path) -> None:
     loose, tight = (
         average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {u} um")) for u in ("50", "0.0001")
