@@ -222,13 +222,19 @@ def __getattr__(name: str) -> Any:
 
         value = getattr(import_module(_PLACES[name]), name)
     else:
-        from ballplate.simulator.inputs.extensions import function
+        from ballplate.simulator.inputs.extensions import (
+            MissingExtensionError,
+            MissingNameError,
+            function,
+        )
 
         try:
             value = function(name)
         except KeyError:
             message = f"module {__name__!r} has no attribute {name!r}"
             raise AttributeError(message) from None
+        except MissingExtensionError as error:
+            raise MissingNameError(f"{__name__}.{name}: {error}") from None
     globals()[name] = value
     return value
 

@@ -15,7 +15,6 @@ import pytest
 from ballplate.extensions import SHIPPED
 from ballplate.simulator.inputs import extensions
 from ballplate.simulator.inputs.extensions import KINDS, Extension
-from ballplate.simulator.inputs.unusable import UnusableError
 
 from tests.test_architecture import EXTENSIONS, arrows, trees
 
@@ -101,6 +100,9 @@ def test_no_name_is_provided_twice() -> None:
         assert len(names) == len(set(names)), kind
 
 
+# What others build on.
+SOME = ("campaign", "maps", "reliability", "requirements")
+
 WITHOUT = """
 import sys
 from importlib.abc import MetaPathFinder
@@ -131,6 +133,13 @@ import contextlib, io, warnings
 
 fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
 assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
+with contextlib.suppress(SystemExit):
+    main(["--help"])
+told = io.StringIO()
+with contextlib.redirect_stderr(told):
+    status = main(["run", quickstart, "--report", sys.argv[1] + ".html"])
+assert status == 0 or "is not installed" in told.getvalue(), told.getvalue()
+assert not hasattr(bp, "nosuch")
 from ballplate.extensions import SHIPPED
 for one in SHIPPED:
     if one.name in sys.argv[3:]:
@@ -143,7 +152,7 @@ for one in SHIPPED:
             try:
                 getattr(bp, function)
             except bp.MissingExtensionError as error:
-                assert one.name in str(error)
+                assert one.name in str(error) and not hasattr(bp, function)
             else:
                 raise AssertionError(function)
 """
@@ -167,8 +176,8 @@ pool:
 
 @pytest.mark.parametrize(
     "hidden",
-    [NAMES, *(pytest.param((name,), marks=pytest.mark.long) for name in NAMES)],
-    ids=["every one", *NAMES],
+    [NAMES, SOME, *(pytest.param((name,), marks=pytest.mark.long) for name in NAMES)],
+    ids=["every one", "those that pages need", *NAMES],
 )
 def test_the_kernel_works_without(hidden: tuple[str, ...], tmp_path: Path) -> None:
     quickstart = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
@@ -277,13 +286,72 @@ def test_an_extension_of_a_laboratory_is_found(
     assert "print the number of positions of a design" in capsys.readouterr().out
 
 
-def test_a_name_that_is_used_twice_is_refused(installed: Callable[[str], None]) -> None:
-    installed('Extension("mine", "mine", commands={"sweep": "sweep"})')
-    with pytest.raises(UnusableError, match="extensions sweeps and mine both provide sweep"):
-        extensions.registered()
+@pytest.mark.parametrize(
+    ("registered", "told"),
+    [
+        (
+            'Extension("mine", "mine", commands={"sweep": "a"})',
+            "sweep (commands) is provided by sweeps",
+        ),
+        (
+            'Extension("mine", "mine", commands={"check": "a"})',
+            "check (commands) is provided by ballplate",
+        ),
+        (
+            'Extension("mine", "mine", functions={"fit": "a"})',
+            "fit (functions) is provided by ballplate",
+        ),
+        (
+            'Extension("mine", "mine", schemas={"map": "a"})',
+            "map (schemas) is provided by ballplate",
+        ),
+        ('Extension("mine", "mine", commands=["a"])', "its commands are no mapping"),
+        ('"mine"', "'mine' is no Extension"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_what_cannot_be_used_is_left_out_and_told(
+    registered: str, told: str, installed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By its package, and nothing else fails for it: help, mistypings, names of the face."""
+    from ballplate.cli import main
+
+    installed(registered)
+    words = "warning: entry point counting of laboratory-package is not used: "
+    for line in (["--help"], ["--version"], ["chekc"]):
+        with pytest.raises(SystemExit) as ended:
+            main(line)
+        err = capsys.readouterr().err
+        assert words in err and told in err and "Traceback" not in err
+        assert ended.value.code == 2 * (line == ["chekc"])
+    assert main([]) == 2 and not hasattr(bp, "nosuch")
+    assert main(["schema"]) == 0
 
 
-def test_what_is_no_extension_is_refused(installed: Callable[[str], None]) -> None:
-    installed('"mine"')
-    with pytest.raises(UnusableError, match="'mine' is no Extension"):
-        extensions.registered()
+@pytest.mark.parametrize(
+    ("module", "told"),
+    [("nowhere", "module nowhere cannot be loaded (ModuleNotFoundError"), ("__init__", "HELP")],
+)
+def test_a_command_that_cannot_be_loaded_is_told(
+    module: str, told: str, installed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    from ballplate.cli import main
+
+    installed(f'Extension("mine", "laboratory_package", commands={{"count": "{module}"}})')
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    assert ended.value.code == 0 and told in capsys.readouterr().err
+    assert main(["count", "a.yaml"]) == 2 and told in capsys.readouterr().err
+
+
+def test_a_group_that_the_help_lacks_is_the_last_one(
+    installed: Callable[[str], None], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from ballplate.cli import main
+
+    installed('Extension("mine", "laboratory_package", commands={"count": "counting"})')
+    path = tmp_path / "laboratory_package" / "counting.py"
+    path.write_text(COUNTING + '\nGROUP = "ours"\n', encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "print the number of positions" in capsys.readouterr().out.partition(" more\n")[2]

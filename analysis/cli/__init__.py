@@ -44,17 +44,30 @@ def commands_of_all() -> tuple[str, ...]:
     return (*COMMANDS, *names("commands", with_registered=True))
 
 
+def _tell_of_extensions() -> None:
+    """Say which extensions that are registered are not used."""
+    from ballplate.simulator.inputs.extensions import registered
+
+    for complaint in registered().complaints:
+        print(f"warning: {complaint}", file=sys.stderr)
+
+
 def _module_of(name: str) -> ModuleType:
     """The module of a command.
 
     :raises KeyError: there is no such command.
-    :raises MissingExtensionError: the extension that has it is not installed.
+    :raises UnusableError: the extension that has it is not installed, or cannot be used.
     """
     if name in COMMANDS:
         return import_module(f".{name}", __package__)
     from ballplate.simulator.inputs.extensions import module_with
 
-    return module_with("commands", name)
+    module = module_with("commands", name)
+    if lacking := [
+        one for one in ("HELP", "DESCRIPTION", "add_options", "run") if not hasattr(module, one)
+    ]:
+        raise UnusableError(f"its module lacks {', '.join(lacking)}")
+    return module
 
 
 def _is_command(word: str) -> bool:
@@ -88,18 +101,23 @@ def parser(names: Sequence[str] | None = None) -> _Parser:
     commands = top.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
+    if names is None:
+        _tell_of_extensions()
     for name in commands_of_all() if names is None else names:
         # Loaded only now, so that hardly anything is when an interruption begins to be answered.
         try:
             module = _module_of(name)
-        except MissingExtensionError:
-            if names is None:
-                continue
-            raise
-        command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
+            command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
+            module.add_options(command)
+        except UnusableError as error:
+            if names is not None:
+                raise
+            if not isinstance(error, MissingExtensionError):
+                print(f"{top.prog}: command {name}: {error}", file=sys.stderr)
+            continue
         # What is printed for it, of which argparse knows no group.
-        vars(commands._choices_actions[-1])["group"] = getattr(module, "GROUP", "more")
-        module.add_options(command)
+        group = getattr(module, "GROUP", "more")
+        vars(commands._choices_actions[-1])["group"] = group if group in GROUPS else "more"
         command.set_defaults(run=module.run)
         add_telling(command)
     return top
@@ -189,7 +207,13 @@ def _run(options: argparse.Namespace) -> int:
     except InternalError as error:
         return internal_error(error)
     except Exception as error:
+        from ballplate.simulator.inputs.extensions import missing
+
         from .memory import no_memory
+
+        if (gone := missing(error)) is not None:
+            print(f"ballplate {options.command}: {gone}", file=sys.stderr)
+            return BAD_FILE
 
         shortage = no_memory(error, options)
         if shortage is not None:
@@ -287,7 +311,7 @@ class _Formatter(argparse.HelpFormatter):
             return super()._format_action(action)
         parts = []
         for group, title in GROUPS.items():
-            rows = [one for one in action._choices_actions if getattr(one, "group", "") == group]
+            rows = [one for one in action._choices_actions if vars(one).get("group") == group]
             if rows:
                 parts += [f"\n {title}\n", *map(self._format_action, rows)]
         return "".join(parts).removeprefix("\n")

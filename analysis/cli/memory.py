@@ -31,7 +31,7 @@ def no_memory(error: BaseException, options: Namespace) -> str | None:
     """What to tell the user where an error comes of a want of memory, here or in a worker; None of
     any other error.
     """
-    name = options.run.__module__.rpartition(".")[2]
+    name = options.command
     named = [path for key, path in named_paths(options) if key in ("files", "file", "store")]
     place = ", ".join(map(str, named)) or f"ballplate {name}"
     smaller = SMALLER.get(name, "close other programs")

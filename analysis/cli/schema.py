@@ -19,7 +19,7 @@ DESCRIPTION = (
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "files",
-        choices=(*SCHEMAS, *names("schemas")),
+        choices=(*SCHEMAS, *names("schemas", with_registered=True)),
         nargs="?",
         default="experiment",
         help="which files",

@@ -66,6 +66,10 @@ class PoolGap:
         """What would determine it."""
         if self.verdict.as_expected:
             return "the file expects that"
+        if optional_service("repairs") is None:
+            return (
+                "the extension repair, which looks for changes that determine it, is not installed"
+            )
         if not self.sought:
             return (
                 "changes that would determine it were not looked for in so large a design; check"

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -29,6 +30,10 @@ KINDS = ("commands", "functions", "services", "schemas")
 
 class MissingExtensionError(UnusableError):
     """An extension that is needed is not installed."""
+
+
+class MissingNameError(MissingExtensionError, AttributeError):
+    """A name of `import ballplate` is of an extension that is not installed."""
 
 
 @dataclass(frozen=True)
@@ -50,62 +55,114 @@ class Extension:
     def load(self, module: str) -> ModuleType:
         """A module of the extension.
 
-        :raises MissingExtensionError: the extension is not installed.
+        :raises MissingExtensionError: the extension, or one that it builds on, is not installed.
+        :raises UnusableError: a module of an extension that is not shipped cannot be loaded.
         """
         try:
             return import_module(f"{self.package}.{module}")
-        except ModuleNotFoundError as error:
-            if error.name is None or not f"{self.package}.".startswith(f"{error.name}."):
+        except Exception as error:
+            if (gone := missing(error)) is not None:
+                raise gone from None
+            if self in shipped():
                 raise
-            text = f"the extension {self.name} is not installed; install ballplate anew, with it"
-            raise MissingExtensionError(text) from None
+            text = f"module {module} cannot be loaded ({_in_words(error)}); mend or uninstall it"
+            raise UnusableError(f"extension {self.name}: {text}") from error
+
+
+def missing(error: BaseException) -> MissingExtensionError | None:
+    """What to say of an error that comes of a shipped extension's absence; None of any other."""
+    if not isinstance(error, ModuleNotFoundError) or error.name is None:
+        return None
+    for extension in shipped():
+        if f"{error.name}.".startswith(f"{extension.package}."):
+            text = f"the extension {extension.name} is not installed; install ballplate anew"
+            return MissingExtensionError(f"{text}, with it")
+    return None
+
+
+def _in_words(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+@dataclass(frozen=True)
+class Registered:
+    """Extensions that are installed besides those shipped, and what is wrong with others."""
+
+    extensions: tuple[Extension, ...]
+    complaints: tuple[str, ...]
 
 
 @cache
-def registered() -> tuple[Extension, ...]:
-    """Extensions that are installed besides those shipped.
-
-    :raises UnusableError: one of them provides what another one does already.
+def registered() -> Registered:
+    """Extensions of other packages. What cannot be loaded, or provides a name that ballplate or
+    another extension has, is left out.
     """
-    found = tuple(point.load() for point in _entry_points())
-    known = list(shipped())
-    for extension in found:
-        if not isinstance(extension, Extension):
-            raise UnusableError(f"entry point {ENTRY_POINT}: {extension!r} is no Extension")
-        for kind in KINDS:
-            for other in known:
-                twice = getattr(extension, kind).keys() & getattr(other, kind).keys()
-                if twice:
-                    raise UnusableError(
-                        f"the extensions {other.name} and {extension.name} both provide"
-                        f" {min(twice)} ({kind}); uninstall one of them"
-                    )
-        known.append(extension)
-    return found
+    found, complaints = list[Extension](), list[str]()
+    for point in _entry_points():
+        package = point.dist.name if point.dist is not None else point.value
+        try:
+            extension = _checked(point.load(), found)
+        except Exception as error:
+            words = str(error) if isinstance(error, UnusableError) else _in_words(error)
+            complaints.append(f"entry point {point.name} of {package} is not used: {words}")
+        else:
+            found.append(extension)
+    return Registered(tuple(found), tuple(complaints))
 
 
-def _entry_points() -> Iterable[EntryPoint]:
+def _checked(extension: object, before: Sequence[Extension]) -> Extension:
+    """An extension that may be used beside those before it.
+
+    :raises UnusableError: it is none, or provides what is there already.
+    """
+    if not isinstance(extension, Extension):
+        raise UnusableError(f"{extension!r} is no Extension")
+    for kind in KINDS:
+        provided = getattr(extension, kind)
+        if not isinstance(provided, Mapping):
+            raise UnusableError(f"its {kind} are no mapping of names to modules")
+        for name in provided:
+            owner = "ballplate" if name in _own(kind) else None
+            for other in (*shipped(), *before):
+                owner = other.name if name in getattr(other, kind) else owner
+            if owner is not None:
+                raise UnusableError(f"{name} ({kind}) is provided by {owner} already")
+    return extension
+
+
+def _own(kind: str) -> Collection[str]:
+    """Names of a kind that the kernel has itself."""
+    if kind == "commands":
+        return tuple(import_module("ballplate.cli").COMMANDS)
+    if kind == "functions":
+        return tuple(import_module("ballplate").__all__)
+    return tuple(import_module("ballplate.cli.schema").SCHEMAS) if kind == "schemas" else ()
+
+
+def _entry_points() -> Iterator[EntryPoint]:
     """Entry points of extensions. Most often there are none, which reading the files of installed
     packages tells in a twentieth of the time that it takes to parse all of them.
     """
+    folders = list(filter(_has_extensions, sys.path))
+    if folders:
+        from importlib.metadata import distributions
+
+        for distribution in distributions(path=folders):
+            yield from distribution.entry_points.select(group=ENTRY_POINT)
+
+
+def _has_extensions(folder: str) -> bool:
+    """Whether packages that are installed in a folder, not the current one, register extensions."""
     group = f"[{ENTRY_POINT}]".encode()
-    if not any(group in path.read_bytes() for path in _files_of_entry_points()):
-        return ()
-    from importlib.metadata import entry_points
-
-    return entry_points(group=ENTRY_POINT)
-
-
-def _files_of_entry_points() -> Iterator[Path]:
-    for folder in sys.path:
-        try:
-            names = os.listdir(folder or ".")
-        except OSError:
-            continue
-        for name in names:
-            path = Path(folder, name, "entry_points.txt")
-            if name.endswith((".dist-info", ".egg-info")) and path.is_file():
-                yield path
+    with suppress(OSError):
+        if os.path.samefile(folder or ".", "."):
+            return False
+        for name in os.listdir(folder):
+            if name.endswith((".dist-info", ".egg-info")):
+                with suppress(OSError):
+                    if group in Path(folder, name, "entry_points.txt").read_bytes():
+                        return True
+    return False
 
 
 def shipped() -> tuple[Extension, ...]:
@@ -115,16 +172,18 @@ def shipped() -> tuple[Extension, ...]:
 
 def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
     """Names that extensions provide of a kind, in the order of the table."""
-    extensions = (*shipped(), *(registered() if with_registered else ()))
+    extensions = (*shipped(), *(registered().extensions if with_registered else ()))
     return tuple(name for one in extensions for name in getattr(one, kind))
 
 
 def provider(kind: str, name: str) -> Extension | None:
     """The extension that provides a name; None where none does."""
-    for extensions in (shipped, registered):
-        for one in extensions():
-            if name in getattr(one, kind):
-                return one
+    for one in shipped():
+        if name in getattr(one, kind):
+            return one
+    for one in registered().extensions:
+        if name in getattr(one, kind):
+            return one
     return None
 
 

@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -91,15 +90,20 @@ def source_rows(
     axes = AXIS_NAMES[: design.dimension]
     rows: list[FileRow] = []
     wrong: list[Message] = []
-    if all(_has_own_columns(one, settings, axes, units) for one in tables):
+    others = [one for one in tables if not _has_own_columns(one, settings, axes, units)]
+    read = optional_service("any_source_rows")
+    if not others:
         for one in tables:
             rows += plain_rows(one, names, axes, wrong, units, empty)
         known = [set(of_role) for of_role in names.values()]
-        if not wrong and all(row.texts[k] in known[k] for row in rows for k in range(len(known))):
+        is_known = all(row.texts[k] in known[k] for row in rows for k in range(len(known)))
+        # Which names are not is told of all rows together.
+        if not wrong and (is_known or read is None):
             return SourceRows(tuple(rows), (), settings)
-    return _any_rows("any_source_rows", tables, wrong)(
-        tables, design, settings, messages, is_possible, units, empty
-    )
+    if read is None:
+        raise ExperimentError(wrong) if wrong else _not_plain(others[0])
+    found: SourceRows = read(tables, design, settings, messages, is_possible, units, empty)
+    return found
 
 
 def named_rows(
@@ -120,26 +124,22 @@ def named_rows(
         if not wrong:
             return rows
     messages: list[Message] = []
-    read = _any_rows("any_table_rows", [table], wrong)
+    read = optional_service("any_table_rows")
+    if read is None:
+        raise ExperimentError(wrong) if wrong else _not_plain(table)
     found = read(table, names, settings, messages, lambda x: False, dimension, {}, empty)
     if messages:
         raise ExperimentError(messages)
     return tuple(found.rows)
 
 
-def _any_rows(name: str, tables: Sequence[SourceText], wrong: Sequence[Message]) -> Any:
-    """The service of an extension that reads tables of any form.
-
-    :raises ExperimentError: it is not installed, and these tables need it.
-    """
-    found = optional_service(name)
-    if found is None:
-        text = (
-            "these columns or names are not those of a plain table; other tables need the extension"
-            " laboratory, which is not installed"
-        )
-        raise ExperimentError(wrong) if wrong else refused(tables[0].source, text)
-    return found
+def _not_plain(table: SourceText) -> ExperimentError:
+    """The error of a table that only an extension reads, which is not installed."""
+    text = (
+        "these are not the columns of a plain table; other tables need the extension laboratory,"
+        " which is not installed"
+    )
+    return refused(table.source, text)
 
 
 def is_plain(table: SourceText, settings: ReadingsSettings, axes: Sequence[str]) -> bool:
@@ -179,7 +179,7 @@ def plain_rows(
             )
         )
     except ExperimentError as error:
-        wrong[:] = error.messages
+        wrong += [one for one in error.messages if one not in wrong]
         return ()
 
 

@@ -10,12 +10,11 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.cli import main
+from ballplate.cli import _module_of, commands_of_all, main
 from ballplate.cli.memory import SMALLER, no_memory
 from ballplate.cli.run import run
 from ballplate.simulator.computing.processes import in_processes
@@ -49,13 +48,12 @@ def test_no_memory_in_any_command(
     failure: Callable[..., None],
     told: str,
 ) -> None:
-    module = import_module(f"ballplate.cli.{command}")
+    module = _module_of(command)
 
     def fails(options: Namespace) -> int:
         failure()
         return 0
 
-    fails.__module__ = module.__name__
     monkeypatch.setattr(module, "run", fails)
     arguments = ["--target", "1 um"] if command == "reach" else []
     assert main([command, QUICKSTART, *arguments]) == 3
@@ -118,3 +116,7 @@ def test_a_process_with_little_memory(tmp_path: Path) -> None:
     assert found.stdout == ""
     (line,) = found.stderr.splitlines()
     assert line.startswith(f"{tmp_path}/large.yaml: run needs more memory than is available")
+
+
+def test_remedies_are_of_commands() -> None:
+    assert set(SMALLER) <= set(commands_of_all())

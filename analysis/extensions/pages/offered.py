@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 from ballplate.simulator.estimation.linearisation import linearise
 
 from .embedded import View
-from .fit_contents import fit_contents
-from .fit_page import fit_page
 from .views import judged_pictures, position_picture, residual_pictures
 
 if TYPE_CHECKING:
@@ -39,6 +37,10 @@ def fit_view(fit: Fit) -> View:
 
 def fit_page_text(fit: Fit) -> str:
     """The page of a fit that knows its experiment."""
+    # Loaded only now: views need no other extension.
+    from .fit_contents import fit_contents
+    from .fit_page import fit_page
+
     assert fit.experiment is not None
     contents = fit_contents(
         fit.experiment,

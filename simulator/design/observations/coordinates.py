@@ -11,7 +11,6 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
-from ...inputs.extensions import service
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthUncertainty
 from ...inputs.settings import Forms, Settings, Text, hint, listing
@@ -21,7 +20,13 @@ from ..lookup import References
 from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration
 from .certificate_tables import read_rows
-from .stated_values import CertificateSettings, check_keys, is_digital, uncertainties_of
+from .stated_values import (
+    CertificateSettings,
+    check_keys,
+    is_digital,
+    read_digital,
+    uncertainties_of,
+)
 from .whitening import CovarianceRoot, at_least_exact
 
 # What balls may be off a plane that they are drawn in, in metres.
@@ -243,7 +248,7 @@ def _certified_coordinates(
     covariance = None
     if is_digital(settings.values):
         wanted = [(layout.names[ball], axis) for ball in balls for axis in axes]
-        digital = service("read_digital")(settings, wanted, False, steps, references)
+        digital = read_digital(settings, wanted, False, steps, references)
         if digital is None:
             return None
         covariance = digital.covariance

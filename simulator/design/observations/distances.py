@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
-from ...inputs.extensions import service
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthFunction, PositiveLength, UncertaintyFunction
 from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
@@ -27,6 +26,7 @@ from .stated_values import (
     FileValues,
     check_keys,
     is_digital,
+    read_digital,
     uncertainties_of,
 )
 from .whitening import CovarianceRoot, at_least_exact
@@ -368,7 +368,7 @@ def _entries(
 ) -> FileValues | None:
     """What the file or the list of values states; None after saying what is wrong."""
     if is_digital(settings.values):
-        return service("read_digital")(settings, wanted, True, steps[:-1], references)
+        return read_digital(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):
         read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
         if read is None:

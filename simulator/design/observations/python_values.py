@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, Name, frozen
-from ...inputs.extensions import service
 from ...inputs.messages import Steps
 from ...inputs.own_code import own_array
 from ...inputs.quantities import (
@@ -31,7 +30,13 @@ from .balls import BallObservations
 from .calibration import MOST_TIED_BALLS, Calibration
 from .certificate_tables import read_rows
 from .coordinates import CalibratedBalls
-from .stated_values import CertificateSettings, check_keys, is_digital, uncertainties_of
+from .stated_values import (
+    CertificateSettings,
+    check_keys,
+    is_digital,
+    read_digital,
+    uncertainties_of,
+)
 from .whitening import CovarianceRoot, at_least_exact, covariance_root
 
 GROUP = "ballplate.calibrations"
@@ -271,7 +276,7 @@ def _values(
     if not references.require(functions.unit == "m", place, text):
         return None
     if is_digital(settings.values):
-        digital = service("read_digital")(settings, functions.names, False, steps, references)
+        digital = read_digital(settings, functions.names, False, steps, references)
         if digital is None:
             return None
         values, in_file = (

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from ...inputs.extensions import optional_service
 from ...inputs.messages import ExperimentError, Message, Steps
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
@@ -239,4 +240,23 @@ def _of_file(
 def _frozen(values: Array) -> Array:
     found = np.array(values, float)
     found.setflags(write=False)
+    return found
+
+
+def read_digital(
+    settings: Any,
+    wanted: Sequence[tuple[str, str]],
+    is_pair: bool,
+    steps: Steps,
+    references: References,
+) -> FileValues | None:
+    """The wanted values in a digital calibration certificate, which an extension reads; None after
+    saying what is wrong.
+    """
+    read = optional_service("read_digital")
+    if read is None:
+        text = "digital certificates need the extension certificates, which is not installed"
+        references.problems.add((*steps, "values"), text)
+        return None
+    found: FileValues | None = read(settings, wanted, is_pair, steps, references)
     return found
