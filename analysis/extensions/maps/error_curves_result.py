@@ -192,7 +192,7 @@ def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
         ends = ["", ""]
         if one.axis is not None:
             along = along or AXIS_NAMES[one.axis].upper()
-            ends = [f"{1e3 * x + 0.0:.6g}" for x in (one.positions[0], one.positions[-1])]
+            ends = [f"{1e3 * x:.6g}" for x in (one.positions[0], one.positions[-1])]
         values = [UNDETERMINED, "", ""]
         if not one.is_undetermined:
             ranges = np.nanmin(one.values), np.nanmax(one.values), k * np.nanmax(one.uncertainties)

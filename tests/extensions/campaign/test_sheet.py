@@ -237,8 +237,7 @@ def test_names_in_the_volume_are_on_their_outlines_and_cover_no_first_ball(sheet
         assert (away > 0.5 * box[2:]).any(axis=1).all()
     centres = [box[:2] + 0.5 * box[2:] for box in names.values()]
     # Names stand a little inside of a corner, or of the middle of a side, of their own outline.
-    for outline, dot in zip(corners, dots, strict=True):
-        assert np.linalg.norm(outline - dot, axis=1).min() < 60.0
+    for outline in corners:
         ends = np.concatenate([outline, 0.5 * (outline + np.roll(outline, -1, axis=0))])
         middle = outline.mean(axis=0)
         size = np.linalg.norm(ends - middle, axis=1).max()
