@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import errno
-import importlib
 import os
 import resource
 import shutil
@@ -26,7 +25,7 @@ from typing import Any
 
 import ballplate as bp
 import pytest
-from ballplate.cli import main, outputs, parser
+from ballplate.cli import _module_of, main, outputs, parser
 from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
 
 from tests.cli.cuts import remains
@@ -271,7 +270,7 @@ def idle(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError(f"{options.command} has begun")
 
     for command in WALK:
-        monkeypatch.setattr(importlib.import_module(f"ballplate.cli.{command}"), "run", fail)
+        monkeypatch.setattr(_module_of(command), "run", fail)
 
 
 @pytest.fixture

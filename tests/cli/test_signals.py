@@ -268,12 +268,12 @@ def test_signals_at_ten_random_moments(
 @pytest.mark.parametrize(
     "arguments",
     [
-        (*TRIALS, "--workers", 2),
+        pytest.param((*TRIALS, "--workers", 2), marks=pytest.mark.long),
         # One of these workers has nothing to do.
-        (*PLAN, "--workers", 3),
+        pytest.param((*PLAN, "--workers", 3), marks=pytest.mark.long),
         ("sweep", "many.yaml", "--workers", 2, "--store", "new.sqlite"),
     ],
-    ids=lambda arguments: arguments[0],
+    ids=["run", "plan", "sweep"],
 )
 def test_no_process_is_left_where_the_command_is_killed(
     small: Path, tmp_path: Path, start: Start, arguments: tuple[object, ...]

@@ -31,7 +31,7 @@ FENCE = re.compile(r"^( *)(`{3,}|~{3,})(.*)\n((?:.*\n)*?)\1\2 *$", re.MULTILINE)
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]\d+)?")
 
 # What a person types or writes, which no program prints, and what the pages' build makes.
-INPUT = ("python", "sh", "yaml")
+INPUT = ("python", "sh", "yaml", "toml")
 MADE = re.compile(
     r"\{(console|edit|eval-rst|figure|file|literalinclude|picture|python-run|toctree)\}"
 )

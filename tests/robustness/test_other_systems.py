@@ -338,5 +338,5 @@ def test_git_gives_line_feeds_whatever_the_system() -> None:
     assert left == {
         name
         for facts, name in files
-        if facts.startswith("i/-text") or name.startswith("tests/readings/samples/")
+        if facts.startswith("i/-text") or name.startswith("tests/extensions/laboratory/samples/")
     }

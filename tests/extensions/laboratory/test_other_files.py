@@ -12,7 +12,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
 DESIGN, POOL = "designs/quickstart.yaml", "designs/planning/campaign.yaml"
-SAMPLES = Path("tests/readings/samples")
+SAMPLES = Path("tests/extensions/laboratory/samples")
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:

@@ -193,6 +193,7 @@ def test_killed_at_random_moments(
     assert sum(killed.values()) >= 2 * times and all(killed.values()), killed
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> None:
     """An error model that ends its process, as one that takes all memory would."""
     path = small_sweep(tmp_path, 2)
