@@ -77,7 +77,7 @@ def test_no_memory_in_a_worker(work: Callable[[], None], told: str) -> None:
     """The first as if the system had ended it for want of memory."""
     with pytest.raises((BrokenProcessPool, MemoryError)) as caught:
         list(in_processes(work, [(), ()], 2))
-    options = Namespace(run=run, files=[Path(QUICKSTART)])
+    options = Namespace(command="run", run=run, files=[Path(QUICKSTART)])
     message = no_memory(caught.value, options)
     assert message is not None and message.startswith(f"{QUICKSTART}: {told}")
 
@@ -86,7 +86,7 @@ def test_no_memory_in_a_worker(work: Callable[[], None], told: str) -> None:
     "error", [ValueError("1 GiB"), OSError(errno.ENOSPC, "No space left on device")]
 )
 def test_other_errors_are_none_of_memory(error: Exception) -> None:
-    assert no_memory(error, Namespace(run=run, files=[])) is None
+    assert no_memory(error, Namespace(command="run", run=run, files=[])) is None
 
 
 def test_a_process_with_little_memory(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def worker_processes(nannies: int) -> list[int]:
     return [int(one) for one in found if b"spawn_main" in Path(f"/proc/{one}/cmdline").read_bytes()]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     tmp_path: Path, cluster: tuple[str, subprocess.Popen[bytes]]
 ) -> None:
