@@ -27,7 +27,7 @@ TIPS = np.array(
 )
 # Standard uncertainties of a tip in the star and of re-indexing, and by how much stars are turned.
 TIP, SHIFT, TURN = 2e-7, 5e-7, 2e-4
-PAGE = Path("docs/how-to/probes-and-reference-sphere.md")
+PAGE = Path("docs/reference/validation.md")
 
 
 def small(**changes: Any) -> Experiment:

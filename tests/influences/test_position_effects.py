@@ -301,7 +301,7 @@ def test_a_bias_that_is_not_declared_is_that_of_a_dense_step(small: bp.Experimen
 @pytest.mark.long
 @pytest.mark.parametrize("name", EVERY)
 def test_the_page_states_what_is_wrong_otherwise(name: str, small: bp.Experiment) -> None:
-    page = Path("docs/how-to/variance-components.md").read_text(encoding="utf-8")
+    page = Path("docs/reference/validation.md").read_text(encoding="utf-8")
     lines = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
     for is_declared, line in zip((True, False), lines, strict=True):
         told = [float(cell.split()[0]) for cell in line.split("|")[3:-1]]

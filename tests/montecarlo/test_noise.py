@@ -163,7 +163,7 @@ ON_THE_PAGE: dict[str, Any] = {
 @pytest.mark.long
 @pytest.mark.parametrize("name", ON_THE_PAGE)
 def test_the_page_states_what_monte_carlo_gives(name: str) -> None:
-    page = Path("docs/how-to/monte-carlo.md").read_text(encoding="utf-8")
+    page = Path("docs/reference/validation.md").read_text(encoding="utf-8")
     (line,) = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
     told = [float(cell.split()[0]) for cell in line.split("|")[2:-1]]
     found = trials(bp.quickstart().with_(noise=ON_THE_PAGE[name]), 2000).outcome

@@ -1,7 +1,7 @@
 """How often a fit names the right cause: data sets with one mistake or one model error each, and a
 table of them.
 
-Run as `python -m tests.reliability.naming` it prints a table; docs/how-to/reliability.md has it of
+Run as `python -m tests.reliability.naming` it prints a table; docs/reference/validation.md has it of
 fewer data sets.
 """
 

@@ -13,7 +13,7 @@ from scipy.stats import binom
 
 from tests.reliability.naming import MISTAKES, MODEL_ERRORS, OUTCOMES, World, counts
 
-PAGE = Path("docs/how-to/reliability.md")
+PAGE = Path("docs/reference/validation.md")
 
 
 @cache
