@@ -494,8 +494,8 @@ def test_budget(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "calibration[1]: coordinates of plate",
     )
     volume = design.machine.volume
-    text = output_of(capsys, "budget", path)
-    data = json.loads(output_of(capsys, "budget", path, "--json"))
+    text = output_of(capsys, "run", "--budget", path)
+    data = json.loads(output_of(capsys, "run", "--budget", path, "--json"))
     told = dict(
         re.findall(r"^(diagonal \d): length of the body diagonal from (.* mm)$", text, re.M)
     )

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .left_out_result import Validation
 
 
-def ladder(
+def models(
     experiment: Experiment | PathLike,
     readings: Tables = None,
     sigma: Literal["estimated", "given"] | None = None,
@@ -43,7 +43,7 @@ def ladder(
 
     >>> import ballplate as bp
     >>> readings = bp.simulate(bp.quickstart())
-    >>> bp.ladder(bp.quickstart(), readings, coefficients=6).recommended
+    >>> bp.models(bp.quickstart(), readings, coefficients=6).recommended
     'kinematic, 5 and 5 coefficients'
     """
     from .ladder import ladder as compared

@@ -15,8 +15,6 @@ from ballplate.cli.reading_options import (
     warn_of,
 )
 
-GROUP = "evaluate"
-HELP = "leave out positions, plates and directions in turn and predict them; compare two campaigns"
 DESCRIPTION = (
     "Leave out each position, plate and direction in turn, predict its readings from all others,"
     " and compare the errors with their uncertainties. With --against, compare what the readings of"

@@ -14,8 +14,6 @@ from ballplate.cli.telling import warn
 if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
 
-GROUP = "use"
-HELP = "predict what adjustments leave of a machine's errors, and compare with a second campaign"
 DESCRIPTION = (
     "Apply stated changes of scales and turns of guideways to a fitted machine: of a map file, or"
     " of an experiment with its readings. Predict what remains of scale errors, angles between the"

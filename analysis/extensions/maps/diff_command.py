@@ -10,8 +10,6 @@ from ballplate.cli.outputs import UsageError, add_force, add_output, write
 
 from .lengths_command import coverage_factor
 
-GROUP = "evaluate"
-HELP = "compare two maps of a machine: which lengths, errors and balls have changed"
 DESCRIPTION = (
     "Compare two campaigns, or a campaign with an expected map: lengths, errors at points of the"
     " volume after the free motion between the frames is taken out, error functions, and balls"

@@ -1,4 +1,4 @@
-"""`ballplate lengths`: lengths throughout the volume against a target."""
+"""`ballplate run --lengths`: lengths throughout the volume against a target."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ from ballplate.cli.outputs import (
 MOST_PAIRS = 500_000
 
 
-GROUP = "more"
-HELP = "map the uncertainty of lengths over the volume against a target"
 DESCRIPTION = (
     "Compute the standard uncertainty u of the length between every two points of a"
     " grid over the volume, measured on the corrected machine, and compare it and the"

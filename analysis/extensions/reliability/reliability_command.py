@@ -1,5 +1,5 @@
-"""`ballplate reliability`: which biases a design would notice, and what those do that it would
-not.
+"""`ballplate run --reliability`: which biases a design would notice, and the
+effects of the others.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from functools import partial
 from ballplate.cli.common import add_file, add_json, number
 from ballplate.cli.outputs import UsageError, add_force, add_output, text_writer, write
 
-GROUP = "more"
-HELP = "find which biases of readings and certificates would be noticed, and what the others change"
 DESCRIPTION = (
     "Compute the redundancy of every observation of a design, the smallest biases of"
     " readings, certificates, probes and positions that a test of the residuals finds,"

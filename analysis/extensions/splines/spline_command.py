@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from .read_points import CurvePoints
 
 
-GROUP = "more"
-HELP = "fit a spline with prescribed values and slopes to measured errors"
 DESCRIPTION = (
     "Fit a spline to errors along an axis or along the profile of a turned part, by least"
     " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"

@@ -1,0 +1,15 @@
+"""Commands, options and functions that have moved, with their successors."""
+
+from __future__ import annotations
+
+MOVED = {
+    "ballplate budget": "ballplate run --budget",
+    "ballplate convert": "ballplate map --convert",
+    "ballplate curves": "ballplate map --curves",
+    "ballplate export": "ballplate sweep --export",
+    "ballplate ladder": "ballplate models",
+    "ballplate lengths": "ballplate run --lengths",
+    "ballplate reliability": "ballplate run --reliability",
+    "ballplate report": "ballplate sweep --report",
+    "bp.ladder": "bp.models",
+}
