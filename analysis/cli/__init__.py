@@ -14,7 +14,6 @@ from typing import Any, NoReturn
 
 from ballplate.simulator.inputs.extensions import (
     Command,
-    MissingExtensionError,
     module_with,
     names,
     provider,

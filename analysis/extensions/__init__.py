@@ -100,7 +100,7 @@ SHIPPED = (
         commands={
             "run --reliability": Command(
                 "reliability_command",
-                "minimal detectable biases of readings and certificates, effects of undetected ones",
+                "minimal detectable biases of readings and certificates, and effects of others",
             ),
         },
         functions=_from("interface", "reliability"),

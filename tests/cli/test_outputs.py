@@ -137,7 +137,7 @@ WALK = {
     "map --curves": Walk({"MAP": "curved-map.yaml"}, {"--plot": "curves.svg"}),
     "diff": Walk(
         {"MAP": "map.yaml", "SECOND": "second-map.yaml", "--points": "corners.csv"},
-        {"--csv": "d.csv", "--plot": "d.svg"},
+        {"-o": "d.csv", "--plot": "d.svg"},
     ),
     "map --convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
@@ -152,11 +152,11 @@ WALK = {
     ),
     "run --lengths": Walk(
         EXPERIMENT,
-        {"--csv": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},
+        {"-o": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},
         ("--grid", "3"),
         ("balls.csv",),
     ),
-    "run --reliability": Walk(EXPERIMENT, {"--csv": "o.csv"}, also=("balls.csv",)),
+    "run --reliability": Walk(EXPERIMENT, {"-o": "o.csv"}, also=("balls.csv",)),
     "map": Walk(
         {"FILE": "machine.yaml", "--tasks": "design.yaml"},
         {"--plot": "map.png"},
@@ -172,7 +172,7 @@ WALK = {
     "spline": Walk(
         {"FILE": "points.csv", "--nominal": "nominal.csv"},
         {
-            "--coefficients": "s.csv",
+            "-o": "s.csv",
             "--compensated": "m.csv",
             "--plot": "s.pdf",
             "--whiskers": "w.svg",
@@ -609,7 +609,7 @@ def test_two_outputs_on_the_screen(files: Path, capsys: pytest.CaptureFixture[st
 def test_capitals_make_no_other_file_where_the_disk_takes_none_for_different(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    paths = {"--csv": tmp_path / "all.csv", "--pairs": tmp_path / "ALL.csv"}
+    paths = {"-o": tmp_path / "all.csv", "--pairs": tmp_path / "ALL.csv"}
     with pytest.raises(AssertionError, match="has begun"):
         main(line("run --lengths", files, paths))
     there = Path.exists
@@ -626,10 +626,10 @@ def test_every_reason_is_told_at_once(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "l.csv").write_text("old")
-    paths = {"--csv": tmp_path / "l.csv", "--pairs": tmp_path / "none" / "p.csv"}
+    paths = {"-o": tmp_path / "l.csv", "--pairs": tmp_path / "none" / "p.csv"}
     assert main(line("run --lengths", files, paths)) == 3
     first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith(f"{paths['--csv']}: exists already") and second.startswith(
+    assert first.startswith(f"{paths['-o']}: exists already") and second.startswith(
         f"{paths['--pairs']}: cannot be"
     )
 
@@ -652,14 +652,12 @@ def test_a_page_without_its_extra_is_told_before_the_store_is_read(
 
 def test_a_file_to_which_standard_output_goes(files: Path, tmp_path: Path) -> None:
     path = tmp_path / "l.csv"
-    arguments = line("run --lengths", files, {"--csv": path}, "--force")
+    arguments = line("run --lengths", files, {"-o": path}, "--force")
     with path.open("w") as stream:
         found = subprocess.run(
             [sys.executable, "-m", "ballplate", *arguments], stdout=stream, stderr=subprocess.PIPE
         )
-    told = (
-        f"ballplate run --lengths: --csv {path} is where standard output goes; name another file\n"
-    )
+    told = f"ballplate run --lengths: -o {path} is where standard output goes; name another file\n"
     assert (found.returncode, found.stderr.decode()) == (2, told)
 
 
@@ -1007,7 +1005,7 @@ def test_a_pipe_is_written_as_it_is(tmp_path: Path) -> None:
 def test_standard_output_by_its_name(files: Path, tmp_path: Path) -> None:
     """Before what is printed, and neither over the other, also where it goes to a file."""
     path = tmp_path / "all.txt"
-    arguments = line("run --lengths", files, {"--csv": Path("/dev/stdout")})
+    arguments = line("run --lengths", files, {"-o": Path("/dev/stdout")})
     with path.open("w") as stream:
         found = subprocess.run([sys.executable, "-m", "ballplate", *arguments], stdout=stream)
     assert found.returncode in (0, 1)

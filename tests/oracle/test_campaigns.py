@@ -312,7 +312,7 @@ def test_diff(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
     second, _, other = measured(path, capsys, 4)
     found, out = Difference(first, second), path.with_name("figures.csv")
     line = ["diff", one, other, "--coverage-factor", k, "--probe", "right"]
-    text = output_of(capsys, *line, "--csv", out)
+    text = output_of(capsys, *line, "-o", out)
     data = json.loads(output_of(capsys, *line, "--json"))
     assert f"U = {k:g} u, E_n = difference / U" in text and data["coverage_factor"] == k
     judge_joint_test(text, first, second)

@@ -33,10 +33,10 @@ RECIPES = (
     "reach small.yaml --by certificate --target '5 um' --json",
     "reach bar-bell.yaml --variant 'length known' --by certificate --calibration 0 --artefact bar",
     "reach small.yaml --by repeats --goal tasks",
-    "'run --lengths' small.yaml --grid 3 --csv out.csv --pairs pairs.csv",
+    "'run --lengths' small.yaml --grid 3 -o out.csv --pairs pairs.csv",
     "'run --lengths' tables.yaml --grid 3,2,2 --target '1 um + L/100000' --probe right --json",
     "'run --lengths' small.yaml --grid 2 --plot out.svg --coverage-factor 2 --with-repeatability --fail",
-    "'run --reliability' small.yaml --csv out.csv --all",
+    "'run --reliability' small.yaml -o out.csv --all",
     "'run --reliability' tables.yaml --false-alarm 1% --power 90% --sigma given --json",
     "simulate small.yaml -o out.csv --certificate certificate.csv --seed 4",
     "simulate tables.yaml -o - --exact",
@@ -74,7 +74,7 @@ RECIPES = (
     "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
-    "diff map.yaml map.npz --grid 2 --csv out.csv",
+    "diff map.yaml map.npz --grid 2 -o out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
     "diff map.yaml map.npz --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
     "fit small.yaml small-readings.csv --trials 2 --seed 3 --workers 1",
@@ -131,7 +131,7 @@ RECIPES = (
         " --origin '100 mm, 0 mm, 0 mm' -o out.cma"
     ),
     "compensation volcomp.csv --format isg --read --sense corrections --arrangement MB2 -o out.yaml",
-    "spline curve.csv --evaluate '10 mm, 50 mm' --coefficients out.csv --powers global",
+    "spline curve.csv --evaluate '10 mm, 50 mm' -o out.csv --powers global",
     (
         "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"
         " --plot out.svg"

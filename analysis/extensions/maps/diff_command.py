@@ -85,7 +85,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fail", action="store_true", help="end with exit status 1 if a change is shown"
     )
-    add_output(parser, "--csv", metavar="FILE", help="write a line for each figure")
+    add_output(parser, "-o", "--output", metavar="FILE", help="write a line for each figure")
     add_picture(parser, "--plot", help="draw what changed, and E_n of all figures")
     add_force(parser)
     add_json(parser)
@@ -121,7 +121,7 @@ def run(options: Namespace) -> int:
         )
     except (NotComparableError, NothingSharedError, QuantityError) as error:
         raise UsageError(error) from None
-    write(options, {options.csv: found.to_csv, options.plot: found.plot})
+    write(options, {options.output: found.to_csv, options.plot: found.plot})
     show(options, found)
     for note in found.notes:
         complain(note)

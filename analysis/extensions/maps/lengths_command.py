@@ -75,7 +75,9 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="include the scatter of the two readings that measure a length",
     )
-    add_output(parser, "--csv", metavar="FILE", help="write a line for each point of the grid")
+    add_output(
+        parser, "-o", "--output", metavar="FILE", help="write a line for each point of the grid"
+    )
     add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")
     add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
     add_force(parser)
@@ -119,7 +121,7 @@ def run(options: Namespace) -> int:
     with progress(options) as shown:
         found = length_map(experiment, settings, shown.show)
     contents: dict[Path | None, Writer] = {
-        options.csv: _of_lines(point_csv(found)),
+        options.output: _of_lines(point_csv(found)),
         options.pairs: _of_lines(pair_csv(experiment, settings)),
         options.plot: found.plot,
     }

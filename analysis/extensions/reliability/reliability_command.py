@@ -45,7 +45,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--all", action="store_true", help="list every event, not only the worst of a kind"
     )
-    add_output(parser, "--csv", metavar="FILE", help="write a row for every observation")
+    add_output(parser, "-o", "--output", metavar="FILE", help="write a row for every observation")
     add_force(parser)
     add_json(parser)
 
@@ -72,10 +72,10 @@ def run(options: Namespace) -> int:
     if options.power <= options.false_alarm:
         raise UsageError("--power must be above --false-alarm; any test has at least that power")
     chosen = experiments(options)
-    if options.csv is not None and len(chosen) > 1:
+    if options.output is not None and len(chosen) > 1:
         names = ", ".join(str(one.name or one.label) for one in chosen)
         raise UsageError(
-            f"--csv writes the table of one experiment; choose one with --variant: {names}"
+            f"-o writes the table of one experiment; choose one with --variant: {names}"
         )
     found = []
     for k, experiment in enumerate(chosen):
@@ -83,8 +83,10 @@ def run(options: Namespace) -> int:
             result = reliability(
                 experiment, options.false_alarm, options.power, options.sigma, shown.show
             )
-        if options.csv is not None:
-            write(options, {options.csv: text_writer(partial(write_observations, result=result))})
+        if options.output is not None:
+            write(
+                options, {options.output: text_writer(partial(write_observations, result=result))}
+            )
         if options.json:
             found.append(result.to_dict())
         else:

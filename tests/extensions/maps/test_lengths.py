@@ -201,7 +201,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         str(tmp_path / name) for name in ("design.yaml", "points.csv", "pairs.csv")
     )
     limits = ["--target", "0.1 um + L/10000000", "--grid", "3,2,3", "--coverage-factor", "1.5"]
-    assert main(["run", "--lengths", file, *limits, "--csv", points, "--pairs", pairs]) == 0
+    assert main(["run", "--lengths", file, *limits, "-o", points, "--pairs", pairs]) == 0
     out, err = capsys.readouterr()
     assert err == "" and "153 lengths between 18 points of a grid, with the probe down" in out
     assert (
@@ -264,7 +264,7 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
             "885115 lengths are too many for --pairs",
         ),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),
-        (["--target", "1 um", "--csv", file], "which is read; name another"),
+        (["--target", "1 um", "-o", file], "which is read; name another"),
     ):
         assert main(["run", "--lengths", file, *options]) == 2
         assert told in capsys.readouterr().err

@@ -20,7 +20,7 @@ Rows = list[dict[str, str]]
 
 def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "all.csv"
-    assert main(["run", "--reliability", QUICKSTART, "--csv", str(table)]) == 0
+    assert main(["run", "--reliability", QUICKSTART, "-o", str(table)]) == 0
     out = capsys.readouterr().out
     assert "754 observations; redundancy 580.0 in total" in out
     assert "estimated from the other residuals: 4.152 standard deviations" in out
@@ -106,7 +106,7 @@ def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFi
                 "run",
                 "--reliability",
                 "designs/hurt_foss/bar-bell.yaml",
-                "--csv",
+                "-o",
                 str(tmp_path / "t.csv"),
             ]
         )
@@ -115,9 +115,9 @@ def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFi
     assert "choose one with --variant: length known, " in capsys.readouterr().err
     own = tmp_path / "own.yaml"
     own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
-    assert main(["run", "--reliability", str(own), "--csv", str(own)]) == 2
+    assert main(["run", "--reliability", str(own), "-o", str(own)]) == 2
     assert "would overwrite" in capsys.readouterr().err
-    assert main(["run", "--reliability", QUICKSTART, "--csv", str(tmp_path / "no" / "t.csv")]) == 3
+    assert main(["run", "--reliability", QUICKSTART, "-o", str(tmp_path / "no" / "t.csv")]) == 3
     assert "cannot be written" in capsys.readouterr().err
 
 
