@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ballplate.estimators.estimator_choice import ESTIMATORS
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.compensation.interface import compensation, read_compensation
-    from ballplate.extensions.judgement.interface import budget, cross_validate, models, validate
+    from ballplate.extensions.judgement.interface import budget, models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
         adjust,
@@ -124,7 +124,6 @@ __all__ = [
     "compensation",
     "convert",
     "correct",
-    "cross_validate",
     "curves",
     "diff",
     "experiment",

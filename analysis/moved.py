@@ -15,5 +15,8 @@ MOVED = {
     "ballplate run --lengths --csv": "-o",
     "ballplate run --reliability --csv": "-o",
     "ballplate spline --coefficients": "-o",
+    "ballplate validate --against": "ballplate diff FILE FILE --readings FIRST SECOND",
+    "ballplate validate --other-plate": "ballplate diff, without --shared",
+    "bp.cross_validate": "bp.diff",
     "bp.ladder": "bp.models",
 }

@@ -106,7 +106,6 @@ def test_files_in_each_others_place_are_told(
         (["run", "--budget", "readings.csv", design], "the experiment file comes first"),
         (["fit", design, "map.npz"], "map.npz is no table of readings"),
         (["next", design, "map.yaml"], "map.yaml is no table of readings"),
-        (["validate", design, "r.csv", "--against", "map.yaml"], "map.yaml is no table"),
         (["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"], "r.csv is no map file"),
     ):
         if "--after" in arguments:

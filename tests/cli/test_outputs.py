@@ -117,12 +117,7 @@ WALK = {
         also=("balls.csv",),
     ),
     "validate": Walk(
-        EXPERIMENT
-        | {
-            "READINGS": "readings.csv",
-            "--certificate": "certificate.csv",
-            "--against": "again.csv",
-        },
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
         {},
         also=("balls.csv",),
     ),
@@ -136,7 +131,12 @@ WALK = {
     ),
     "map --curves": Walk({"MAP": "curved-map.yaml"}, {"--plot": "curves.svg"}),
     "diff": Walk(
-        {"MAP": "map.yaml", "SECOND": "second-map.yaml", "--points": "corners.csv"},
+        {
+            "MAP": "map.yaml",
+            "SECOND": "second-map.yaml",
+            "--points": "corners.csv",
+            "--readings": "readings.csv",
+        },
         {"-o": "d.csv", "--plot": "d.svg"},
     ),
     "map --convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
@@ -201,7 +201,7 @@ WALK = {
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
-LEFT_OUT += ("--tasks", "--against", "--compare", "--watch")
+LEFT_OUT += ("--tasks", "--readings", "--compare", "--watch")
 
 
 @pytest.fixture(scope="module")
@@ -301,7 +301,8 @@ def line(
     words = [command]
     for option, name in walk.reads.items():
         if option not in LEFT_OUT or option in reads:
-            words += [option, str(files / name)] if option.startswith("-") else [str(files / name)]
+            count = 2 if option == "--readings" else 1
+            words += [option] * option.startswith("-") + [str(files / name)] * count
     words += walk.options
     if command in ("simulate", "sweep --export") and "-o" not in written:
         words += ["-o", "-"]

@@ -85,8 +85,8 @@ RECIPES = (
     ),
     "validate small.yaml small-readings.csv --sigma estimated",
     (
-        "validate tables.yaml tables-readings.csv --certificate tables-certificate.csv --against"
-        " tables-again.csv --other-plate --json"
+        "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv"
+        " --shared certificate --json"
     ),
     "'map --convert' map.yaml --to empirical -o out.yaml",
     "'map --convert' map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",

@@ -34,6 +34,13 @@ def add_options(parser: ArgumentParser) -> None:
             " section readings names its files; the second is compared with the first"
         ),
     )
+    parser.add_argument(
+        "--readings",
+        metavar=("FIRST", "SECOND"),
+        nargs=2,
+        type=Path,
+        help="tables of readings of two experiment files, in place of those that they name",
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--points",
@@ -101,6 +108,7 @@ def _grid(text: str) -> int:
 def run(options: Namespace) -> int:
     """Compare, write and print; 1 with --fail if a change is shown."""
     from ballplate.cli.telling import complain
+    from ballplate.results.fit_of_file import fit_of_file
     from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
 
     from .comparison import ComparisonSettings, NotComparableError
@@ -112,8 +120,13 @@ def run(options: Namespace) -> int:
         stated = None
         if options.stated is not None:
             stated = Target(parse_length_function(options.stated), k).standard
+        first, second = (
+            options.files
+            if options.readings is None
+            else map(fit_of_file, options.files, options.readings)
+        )
         found = map_difference(
-            (options.files[0], options.files[1]),
+            (first, second),
             ComparisonSettings(k, options.grid, options.points, options.probe),
             options.shared is not None,
             stated,
