@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ballplate.estimators.estimator_choice import ESTIMATORS
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.compensation.interface import compensation, read_compensation
-    from ballplate.extensions.judgement.interface import budget, cross_validate, ladder, validate
+    from ballplate.extensions.judgement.interface import budget, models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
         adjust,
@@ -71,7 +71,11 @@ if TYPE_CHECKING:
     )
     from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.experiment.model import Candidate, Experiment
-    from ballplate.simulator.inputs.extensions import Extension, MissingExtensionError
+    from ballplate.simulator.inputs.extensions import (
+        Command,
+        Extension,
+        MissingExtensionError,
+    )
     from ballplate.simulator.inputs.messages import ExperimentError, Message
     from ballplate.simulator.inputs.quantities import Target, parse_length
     from ballplate.simulator.inputs.trust import Trust
@@ -82,6 +86,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BallPlaces",
     "Candidate",
+    "Command",
     "Coordinates",
     "Criterion",
     "Design",
@@ -119,13 +124,11 @@ __all__ = [
     "compensation",
     "convert",
     "correct",
-    "cross_validate",
     "curves",
     "diff",
     "experiment",
     "fit",
     "in_processes",
-    "ladder",
     "lay_out",
     "lengths",
     "linear_functions",
@@ -134,6 +137,7 @@ __all__ = [
     "load_all",
     "load_map",
     "map",
+    "models",
     "page",
     "parse_length",
     "plan",
@@ -200,7 +204,7 @@ _KERNEL = {
     ),
     "ballplate.simulator.experiment.layout": ("lay_out",),
     "ballplate.simulator.experiment.model": ("Candidate", "Experiment"),
-    "ballplate.simulator.inputs.extensions": ("Extension", "MissingExtensionError"),
+    "ballplate.simulator.inputs.extensions": ("Command", "Extension", "MissingExtensionError"),
     "ballplate.simulator.inputs.messages": ("ExperimentError", "Message"),
     "ballplate.simulator.inputs.quantities": ("Target", "parse_length"),
     "ballplate.simulator.inputs.trust": ("Trust",),
@@ -231,7 +235,11 @@ def __getattr__(name: str) -> Any:
         try:
             value = function(name)
         except KeyError:
-            message = f"module {__name__!r} has no attribute {name!r}"
+            from ballplate.moved import MOVED
+
+            successor = MOVED.get(f"bp.{name}")
+            moved = "" if successor is None else f"; it is now {successor}"
+            message = f"module {__name__!r} has no attribute {name!r}{moved}"
             raise AttributeError(message) from None
         except MissingExtensionError as error:
             raise MissingNameError(f"{__name__}.{name}: {error}") from None

@@ -38,7 +38,9 @@ def test_results_are_those_of_the_commands(
         capsys, "run", QUICKSTART, "--trials", "20"
     )
     assert bp.fit(QUICKSTART, file).to_dict() == printed(capsys, "fit", QUICKSTART, str(file))
-    assert bp.reliability(QUICKSTART).to_dict() == printed(capsys, "reliability", QUICKSTART)
+    assert bp.reliability(QUICKSTART).to_dict() == printed(
+        capsys, "run", "--reliability", QUICKSTART
+    )
     assert bp.reach(QUICKSTART).to_dict() == printed(capsys, "reach", QUICKSTART)
 
 
@@ -220,11 +222,14 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     mended = bp.sweep(file)
     assert mended.summary.before == 1 and mended.summary.done == 2
     assert "computed anew" in mended.remarks[0] and mended.remarks[0] in str(mended)
-    assert main(["export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
     exported = read_table(tmp_path / "table.csv")
     assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()
     assert bp.stored(store).to_frame().equals(mended.to_frame())
-    assert main(["report", str(store), "--format", "csv", "-o", str(tmp_path / "r.csv")]) == 0
+    assert (
+        main(["sweep", "--report", str(store), "--format", "csv", "-o", str(tmp_path / "r.csv")])
+        == 0
+    )
     assert (tmp_path / "r.csv").read_text("utf-8") == bp.sweep_report(store, form="csv")
     file.write_text(text.replace("0.2 um", "0.3 um"), "utf-8")
     with pytest.raises(bp.OtherSweepError, match="holds another sweep; what has changed"):

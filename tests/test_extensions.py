@@ -19,6 +19,7 @@ from ballplate.simulator.inputs.extensions import KINDS, Extension
 from tests.test_architecture import EXTENSIONS, arrows, trees
 
 TOP = Path(__file__).parents[1]
+QUICKSTART = "designs/quickstart.yaml"
 NAMES = tuple(extension.name for extension in SHIPPED)
 
 # What an extension takes from another one, and why that is no part of the kernel.
@@ -84,9 +85,9 @@ def test_each_folder_is_an_extension() -> None:
 
 @pytest.mark.parametrize("extension", SHIPPED, ids=NAMES)
 def test_what_the_table_names_is_there(extension: Extension) -> None:
-    for name, module in extension.commands.items():
-        command = extension.load(module)
-        assert command.HELP and command.DESCRIPTION and command.run and command.add_options, name
+    for name, listed in extension.commands.items():
+        command = extension.load(listed.module)
+        assert listed.help and command.DESCRIPTION and command.run and command.add_options, name
     for kind in ("functions", "services"):
         for name, module in getattr(extension, kind).items():
             assert callable(getattr(extension.load(module), name)), name
@@ -228,7 +229,8 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Calla
         folder = tmp_path / "laboratory_package"
         folder.mkdir()
         (folder / "__init__.py").write_text(
-            f"from ballplate import Extension\n\nEXTENSION = {registered}\n", encoding="utf-8"
+            f"from ballplate import Command, Extension\n\nEXTENSION = {registered}\n",
+            encoding="utf-8",
         )
         (folder / "counting.py").write_text(COUNTING, encoding="utf-8")
         about = tmp_path / "laboratory_package-1.0.dist-info"
@@ -248,7 +250,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Calla
 
 
 COUNTING = """
-HELP = DESCRIPTION = "print the number of positions of a design"
+DESCRIPTION = "print the number of positions of a design"
 
 
 def add_options(parser):
@@ -270,16 +272,18 @@ def count(file):
 def test_an_extension_of_a_laboratory_is_found(
     installed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its command, its function, and its line in the help."""
+    """Its command, its function, its option of a command, and its line in the help."""
     from ballplate.cli import main
 
+    command = 'Command("counting", "print the number of positions of a design")'
     installed(
-        'Extension("counting", "laboratory_package", commands={"count": "counting"},'
-        ' functions={"count": "counting"})'
+        f'Extension("counting", "laboratory_package", functions={{"count": "counting"}},'
+        f' commands={{"count": {command}, "run --count": {command}}})'
     )
-    assert main(["count", "designs/quickstart.yaml"]) == 0
-    assert capsys.readouterr().out == "6\n"
-    assert bp.count("designs/quickstart.yaml") == 6
+    for line in (["count", QUICKSTART], ["run", QUICKSTART, "--count"]):
+        assert main(line) == 0
+        assert capsys.readouterr().out == "6\n"
+    assert bp.count(QUICKSTART) == 6
     vars(bp).pop("count")
     with pytest.raises(SystemExit):
         main(["--help"])
@@ -290,11 +294,11 @@ def test_an_extension_of_a_laboratory_is_found(
     ("registered", "told"),
     [
         (
-            'Extension("mine", "mine", commands={"sweep": "a"})',
+            'Extension("mine", "mine", commands={"sweep": Command("a", "b")})',
             "sweep (commands) is provided by sweeps",
         ),
         (
-            'Extension("mine", "mine", commands={"check": "a"})',
+            'Extension("mine", "mine", commands={"check": Command("a", "b")})',
             "check (commands) is provided by ballplate",
         ),
         (
@@ -306,6 +310,7 @@ def test_an_extension_of_a_laboratory_is_found(
             "map (schemas) is provided by ballplate",
         ),
         ('Extension("mine", "mine", commands=["a"])', "its commands are no mapping"),
+        ('Extension("mine", "mine", commands={"a": "b"})', "a (commands) is 'b', and no Command"),
         ('"mine"', "'mine' is no Extension"),
         ("1 / 0", "ZeroDivisionError: division by zero"),
     ],
@@ -330,28 +335,31 @@ def test_what_cannot_be_used_is_left_out_and_told(
 
 @pytest.mark.parametrize(
     ("module", "told"),
-    [("nowhere", "module nowhere cannot be loaded (ModuleNotFoundError"), ("__init__", "HELP")],
+    [
+        ("nowhere", "module nowhere cannot be loaded (ModuleNotFoundError"),
+        ("__init__", "DESCRIPTION"),
+    ],
 )
 def test_a_command_that_cannot_be_loaded_is_told(
     module: str, told: str, installed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
 ) -> None:
     from ballplate.cli import main
 
-    installed(f'Extension("mine", "laboratory_package", commands={{"count": "{module}"}})')
+    command = f'Command("{module}", "count")'
+    installed(f'Extension("mine", "laboratory_package", commands={{"count": {command}}})')
     with pytest.raises(SystemExit) as ended:
         main(["--help"])
-    assert ended.value.code == 0 and told in capsys.readouterr().err
+    assert ended.value.code == 0 and capsys.readouterr().err == ""
     assert main(["count", "a.yaml"]) == 2 and told in capsys.readouterr().err
 
 
 def test_a_group_that_the_help_lacks_is_the_last_one(
-    installed: Callable[[str], None], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    installed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
 ) -> None:
     from ballplate.cli import main
 
-    installed('Extension("mine", "laboratory_package", commands={"count": "counting"})')
-    path = tmp_path / "laboratory_package" / "counting.py"
-    path.write_text(COUNTING + '\nGROUP = "ours"\n', encoding="utf-8")
+    command = 'Command("counting", "print the number of positions", "ours")'
+    installed(f'Extension("mine", "laboratory_package", commands={{"count": {command}}})')
     with pytest.raises(SystemExit):
         main(["--help"])
     assert "print the number of positions" in capsys.readouterr().out.partition(" more\n")[2]

@@ -44,7 +44,14 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
         ),
         (
             lambda: bp.lengths(QUICKSTART, "0.3 um", grid=(3, 2, 4), coverage_factor=3),
-            ("lengths", QUICKSTART, "--target=0.3 um", "--grid=3,2,4", "--coverage-factor=3"),
+            (
+                "run",
+                "--lengths",
+                QUICKSTART,
+                "--target=0.3 um",
+                "--grid=3,2,4",
+                "--coverage-factor=3",
+            ),
         ),
         (lambda: bp.map(MACHINE, grid=(3, 2, 2)), ("map", MACHINE, "--grid=3,2,2")),
         (

@@ -12,7 +12,12 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any, NoReturn
 
-from ballplate.simulator.inputs.extensions import MissingExtensionError
+from ballplate.simulator.inputs.extensions import (
+    Command,
+    module_with,
+    names,
+    provider,
+)
 from ballplate.simulator.inputs.unusable import UnusableError
 
 from .completion import SHELLS, PrintCompletion
@@ -24,9 +29,23 @@ from .telling import add_telling, told
 
 USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
-# Modules of this package in the order of the help: each has GROUP, HELP, DESCRIPTION, add_options
-# and run.
-COMMANDS = ("init", "check", "run", "plan", "simulate", "fit", "compare", "schema")
+# Modules of this package, in the order of the help.
+COMMANDS = {
+    "init": Command("init", "write a commented experiment or machine file to start from", "plan"),
+    "check": Command("check", "check whether designs determine all their parameters", "plan"),
+    "run": Command("run", "predict the uncertainties U1 to U6 that a design will achieve", "plan"),
+    "plan": Command(
+        "plan",
+        "choose positions and certificates from a pool, and bound what any choice could achieve",
+        "plan",
+    ),
+    "simulate": Command("simulate", "write synthetic readings of a design", "measure"),
+    "fit": Command("fit", "estimate machine errors, balls and poses from readings", "evaluate"),
+    "compare": Command(
+        "compare", "compare an alternative estimator with the full one on synthetic data"
+    ),
+    "schema": Command("schema", "print the JSON Schema of experiment, sweep, machine or map files"),
+}
 # Groups of commands in the help, with their titles.
 GROUPS = {
     "plan": "plan an experiment",
@@ -39,8 +58,6 @@ GROUPS = {
 
 def commands_of_all() -> tuple[str, ...]:
     """The commands of the kernel, then those of extensions."""
-    from ballplate.simulator.inputs.extensions import names
-
     return (*COMMANDS, *names("commands", with_registered=True))
 
 
@@ -60,26 +77,43 @@ def _module_of(name: str) -> ModuleType:
     """
     if name in COMMANDS:
         return import_module(f".{name}", __package__)
-    from ballplate.simulator.inputs.extensions import module_with
-
     module = module_with("commands", name)
     if lacking := [
-        one for one in ("HELP", "DESCRIPTION", "add_options", "run") if not hasattr(module, one)
+        needed for needed in ("DESCRIPTION", "add_options", "run") if not hasattr(module, needed)
     ]:
         raise UnusableError(f"its module lacks {', '.join(lacking)}")
     return module
 
 
-def _is_command(word: str) -> bool:
-    if word in COMMANDS or word.startswith("-"):
-        return word in COMMANDS
-    from ballplate.simulator.inputs.extensions import provider
+def _command(name: str) -> Command | None:
+    """What is listed of a command; None where there is none, or none that is installed.
 
-    return provider("commands", word) is not None
+    :raises KeyError: there is no such command.
+    """
+    if name in COMMANDS:
+        return COMMANDS[name]
+    extension = provider("commands", name)
+    if extension is None:
+        raise KeyError(name)
+    return extension.commands[name] if extension.is_installed else None
 
 
-def parser(names: Sequence[str] | None = None) -> _Parser:
-    """The command line's grammar, with all commands or some of them."""
+def _with_command(words: Sequence[str]) -> list[str]:
+    """A command line whose first word is the command, with the option that makes it another one."""
+    command, *others = words
+    if command.startswith("-"):
+        return list(words)
+    until = others.index("--") if "--" in others else len(others)
+    for name in names("commands"):
+        first, _, option = name.partition(" ")
+        if first == command and option in others[:until]:
+            others.remove(option)
+            return [name, *others]
+    return list(words)
+
+
+def parser(chosen: Sequence[str] | None = None, with_options: bool = True) -> _Parser:
+    """The command line's grammar, with all commands or some of them, or what is listed of all."""
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
@@ -101,26 +135,45 @@ def parser(names: Sequence[str] | None = None) -> _Parser:
     commands = top.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    if names is None:
+    if chosen is None:
         _tell_of_extensions()
-    for name in commands_of_all() if names is None else names:
-        # Loaded only now, so that hardly anything is when an interruption begins to be answered.
-        try:
-            module = _module_of(name)
-            command = commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION)
-            module.add_options(command)
-        except UnusableError as error:
-            if names is not None:
-                raise
-            if not isinstance(error, MissingExtensionError):
-                print(f"{top.prog}: command {name}: {error}", file=sys.stderr)
+    for name in commands_of_all() if chosen is None else chosen:
+        listed = _command(name)
+        if chosen is None and (listed is None or " " in name and not with_options):
             continue
-        # What is printed for it, of which argparse knows no group.
-        group = getattr(module, "GROUP", "more")
-        vars(commands._choices_actions[-1])["group"] = group if group in GROUPS else "more"
-        command.set_defaults(run=module.run)
-        add_telling(command)
+        try:
+            # Loaded only now: little is loaded when an interruption begins to be answered.
+            module = _module_of(name) if with_options else None
+        except UnusableError as error:
+            if chosen is not None:
+                raise
+            print(f"{top.prog}: command {name}: {error}", file=sys.stderr)
+            continue
+        assert listed is not None
+        listing: dict[str, Any] = {} if " " in name else {"help": listed.help}
+        command = commands.add_parser(name, **listing)
+        if listing:
+            # What is printed for it, of which argparse knows no group.
+            group = listed.group if listed.group in GROUPS else "more"
+            vars(commands._choices_actions[-1])["group"] = group
+        if module is not None:
+            command.description = module.DESCRIPTION
+            module.add_options(command)
+            _add_other_commands(command, name)
+            command.set_defaults(run=module.run)
+            add_telling(command)
     return top
+
+
+def _add_other_commands(command: _Parser, name: str) -> None:
+    """List the options that make another command of one."""
+    others = [other for other in names("commands") if other.startswith(f"{name} ")]
+    group = command.add_argument_group("another command, with options of its own")
+    for other in others:
+        if listed := _command(other):
+            group.add_argument(
+                other.removeprefix(f"{name} "), action=_InFull, nargs=0, help=listed.help
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -160,10 +213,10 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
                 given = sys.argv[1:] if arguments is None else arguments
                 # The grammar of all commands is needed only where none is named.
                 if not given:
-                    parser().print_help(sys.stderr)
+                    parser(with_options=False).print_help(sys.stderr)
                     return USAGE
-                named = [one for one in given[:1] if _is_command(one)]
-                options = parser(named or None).parse_args(given)
+                given = _with_command(given)
+                options = _grammar(given[0]).parse_args(given)
             except UnusableError as error:
                 print(f"ballplate {given[0]}: {error}", file=sys.stderr)
                 return USAGE
@@ -180,6 +233,14 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
         except StandardOutputError as error:
             print(f"standard output: cannot be written ({error}); give it room", file=sys.stderr)
             return BAD_FILE
+
+
+def _grammar(word: str) -> _Parser:
+    """The grammar that a command line needs that begins with a word."""
+    is_command = word in COMMANDS or not word.startswith("-") and provider("commands", word)
+    if is_command:
+        return parser([word])
+    return parser(with_options=word.startswith("-") and word not in ("-h", "--help", "--version"))
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -258,6 +319,11 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, unknown = self.parse_known_args(args, namespace)
+        for word in unknown:
+            # Of an extension that is not shipped.
+            if provider("commands", other := f"{options.command} {word}"):
+                others = [one for one in args[1:] if one != word]
+                return parser([other]).parse_args([other, *others], namespace)
         if unknown:
             chosen = self.commands[options.command]
             chosen.error(f"unrecognized arguments: {' '.join(unknown)}{chosen.meant_by(unknown)}")
@@ -268,10 +334,12 @@ class _Parser(argparse.ArgumentParser):
         """The parsers of the commands, by name."""
         # Not by `next`, which a command of this package hides.
         (found,) = (one for one in self._actions if isinstance(one, argparse._SubParsersAction))
-        return dict(found.choices)
+        choices: dict[str, _Parser] = found.choices
+        return choices
 
     def meant_by(self, unknown: Sequence[str]) -> str:
         """Tell which of the command's options the unknown ones are probably meant for."""
+        from ballplate.moved import MOVED
         from ballplate.simulator.inputs.settings import nearest
 
         known = [
@@ -280,14 +348,20 @@ class _Parser(argparse.ArgumentParser):
             for option in action.option_strings
             if option.startswith("--")
         ]
+        for word in unknown:
+            if successor := MOVED.get(f"{self.prog} {word.partition('=')[0]}"):
+                return f"; it is now {successor}"
         meant = [nearest(one.partition("=")[0], known) for one in unknown if one.startswith("--")]
         told = ", ".join(f'"{one}"' for one in dict.fromkeys(meant) if one is not None)
         return f"; did you mean {told}?" if told else ""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
+            from ballplate.moved import MOVED
             from ballplate.simulator.inputs.settings import nearest
 
+            if successor := MOVED.get(f"{self.prog} {value}"):
+                self.error(f"{self.prog} {value} is now {successor}")
             meant = nearest(str(value), [str(one) for one in action.choices])
             if meant is not None:
                 raise argparse.ArgumentError(
@@ -320,6 +394,13 @@ class _Formatter(argparse.HelpFormatter):
         if action.nargs == "+" and not action.option_strings and not action.required:
             return f"[{action.metavar} ...]"
         return super()._format_args(action, default_metavar)
+
+
+class _InFull(argparse.Action):
+    """An option that makes another command is looked for as it is spelt."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        parser.error(f"write {self.option_strings[0]} in full")
 
 
 class _Version(argparse.Action):

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
-GROUP = "plan"
-HELP = "check whether designs determine all their parameters"
 DESCRIPTION = (
     "Determine the rank of each design, the share of lengths within its target, and"
     " what carries its scale. The exit status is 0 if every rank deficiency is the one"

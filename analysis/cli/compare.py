@@ -7,8 +7,6 @@ from argparse import ArgumentParser, Namespace
 from ..estimators.estimator_choice import COMPARED
 from .common import add_file, add_json, argument_type, at_most, count, trial_count, whole
 
-GROUP = "more"
-HELP = "compare an alternative estimator with the full one on synthetic data"
 DESCRIPTION = (
     "Estimate synthetic data sets of the file's true machine with the full estimator"
     " and with another, and compare the distances that the two correct with one another (NPL Report"

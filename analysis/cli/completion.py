@@ -25,6 +25,7 @@ class PrintCompletion(argparse.Action):
             parser.exit(BAD_FILE)
         import shtab
 
+        _join_other_commands(parser)
         for command in parser.commands.values():
             for action in command._actions:
                 if action.metavar == "FOLDER":
@@ -33,3 +34,15 @@ class PrintCompletion(argparse.Action):
                     action.complete = shtab.FILE
         print(shtab.complete(parser, str(values)))
         parser.exit()
+
+
+def _join_other_commands(parser: Any) -> None:
+    """Offer the options of a command that an option makes of another with those of the other."""
+    commands = parser.commands
+    for name in [name for name in commands if " " in name]:
+        base = commands[name.partition(" ")[0]]
+        for action in commands.pop(name)._actions:
+            if action.option_strings and not set(action.option_strings) & set(
+                base._option_string_actions
+            ):
+                base._add_action(action)

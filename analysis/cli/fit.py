@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 
     from ..results.fit import Fit
 
-GROUP = "evaluate"
-HELP = "estimate machine errors, balls and poses from readings"
 DESCRIPTION = (
     "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"
     " ball, probe, x_mm, y_mm, z_mm (or another unit), or tables that measuring programs write. The"

@@ -7,8 +7,6 @@ from argparse import ArgumentParser, Namespace
 from .outputs import add_force, add_output, write
 from .telling import note
 
-GROUP = "plan"
-HELP = "write a commented experiment or machine file to start from"
 DESCRIPTION = (
     "Write a commented experiment file, ready for check and run, or a machine file, ready for map."
 )

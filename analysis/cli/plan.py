@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 ORDER_NAMES = ("change-over", "mirrored", "blocks", "least-drift")
 
 
-GROUP = "plan"
-HELP = "choose positions and certificates from a pool, and bound what any choice could achieve"
 DESCRIPTION = (
     "Choose the positions and certificates from the pool of an experiment file that"
     " minimise a criterion within a budget, and bound what any choice could achieve."

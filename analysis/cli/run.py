@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from ..results.prediction import Prediction
 
 
-GROUP = "plan"
-HELP = "predict the uncertainties U1 to U6 that a design will achieve"
 DESCRIPTION = (
     "Compute the rank and the standard uncertainties U1 to U6 of a design at zero"
     " machine error. With --trials, synthetic data sets of the file's true machine are"

@@ -8,8 +8,6 @@ from typing import Any
 
 from ballplate.simulator.inputs.extensions import module_with, names
 
-GROUP = "more"
-HELP = "print the JSON Schema of experiment, sweep, machine or map files"
 DESCRIPTION = (
     "Print the JSON Schema of experiment files, or of sweep, machine or map files, for editors"
     " that complete and check as you type."

@@ -12,8 +12,6 @@ from .common import add_file, whole
 from .outputs import add_force, add_output, text_writer, write
 from .telling import note
 
-GROUP = "measure"
-HELP = "write synthetic readings of a design"
 DESCRIPTION = (
     "Write the readings that the file's true machine would give, of artefacts that"
     " differ from their certificates within the stated uncertainties, with noise of the"

@@ -6,10 +6,12 @@ An extension imports the contract and its own folder; where it builds on another
 
 from __future__ import annotations
 
-from ballplate.simulator.inputs.extensions import Extension
+from typing import Any
+
+from ballplate.simulator.inputs.extensions import Command, Extension
 
 
-def _here(name: str, **provided: dict[str, str]) -> Extension:
+def _here(name: str, **provided: Any) -> Extension:
     return Extension(name, f"{__name__}.{name}", **provided)
 
 
@@ -20,7 +22,13 @@ def _from(module: str, *names: str) -> dict[str, str]:
 SHIPPED = (
     _here(
         "requirements",
-        commands={"reach": "reach_command"},
+        commands={
+            "reach": Command(
+                "reach_command",
+                "find the repeatability, certificate, repeats, balls or size that meets a target",
+                "plan",
+            ),
+        },
         functions=_from("interface", "reach"),
         services=_from("goals", "GoalError", "parse_goal") | _from("judged_goals", "judged_goals"),
     ),
@@ -37,7 +45,18 @@ SHIPPED = (
     ),
     _here(
         "campaign",
-        commands={"sheet": "sheet_command", "next": "next_command"},
+        commands={
+            "sheet": Command(
+                "sheet_command",
+                "write a run sheet to print, a table to fill in and points for a machine's program",
+                "measure",
+            ),
+            "next": Command(
+                "next_command",
+                "report after each position whether the target is met, and what to read next",
+                "measure",
+            ),
+        },
         functions=_from("interface", "sheet"),
         services={
             **_from("sheet_command", "sheet_name"),
@@ -47,28 +66,54 @@ SHIPPED = (
     ),
     _here(
         "laboratory",
-        commands={"import": "import_command"},
+        commands={
+            "import": Command(
+                "import_command", "make a table of readings of reports of CMM programs", "measure"
+            ),
+        },
         functions=_from("interface", "read_report"),
         services=_from("reading_tables", "any_source_rows", "any_table_rows"),
     ),
     _here(
         "judgement",
         commands={
-            "budget": "budget_command",
-            "ladder": "ladder_command",
-            "validate": "validate_command",
+            "models": Command(
+                "models_command",
+                "compare error models on readings: which one do they call for?",
+                "evaluate",
+            ),
+            "validate": Command(
+                "validate_command",
+                "leave out positions, plates and directions in turn and predict them",
+                "evaluate",
+            ),
+            "run --budget": Command(
+                "budget_command",
+                "uncertainties by their sources: readings, certificates, probes, influences",
+            ),
         },
-        functions=_from("interface", "budget", "cross_validate", "ladder", "validate"),
+        functions=_from("interface", "budget", "models", "validate"),
         services=_from("bootstrap", "bootstrap") | _from("components", "variance_components"),
     ),
     _here(
         "reliability",
-        commands={"reliability": "reliability_command"},
+        commands={
+            "run --reliability": Command(
+                "reliability_command",
+                "minimal detectable biases of readings and certificates, and effects of others",
+            ),
+        },
         functions=_from("interface", "reliability"),
     ),
     _here(
         "certificates",
-        commands={"certificate": "certificate_command"},
+        commands={
+            "certificate": Command(
+                "certificate_command",
+                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC, GTC",
+                "evaluate",
+            ),
+        },
         services={
             **_from("plate_certificate", "plate_certificate"),
             **_from("digital_values", "read_digital"),
@@ -77,13 +122,37 @@ SHIPPED = (
     _here(
         "maps",
         commands={
-            "lengths": "lengths_command",
-            "correct": "correct_command",
-            "curves": "curves_command",
-            "convert": "convert_command",
-            "map": "map_command",
-            "diff": "diff_command",
-            "adjust": "adjust_command",
+            "diff": Command(
+                "diff_command",
+                "compare two maps of a machine: which lengths, errors and balls have changed",
+                "evaluate",
+            ),
+            "correct": Command(
+                "correct_command",
+                "correct points by the map of a fit, with their uncertainty",
+                "use",
+            ),
+            "map": Command(
+                "map_command",
+                "compute volumetric errors of a machine file, or of the map that a fit left behind",
+                "use",
+            ),
+            "map --curves": Command(
+                "curves_command",
+                "parametric errors of a map file along their axes, with their uncertainties",
+            ),
+            "map --convert": Command(
+                "convert_command",
+                "the map of a fit in another error model, with its covariance",
+            ),
+            "adjust": Command(
+                "adjust_command",
+                "predict a machine's errors after adjustments, and compare with a second campaign",
+                "use",
+            ),
+            "run --lengths": Command(
+                "lengths_command", "uncertainties of lengths throughout the volume against a target"
+            ),
         },
         functions=_from(
             "interface", "adjust", "convert", "correct", "curves", "diff", "lengths", "map"
@@ -91,12 +160,23 @@ SHIPPED = (
     ),
     _here(
         "compensation",
-        commands={"compensation": "compensation_command"},
+        commands={
+            "compensation": Command(
+                "compensation_command",
+                "write compensation tables of a machine for controllers, or read them",
+                "use",
+            ),
+        },
         functions=_from("interface", "compensation", "read_compensation"),
     ),
     _here(
         "splines",
-        commands={"spline": "spline_command"},
+        commands={
+            "spline": Command(
+                "spline_command",
+                "fit a spline with prescribed values and slopes to measured errors",
+            ),
+        },
         functions=_from("interface", "spline"),
     ),
     _here(
@@ -106,7 +186,17 @@ SHIPPED = (
     ),
     _here(
         "sweeps",
-        commands={"sweep": "sweep_command", "export": "export_command", "report": "report_command"},
+        commands={
+            "sweep": Command(
+                "sweep_command",
+                "compute a family of experiments into a store, and write its results",
+                "plan",
+            ),
+            "sweep --report": Command(
+                "report_command", "results of a store as an HTML page, or its tables"
+            ),
+            "sweep --export": Command("export_command", "results of a store as CSV or Parquet"),
+        },
         functions={
             **_from("stores", "stored", "sweep", "sweep_report"),
             **_from("running", "OtherSweepError"),
@@ -115,10 +205,24 @@ SHIPPED = (
         services=_from("running", "SweepResult"),
         schemas={"sweep": "sweep_schema"},
     ),
-    _here("studio", commands={"studio": "studio_command"}),
+    _here(
+        "studio",
+        commands={
+            "studio": Command(
+                "studio_command",
+                "open a design in the browser, to move and change it and see its uncertainties",
+                "plan",
+            ),
+        },
+    ),
     _here(
         "reproduction",
-        commands={"reproduce": "reproduce_command"},
+        commands={
+            "reproduce": Command(
+                "reproduce_command",
+                "compute published experiments or certified problems, and compare the figures",
+            ),
+        },
         functions=_from("interface", "reproduce"),
     ),
 )

@@ -32,8 +32,8 @@ def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:
     return "machine" if "arrangement" in keys else "map"
 
 
-def fit_of_file(path: Path) -> Fit:
-    """The fit of an experiment to the readings that it names.
+def fit_of_file(path: Path, readings: Path | None = None) -> Fit:
+    """The fit of an experiment to a table of readings, by default to those that it names.
 
     :raises ExperimentError: the file is wrong, has variants or names no readings, or the estimate
         did not converge.
@@ -43,13 +43,13 @@ def fit_of_file(path: Path) -> Fit:
         raise refused(path, "the file has several variants; name their map files", "variants")
     experiment = variants[0]
     named = experiment.readings.named_files
-    if not named:
+    if not named and readings is None:
         text = (
             "names no readings, so that there is no fit; add readings: {files: […]}, or"
             " name a map that fit -o wrote"
         )
         raise refused(path, text, "readings")
-    files = [experiment.source.parent / name for name in named]
+    files = [experiment.source.parent / name for name in named] if readings is None else [readings]
     observed = read_readings(files, lay_out(experiment), settings=experiment.readings)
     found = fit(experiment, observed)
     if not found.converged:

@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -37,20 +38,41 @@ class MissingNameError(MissingExtensionError, AttributeError):
 
 
 @dataclass(frozen=True)
+class Command:
+    """A command, by its `module`, which has DESCRIPTION, add_options and run; `help` is its line of
+    the help, in a `group` of that.
+
+    The name of a command may be that of another with an option, such as "run --lengths": the option
+    makes another command of it.
+    """
+
+    module: str
+    help: str
+    group: str = "more"
+
+
+@dataclass(frozen=True)
 class Extension:
     """What a `package` provides, each name with the module below the package that has it.
 
-    A module of `commands` has HELP, DESCRIPTION, add_options and run, and may have the GROUP of the
-    help that it is listed in. `functions` are those of `import ballplate`, `services` what the
-    kernel asks for, and `schemas` kinds of files whose module has a function `schema`.
+    `functions` are those of `import ballplate`, `services` what the kernel asks for, and `schemas`
+    kinds of files whose module has a function `schema`.
     """
 
     name: str
     package: str
-    commands: Mapping[str, str] = field(default_factory=dict)
+    commands: Mapping[str, Command] = field(default_factory=dict)
     functions: Mapping[str, str] = field(default_factory=dict)
     services: Mapping[str, str] = field(default_factory=dict)
     schemas: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether its package is there."""
+        try:
+            return find_spec(self.package) is not None
+        except ModuleNotFoundError:
+            return False
 
     def load(self, module: str) -> ModuleType:
         """A module of the extension.
@@ -121,7 +143,10 @@ def _checked(extension: object, before: Sequence[Extension]) -> Extension:
         provided = getattr(extension, kind)
         if not isinstance(provided, Mapping):
             raise UnusableError(f"its {kind} are no mapping of names to modules")
-        for name in provided:
+        for name, module in provided.items():
+            if not isinstance(module, Command if kind == "commands" else str):
+                what = "Command" if kind == "commands" else "name of a module"
+                raise UnusableError(f"{name} ({kind}) is {module!r}, and no {what}")
             owner = "ballplate" if name in _own(kind) else None
             for other in (*shipped(), *before):
                 owner = other.name if name in getattr(other, kind) else owner
@@ -196,7 +221,8 @@ def module_with(kind: str, name: str) -> ModuleType:
     extension = provider(kind, name)
     if extension is None:
         raise KeyError(name)
-    return extension.load(getattr(extension, kind)[name])
+    provided = getattr(extension, kind)[name]
+    return extension.load(provided.module if isinstance(provided, Command) else provided)
 
 
 def service(name: str) -> Any:

@@ -74,8 +74,8 @@ print(json.dumps({
     "reliability table": " ".join(biases.lines()),
     "goals": list(SYMBOLS),
     "reach": said("reach", str(folder / "base.yaml"), "--goal", "U7 average 0.2 um", "--by", "repeatability"),
-    "export": said("export", store, "-o", "-"),
-    "report": said("report", store, "--format", "markdown"),
+    "export": said("sweep", "--export", store, "-o", "-"),
+    "report": said("sweep", "--report", store, "--format", "markdown"),
 }))
 """
 

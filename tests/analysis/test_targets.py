@@ -92,7 +92,7 @@ def test_every_comparison_says_which_uncertainty_it_is_of(
     for factor, words in ((1.0, "standard uncertainty u"), (2.0, "expanded uncertainty U = 2 u")):
         file = str(written(tmp_path, with_target("0.2 um", factor)))
         for command, expected in (
-            (["run"], 2), (["check"], 1), (["lengths"], 1), (["reach", "--by", "repeats"], 1),
+            (["run"], 2), (["check"], 1), (["run", "--lengths"], 1), (["reach", "--by", "repeats"], 1),
             (["reach", "--by", "repeats", "--goal", "tasks"], 1), (["check", "--goal", "lengths"], 2),
         ):  # fmt: skip
             main([command[0], file, *command[1:]])
@@ -134,7 +134,8 @@ def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str
                 "--goal",
                 just,
                 "--goal",
-                "lengths",
+                "run",
+                "--lengths",
                 "--goal",
                 "U2 angles maximum 1 urad",
             ]
@@ -205,13 +206,13 @@ def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
     for factor, status in ((1.0, 0), (2.0, 1)):
         file = str(written(tmp_path, with_target(f"{1.5e6 * largest:.6f} um", factor)))
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
-        assert main(["lengths", file, "--grid", "2"]) == 0
+        assert main(["run", "--lengths", file, "--grid", "2"]) == 0
         mapped = length_map(
             load(file)[0],
             LengthMapSettings((2, 2, 2), "down", load(file)[0].target_uncertainty.stated),
         )  # type: ignore[union-attr]
         of_corners = factor * float(mapped.whole.maximum_ratio[0]) > 1
-        assert main(["lengths", file, "--grid", "2", "--fail"]) == int(of_corners)
+        assert main(["run", "--lengths", file, "--grid", "2", "--fail"]) == int(of_corners)
 
 
 def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Path) -> None:

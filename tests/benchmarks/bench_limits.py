@@ -242,10 +242,14 @@ CASES = (
     Case("run, 40,000 evaluation points", lambda folder: ["run", many_points(folder)]),
     Case("run, 40,000 balls", lambda folder: ["run", many_balls(folder)]),
     Case(
-        "reliability, 40,000 evaluation points", lambda folder: ["reliability", many_points(folder)]
+        "reliability, 40,000 evaluation points",
+        lambda folder: ["run", "--reliability", many_points(folder)],
     ),
     Case("run --trials 1000000", lambda folder: ["run", QUICKSTART, "--trials", "1000000"]),
-    Case("reliability, 1,000,000 readings", lambda folder: ["reliability", many_readings(folder)]),
+    Case(
+        "reliability, 1,000,000 readings",
+        lambda folder: ["run", "--reliability", many_readings(folder)],
+    ),
     Case(
         "reach, 10,000 evaluation points",
         lambda folder: ["reach", many_points(folder, 10_000), "--by", "repeatability"],
@@ -266,10 +270,18 @@ CASES = (
         "compare, 100,000 pairs of points",
         lambda folder: ["compare", QUICKSTART, "--trials", "100", "--points", "100000"],
     ),
-    Case("lengths, 4913 points", lambda folder: ["lengths", QUICKSTART, "--grid", "17"]),
+    Case("lengths, 4913 points", lambda folder: ["run", "--lengths", QUICKSTART, "--grid", "17"]),
     Case(
         "lengths --pairs, 499,500 lengths",
-        lambda folder: ["lengths", QUICKSTART, "--grid", "10", "--pairs", folder / "pairs.csv"],
+        lambda folder: [
+            "run",
+            "--lengths",
+            QUICKSTART,
+            "--grid",
+            "10",
+            "--pairs",
+            folder / "pairs.csv",
+        ],
     ),
     Case(
         "simulate, 2,000,000 readings",
@@ -299,11 +311,11 @@ CASES = (
     Case("sweep --dry-run, 1,000,000 cells", lambda folder: ["sweep", cells(folder), "--dry-run"]),
     Case(
         "export, 1,000,000 cells",
-        lambda folder: ["export", many_cells(folder), "-o", folder / "cells.csv"],
+        lambda folder: ["sweep", "--export", many_cells(folder), "-o", folder / "cells.csv"],
     ),
     Case(
         "report, 1,000,000 cells",
-        lambda folder: ["report", many_cells(folder), "-o", folder / "cells.html"],
+        lambda folder: ["sweep", "--report", many_cells(folder), "-o", folder / "cells.html"],
     ),
 )
 

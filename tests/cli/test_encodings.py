@@ -28,12 +28,12 @@ READABLE = {
 PEOPLE = [
     "check plate.yaml",
     "run plate.yaml",
-    "reliability plate.yaml",
-    "lengths plate.yaml",
+    "run --reliability plate.yaml",
+    "run --lengths plate.yaml",
     "fit plate.yaml readings.csv",
     "map machine.yaml",
     "sweep sizes.yaml --workers 1",
-    "report sizes.sqlite --format text",
+    "sweep --report sizes.sqlite --format text",
 ]
 PROGRAMS = [
     "check --json plate.yaml",
@@ -44,10 +44,10 @@ PROGRAMS = [
     "fit --json plate.yaml readings.csv",
     "map machine.yaml --format csv",
     "map machine.yaml --json",
-    "export sizes.sqlite -o -",
-    "report sizes.sqlite --format csv",
-    "report sizes.sqlite --format markdown",
-    "spline errors.csv --coefficients -",
+    "sweep --export sizes.sqlite -o -",
+    "sweep --report sizes.sqlite --format csv",
+    "sweep --report sizes.sqlite --format markdown",
+    "spline errors.csv -o -",
     "schema",
 ]
 
@@ -160,7 +160,10 @@ def test_files_are_utf_8_with_line_feeds(
     folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Whatever the locale: with that of C and without Python's UTF-8 mode, files would be ASCII."""
-    outputs = {"simulate": ("-o", tmp_path / "µ.csv"), "lengths": ("--csv", tmp_path / "ü.csv")}
+    outputs = {
+        "simulate": ("-o", tmp_path / "µ.csv"),
+        "run --lengths": ("-o", tmp_path / "ü.csv"),
+    }
     for command, (option, path) in outputs.items():
         found = subprocess.run(
             [

@@ -37,7 +37,7 @@ def swapped(word: str, random: Random) -> str:
     return word[:k] + word[k + 1] + word[k] + word[k + 2 :]
 
 
-@pytest.mark.parametrize("command", ["check", "reliability", "simulate", "plan"])
+@pytest.mark.parametrize("command", ["check", "validate", "simulate", "plan"])
 def test_a_mistyped_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     for number in range(3):
         word = swapped(command, Random(number))
@@ -48,7 +48,9 @@ def test_a_mistyped_command(command: str, capsys: pytest.CaptureFixture[str]) ->
 
 def test_a_word_that_is_no_command_is_told_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     told = complaint(capsys, "xyzzy")
-    assert "did you mean" not in told and all(command in told for command in commands())
+    assert "did you mean" not in told and all(
+        command in told for command in commands() if " " not in command
+    )
 
 
 def test_every_option_mistyped(capsys: pytest.CaptureFixture[str]) -> None:
@@ -101,10 +103,9 @@ def test_files_in_each_others_place_are_told(
     design = "designs/quickstart.yaml"
     for arguments, words in (
         (["next", "readings.csv", design], f"first, then the readings: next {design} readings.csv"),
-        (["budget", "readings.csv", design], "the experiment file comes first"),
+        (["run", "--budget", "readings.csv", design], "the experiment file comes first"),
         (["fit", design, "map.npz"], "map.npz is no table of readings"),
         (["next", design, "map.yaml"], "map.yaml is no table of readings"),
-        (["validate", design, "r.csv", "--against", "map.yaml"], "map.yaml is no table"),
         (["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"], "r.csv is no map file"),
     ):
         if "--after" in arguments:

@@ -57,7 +57,7 @@ def test_readings_and_other_tables(tmp_path: Path, capsys: pytest.CaptureFixture
     assert lines[1].startswith("'=cmd|' /C calc'!A0,'=1+1,'@down,")
     assert all(line[0] not in "=+-@" for line in lines)
     assert main(["fit", str(path), str(readings)]) == 0
-    assert main(["reliability", str(path), "--csv", str(table)]) == 0
+    assert main(["run", "--reliability", str(path), "-o", str(table)]) == 0
     for row in csv.reader(io.StringIO(table.read_text(encoding="utf-8"), newline="")):
         for cell in row:
             if len(cell) > 1:

@@ -110,23 +110,18 @@ WALK = {
         {"-o": "o.csv", "--covariance": "v.csv"},
         ("--probe", "probe"),
     ),
-    "ladder": Walk(
+    "models": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
         {},
         ("--coefficients", "3"),
         also=("balls.csv",),
     ),
     "validate": Walk(
-        EXPERIMENT
-        | {
-            "READINGS": "readings.csv",
-            "--certificate": "certificate.csv",
-            "--against": "again.csv",
-        },
+        EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
         {},
         also=("balls.csv",),
     ),
-    "budget": Walk(
+    "run --budget": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
         {},
         also=("balls.csv",),
@@ -134,12 +129,17 @@ WALK = {
     "next": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
     ),
-    "curves": Walk({"MAP": "curved-map.yaml"}, {"--plot": "curves.svg"}),
+    "map --curves": Walk({"MAP": "curved-map.yaml"}, {"--plot": "curves.svg"}),
     "diff": Walk(
-        {"MAP": "map.yaml", "SECOND": "second-map.yaml", "--points": "corners.csv"},
-        {"--csv": "d.csv", "--plot": "d.svg"},
+        {
+            "MAP": "map.yaml",
+            "SECOND": "second-map.yaml",
+            "--points": "corners.csv",
+            "--readings": "readings.csv",
+        },
+        {"-o": "d.csv", "--plot": "d.svg"},
     ),
-    "convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
+    "map --convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
@@ -150,13 +150,13 @@ WALK = {
         {"-o": "sheet.html", "--readings": "table.csv", "--points": "points.csv"},
         prints=False,
     ),
-    "lengths": Walk(
+    "run --lengths": Walk(
         EXPERIMENT,
-        {"--csv": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},
+        {"-o": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},
         ("--grid", "3"),
         ("balls.csv",),
     ),
-    "reliability": Walk(EXPERIMENT, {"--csv": "o.csv"}, also=("balls.csv",)),
+    "run --reliability": Walk(EXPERIMENT, {"-o": "o.csv"}, also=("balls.csv",)),
     "map": Walk(
         {"FILE": "machine.yaml", "--tasks": "design.yaml"},
         {"--plot": "map.png"},
@@ -172,15 +172,15 @@ WALK = {
     "spline": Walk(
         {"FILE": "points.csv", "--nominal": "nominal.csv"},
         {
-            "--coefficients": "s.csv",
+            "-o": "s.csv",
             "--compensated": "m.csv",
             "--plot": "s.pdf",
             "--whiskers": "w.svg",
         },
         ("--y", "semi_finish_error", "--points", "12-32"),
     ),
-    "export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
-    "report": Walk(
+    "sweep --export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
+    "sweep --report": Walk(
         {"STORE": "store.sqlite", "--compare": "other.sqlite"}, {"-o": "t.md"}, prints=False
     ),
     "check": Walk(EXPERIMENT, {}),
@@ -201,7 +201,7 @@ WALK = {
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
-LEFT_OUT += ("--tasks", "--against", "--compare", "--watch")
+LEFT_OUT += ("--tasks", "--readings", "--compare", "--watch")
 
 
 @pytest.fixture(scope="module")
@@ -301,9 +301,10 @@ def line(
     words = [command]
     for option, name in walk.reads.items():
         if option not in LEFT_OUT or option in reads:
-            words += [option, str(files / name)] if option.startswith("-") else [str(files / name)]
+            count = 2 if option == "--readings" else 1
+            words += [option] * option.startswith("-") + [str(files / name)] * count
     words += walk.options
-    if command in ("simulate", "export") and "-o" not in written:
+    if command in ("simulate", "sweep --export") and "-o" not in written:
         words += ["-o", "-"]
     for option, path in written.items():
         words += [option, str(path)] if option.startswith("-") else [str(path)]
@@ -587,7 +588,8 @@ def test_the_log_of_a_store_is_an_input(files: Path, capsys: pytest.CaptureFixtu
     log = files / "store.sqlite-wal"
     log.write_bytes(b"rows that are not in the store yet")
     arguments = [
-        "report",
+        "sweep",
+        "--report",
         str(files / "store.sqlite"),
         "--format",
         "text",
@@ -608,16 +610,16 @@ def test_two_outputs_on_the_screen(files: Path, capsys: pytest.CaptureFixture[st
 def test_capitals_make_no_other_file_where_the_disk_takes_none_for_different(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    paths = {"--csv": tmp_path / "all.csv", "--pairs": tmp_path / "ALL.csv"}
+    paths = {"-o": tmp_path / "all.csv", "--pairs": tmp_path / "ALL.csv"}
     with pytest.raises(AssertionError, match="has begun"):
-        main(line("lengths", files, paths))
+        main(line("run --lengths", files, paths))
     there = Path.exists
 
     def exists(self: Path) -> bool:
         return self.parent == tmp_path and there(self.with_name(self.name.lower())) or there(self)
 
     monkeypatch.setattr(Path, "exists", exists)
-    refused(line("lengths", files, paths), capsys, 2, "are the same file; name another")
+    refused(line("run --lengths", files, paths), capsys, 2, "are the same file; name another")
 
 
 @pytest.mark.usefixtures("idle")
@@ -625,10 +627,10 @@ def test_every_reason_is_told_at_once(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "l.csv").write_text("old")
-    paths = {"--csv": tmp_path / "l.csv", "--pairs": tmp_path / "none" / "p.csv"}
-    assert main(line("lengths", files, paths)) == 3
+    paths = {"-o": tmp_path / "l.csv", "--pairs": tmp_path / "none" / "p.csv"}
+    assert main(line("run --lengths", files, paths)) == 3
     first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith(f"{paths['--csv']}: exists already") and second.startswith(
+    assert first.startswith(f"{paths['-o']}: exists already") and second.startswith(
         f"{paths['--pairs']}: cannot be"
     )
 
@@ -646,17 +648,17 @@ def test_a_page_without_its_extra_is_told_before_the_store_is_read(
                 "a page needs jinja2 and matplotlib; install them with: python -m pip install"
                 " 'ballplate[report]'"
             )
-            refused(["report", str(files / "store.sqlite")], capsys, 3, told)
+            refused(["sweep", "--report", str(files / "store.sqlite")], capsys, 3, told)
 
 
 def test_a_file_to_which_standard_output_goes(files: Path, tmp_path: Path) -> None:
     path = tmp_path / "l.csv"
-    arguments = line("lengths", files, {"--csv": path}, "--force")
+    arguments = line("run --lengths", files, {"-o": path}, "--force")
     with path.open("w") as stream:
         found = subprocess.run(
             [sys.executable, "-m", "ballplate", *arguments], stdout=stream, stderr=subprocess.PIPE
         )
-    told = f"ballplate lengths: --csv {path} is where standard output goes; name another file\n"
+    told = f"ballplate run --lengths: -o {path} is where standard output goes; name another file\n"
     assert (found.returncode, found.stderr.decode()) == (2, told)
 
 
@@ -704,7 +706,7 @@ def fault(
 
 FAULTS = ("limit of size", "full disk at the last", "held open by another program", "interrupted")
 # What becomes of several files is the same whatever command writes them.
-SEVERAL = ("simulate", "lengths")
+SEVERAL = ("simulate", "run --lengths")
 WRITING = [command for command, walk in WALK.items() if walk.writes]
 
 
@@ -1004,7 +1006,7 @@ def test_a_pipe_is_written_as_it_is(tmp_path: Path) -> None:
 def test_standard_output_by_its_name(files: Path, tmp_path: Path) -> None:
     """Before what is printed, and neither over the other, also where it goes to a file."""
     path = tmp_path / "all.txt"
-    arguments = line("lengths", files, {"--csv": Path("/dev/stdout")})
+    arguments = line("run --lengths", files, {"-o": Path("/dev/stdout")})
     with path.open("w") as stream:
         found = subprocess.run([sys.executable, "-m", "ballplate", *arguments], stdout=stream)
     assert found.returncode in (0, 1)
@@ -1113,8 +1115,8 @@ def test_a_folder_in_the_place_of_a_store(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "page.html").write_text("mine")
-    assert main(["report", ".", "--output", "page.html"]) == 3
+    assert main(["sweep", "--report", ".", "--output", "page.html"]) == 3
     assert (tmp_path / "page.html").read_text() == "mine"
-    assert main(["report", ".", "--output", "page.html", "--force"]) == 3
+    assert main(["sweep", "--report", ".", "--output", "page.html", "--force"]) == 3
     assert (tmp_path / "page.html").read_text() == "mine"
     assert all(line for line in capsys.readouterr().err.splitlines())

@@ -53,16 +53,17 @@ ENDING = {
     "plan by two": ((*PLAN, "--workers", 2), 9.0),
     "sweep by one": (("sweep", "many.yaml", "--workers", 1, "--store", "new.sqlite"), 5.0),
     "sweep by two": (("sweep", "many.yaml", "--workers", 2, "--store", "new.sqlite"), 7.0),
-    "report": (("report", "small.sqlite", "-o", "page.html"), 2.0),
-    "export": (("export", "small.sqlite", "-o", "table.csv"), 0.8),
+    "report": (("sweep", "--report", "small.sqlite", "-o", "page.html"), 2.0),
+    "export": (("sweep", "--export", "small.sqlite", "-o", "table.csv"), 0.8),
     "reach": (("reach", DESIGNS / "npl/5.3.yaml"), 1.5),
     "lengths": (
         (
-            "lengths",
+            "run",
+            "--lengths",
             DESIGNS / "quickstart.yaml",
             "--grid",
             12,
-            "--csv",
+            "-o",
             "points.csv",
             "--plot",
             "u.svg",
@@ -70,7 +71,15 @@ ENDING = {
         2.5,
     ),
     "reliability": (
-        ("reliability", DESIGNS / "npl/6.2.7.yaml", "--variant", "7 x 7", "--csv", "all.csv"),
+        (
+            "run",
+            "--reliability",
+            DESIGNS / "npl/6.2.7.yaml",
+            "--variant",
+            "7 x 7",
+            "-o",
+            "all.csv",
+        ),
         1.0,
     ),
     "fit": (

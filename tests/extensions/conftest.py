@@ -23,5 +23,5 @@ def plate_sizes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plate_sizes_page(plate_sizes: Path) -> Path:
     """Its page."""
     page = plate_sizes.with_suffix(".html")
-    assert main(["report", str(plate_sizes), "-o", str(page)]) == 0
+    assert main(["sweep", "--report", str(plate_sizes), "-o", str(page)]) == 0
     return page

@@ -157,8 +157,8 @@ def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
         ["correct", "MAP", "points.csv"],
         ["map", "MAP", "--grid", "2,2,2"],
         ["map", "MAP", "--error", "EXX"],
-        ["curves", "MAP"],
-        ["convert", "MAP", "--to", "metric"],
+        ["map", "--curves", "MAP"],
+        ["map", "--convert", "MAP", "--to", "metric"],
         ["adjust", "MAP", "--scale", "x=10 um/m"],
         ["diff", "MAP", "clean.npz"],
         ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
@@ -215,7 +215,7 @@ def test_maps_made_of_a_map_carry_it(
     monkeypatch.chdir(tmp_path)
     before = bp.load_map(maps["beyond"])
     if kind == "conversion":
-        main(["convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
+        main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
     elif kind == "adjustment":
         main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.npz"])
     else:

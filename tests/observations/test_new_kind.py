@@ -202,7 +202,7 @@ print(json.dumps({
     "angle fit": said("fit", corner, readings + "2", "--certificate", angle_certificate, "--json"),
     "angle reliability": angular.to_dict(),
     "angle reliability table": angular.lines(),
-    "export": said("export", store, "-o", "-"),
+    "export": said("sweep", "--export", store, "-o", "-"),
 }))
 """
 

@@ -172,12 +172,12 @@ def test_harmless_is_said_of_no_offset_that_a_task_may_feel(
     """Perpendicular to a task an offset does not change it, but does change other lengths."""
     text, path = with_tasks(PLATE), tmp_path / "it.yaml"
     path.write_text(text, encoding="utf-8")
-    assert main(["reliability", str(path), "--json"]) == 0
+    assert main(["run", "--reliability", str(path), "--json"]) == 0
     by_name = {one["name"]: one for one in json.loads(capsys.readouterr().out)["events"]}
     for axis in "xyz":
         assert by_name[f"offset {axis} of probe down"]["harmless"] is False
     assert by_name["offset y of probe down"]["effects"]["tasks"]["per_unit"] < 1e-6
-    assert main(["reliability", str(path)]) == 0
+    assert main(["run", "--reliability", str(path)]) == 0
     out = capsys.readouterr().out
     assert "harmless" not in out and "tasks, µm" in out
     assert "offset y of probe down; it changes distances between points of tasks' probes" in out
@@ -188,7 +188,7 @@ def test_harmless_is_said_of_no_offset_that_a_task_may_feel(
         .replace("[left, left]", "[down, down]"),
         encoding="utf-8",
     )
-    assert main(["reliability", str(path)]) == 0
+    assert main(["run", "--reliability", str(path)]) == 0
     out = capsys.readouterr().out
     assert "harmless: offset x of probe down" in out
     assert "no distance changes, between balls or corrected points of probe down\n" in out

@@ -183,8 +183,8 @@ WARM_UP = (
     "run small.yaml --trials 4 --seed 3 --workers 1",
     "plan pool.yaml --positions 2 --workers 1 --plot out.svg",
     "sweep trials.yaml --workers 1",
-    "export trials.sqlite -o out.parquet",
-    "report sweep.sqlite -o out.html",
+    "'sweep --export' trials.sqlite -o out.parquet",
+    "'sweep --report' sweep.sqlite -o out.html",
     "spline curve.csv --plot out.pdf",
 )
 
@@ -279,7 +279,7 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     if command == "sweep":
         file = options.file if options.file.name else options.file / "nothing"
         stores = {options.store or file.with_suffix(".sqlite")}
-    elif command in ("export", "report"):
+    elif command in ("sweep --export", "sweep --report"):
         stores = {options.store}
     if command == "compensation":
         # Tables of single axes, or of errors, beside what is named.

@@ -33,11 +33,11 @@ RECIPES = (
     "reach small.yaml --by certificate --target '5 um' --json",
     "reach bar-bell.yaml --variant 'length known' --by certificate --calibration 0 --artefact bar",
     "reach small.yaml --by repeats --goal tasks",
-    "lengths small.yaml --grid 3 --csv out.csv --pairs pairs.csv",
-    "lengths tables.yaml --grid 3,2,2 --target '1 um + L/100000' --probe right --json",
-    "lengths small.yaml --grid 2 --plot out.svg --coverage-factor 2 --with-repeatability --fail",
-    "reliability small.yaml --csv out.csv --all",
-    "reliability tables.yaml --false-alarm 1% --power 90% --sigma given --json",
+    "'run --lengths' small.yaml --grid 3 -o out.csv --pairs pairs.csv",
+    "'run --lengths' tables.yaml --grid 3,2,2 --target '1 um + L/100000' --probe right --json",
+    "'run --lengths' small.yaml --grid 2 --plot out.svg --coverage-factor 2 --with-repeatability --fail",
+    "'run --reliability' small.yaml -o out.csv --all",
+    "'run --reliability' tables.yaml --false-alarm 1% --power 90% --sigma given --json",
     "simulate small.yaml -o out.csv --certificate certificate.csv --seed 4",
     "simulate tables.yaml -o - --exact",
     "simulate splines.yaml --variant plain -o old.csv --force",
@@ -74,22 +74,22 @@ RECIPES = (
     "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
-    "diff map.yaml map.npz --grid 2 --csv out.csv",
+    "diff map.yaml map.npz --grid 2 -o out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
     "diff map.yaml map.npz --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
     "fit small.yaml small-readings.csv --trials 2 --seed 3 --workers 1",
-    "ladder small.yaml small-readings.csv --coefficients 3",
+    "models small.yaml small-readings.csv --coefficients 3",
     (
-        "ladder tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma given"
+        "models tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma given"
         " --coefficients 3 --json"
     ),
     "validate small.yaml small-readings.csv --sigma estimated",
     (
-        "validate tables.yaml tables-readings.csv --certificate tables-certificate.csv --against"
-        " tables-again.csv --other-plate --json"
+        "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv"
+        " --shared certificate --json"
     ),
-    "convert map.yaml --to empirical -o out.yaml",
-    "convert map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
+    "'map --convert' map.yaml --to empirical -o out.yaml",
+    "'map --convert' map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"
@@ -101,14 +101,14 @@ RECIPES = (
     "sweep ranges.yaml --dry-run",
     "sweep subsets.yaml --dry-run --workers 1",
     "sweep variants.yaml --dry-run --workers 1",
-    "export sweep.sqlite -o out.csv",
-    "export trials.sqlite -o out.parquet --sweep 1",
-    "export trials.sqlite -o -",
-    "report sweep.sqlite -o out.html",
-    "report trials.sqlite --format csv",
-    "report sweep.sqlite --format markdown",
-    "report trials.sqlite --format latex",
-    "report trials.sqlite --format text",
+    "'sweep --export' sweep.sqlite -o out.csv",
+    "'sweep --export' trials.sqlite -o out.parquet --sweep 1",
+    "'sweep --export' trials.sqlite -o -",
+    "'sweep --report' sweep.sqlite -o out.html",
+    "'sweep --report' trials.sqlite --format csv",
+    "'sweep --report' sweep.sqlite --format markdown",
+    "'sweep --report' trials.sqlite --format latex",
+    "'sweep --report' trials.sqlite --format text",
     "sheet small.yaml",
     "sheet small.yaml -o sheet.html --readings template.csv --points out.csv",
     "import z-low.dmo --for quickstart.yaml -o out.csv",
@@ -120,8 +120,8 @@ RECIPES = (
     "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
     "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
     "map map.yaml --points to-correct.csv --format csv",
-    "curves map.yaml --plot out.svg",
-    "curves map.npz --error EXX --error EC0Y --points 5 --format csv",
+    "'map --curves' map.yaml --plot out.svg",
+    "'map --curves' map.npz --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
     "compensation machine.yaml --format isg --pitch '100 mm' -o out.csv",
     "compensation machine.yaml --format csv --sense indication --origin '0 mm, 9 mm, 9 mm' -o out.csv",
@@ -131,7 +131,7 @@ RECIPES = (
         " --origin '100 mm, 0 mm, 0 mm' -o out.cma"
     ),
     "compensation volcomp.csv --format isg --read --sense corrections --arrangement MB2 -o out.yaml",
-    "spline curve.csv --evaluate '10 mm, 50 mm' --coefficients out.csv --powers global",
+    "spline curve.csv --evaluate '10 mm, 50 mm' -o out.csv --powers global",
     (
         "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"
         " --plot out.svg"
@@ -151,8 +151,8 @@ RECIPES = (
     "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
     "schema sweep",
-    "budget small.yaml --by position",
-    "budget tables.yaml tables-readings.csv --certificate tables-certificate.csv --json",
+    "'run --budget' small.yaml --by position",
+    "'run --budget' tables.yaml tables-readings.csv --certificate tables-certificate.csv --json",
     "init out.yaml",
     "init --machine out.yaml",
 )

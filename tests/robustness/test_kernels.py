@@ -55,13 +55,13 @@ COMMANDS = [
     "check --suggest small.yaml",
     "run npl.yaml quickstart.yaml centred.yaml",
     "run --json small.yaml",
-    "reliability npl.yaml --variant B",
-    "reliability small.yaml",
+    "run --reliability npl.yaml --variant B",
+    "run --reliability small.yaml",
     "simulate npl.yaml --variant B -o npl.csv",
     "fit npl.yaml npl.csv --variant B",
     "simulate centred.yaml -o centred.csv",
     "fit centred.yaml centred.csv",
-    "lengths centred.yaml",
+    "run --lengths centred.yaml",
     "plan pool.yaml --positions 3 --workers 1",
 ]
 

@@ -141,7 +141,7 @@ def test_files_of_windows_say_the_same(tmp_path: Path, capsys: pytest.CaptureFix
     for command in (
         ["run", "--json", "NAME.yaml"],
         ["fit", "NAME.yaml", "NAME-readings.csv"],
-        ["spline", "NAME-errors.csv", "--coefficients", "-"],
+        ["spline", "NAME-errors.csv", "-o", "-"],
     ):
         told = []
         for name in ("unix", "dos"):

@@ -279,7 +279,7 @@ def reported(folder: Path, sections: dict[str, Any]) -> None:
     rows = [(1, name, content) for name, content in contents.items()]
     store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
-    assert main(["report", "own.sqlite", "-o", "own.html"]) == 0
+    assert main(["sweep", "--report", "own.sqlite", "-o", "own.html"]) == 0
     page = (folder / "own.html").read_text(encoding="utf-8")
     # Readings are for a fit, and nothing of them is read for a drawing.
     refused = "modules are not allowed here" in page or "files are read from here" in page

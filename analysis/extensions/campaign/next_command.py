@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from .next_result import NextStep
 
-GROUP = "measure"
-HELP = "tell after each position whether the target is met, and what to read next"
 DESCRIPTION = (
     "Judge the readings taken so far: the scatter that the residuals show, suspected gross errors,"
     " the uncertainty U6 reached, and either that the target is met or the position that is best"

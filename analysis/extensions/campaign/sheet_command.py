@@ -10,8 +10,6 @@ from ballplate.cli.outputs import UsageError, add_force, add_output
 
 SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".csv",)
 
-GROUP = "measure"
-HELP = "write a run sheet to print, a table to fill in and points for a machine's program"
 DESCRIPTION = (
     "Write what goes to the laboratory with a design: a run sheet to print and tick off, a CSV"
     " file of the readings in order with empty cells, which fit reads when they are filled in, and"

@@ -12,8 +12,6 @@ from ballplate.cli.reading_options import add_readings, observed_readings, warn_
 
 ENDINGS = (".html", ".csv", ".xml", ".json")
 
-GROUP = "evaluate"
-HELP = "state a plate's ball co-ordinates with their covariance: page, CSV, DCC, GTC archive"
 DESCRIPTION = (
     "Fit readings and state the co-ordinates of a plate's balls in the plate's own axes with their"
     " full covariance, and distances with U: as a page (.html), as tables that calibration items"

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 FORMATS = ("csv", "isg", "heidenhain")
 
-GROUP = "use"
-HELP = "write compensation tables of a machine for controllers, or read them"
 DESCRIPTION = (
     "Write the errors of a machine file, or of a map that fit left behind, as a compensation"
     " table: CSV with ISO 230-1 columns, the ISG CSV format of volumetric compensation (ISG"

@@ -1,4 +1,4 @@
-"""`ballplate budget`: what each source contributes to the uncertainties of a design or a fit."""
+"""`ballplate run --budget`: contributions of each source to uncertainties of a design or a fit."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from ballplate.cli.reading_options import add_readings, observed_readings, warn_
 from ballplate.cli.table_options import KEYS
 from ballplate.results.groupings import GROUPINGS
 
-GROUP = "more"
-HELP = "split uncertainties by their sources: readings, certificates, probes, influences"
 DESCRIPTION = (
     "Compute what each source of uncertainty contributes to U4, U6, the body diagonals and the"
     " measuring tasks: readings, every item of calibration, offsets of probes, priors and influence"

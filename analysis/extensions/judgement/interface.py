@@ -1,4 +1,4 @@
-"""Judgement of a fit from Python: models, data left out, two campaigns, uncertainty budget."""
+"""Judgement of a fit from Python: models, data left out, uncertainty budget."""
 
 from __future__ import annotations
 
@@ -25,12 +25,11 @@ if TYPE_CHECKING:
     from ballplate.results.fit import Fit
 
     from .budget import UncertaintyBudget
-    from .cross_validation import CrossValidation
     from .ladder_result import Ladder
     from .left_out_result import Validation
 
 
-def ladder(
+def models(
     experiment: Experiment | PathLike,
     readings: Tables = None,
     sigma: Literal["estimated", "given"] | None = None,
@@ -43,7 +42,7 @@ def ladder(
 
     >>> import ballplate as bp
     >>> readings = bp.simulate(bp.quickstart())
-    >>> bp.ladder(bp.quickstart(), readings, coefficients=6).recommended
+    >>> bp.models(bp.quickstart(), readings, coefficients=6).recommended
     'kinematic, 5 and 5 coefficients'
     """
     from .ladder import ladder as compared
@@ -74,30 +73,6 @@ def validate(
     ensure_report(report)
     chosen, observed = observed_of(experiment, readings, certificate)
     return predicted(chosen, observed, sigma, report)
-
-
-def cross_validate(
-    experiment: Experiment | PathLike,
-    readings: Tables,
-    against: Tables,
-    sigma: Literal["estimated", "given"] | None = None,
-    certificate: PathLike | pandas.DataFrame | None = None,
-    common: bool = True,
-) -> CrossValidation:
-    """Readings of two campaigns by the same experiment compared throughout the volume, the rigid
-    motion between what they find taken out. Errors of certificates are in `common`, unless the
-    second campaign read another plate.
-
-    >>> import ballplate as bp
-    >>> twice = [bp.simulate(bp.quickstart(), seed) for seed in (1, 2)]
-    >>> bp.cross_validate(bp.quickstart(), *twice, common=False).complaint
-    ''
-    """
-    from .cross_validation import cross_validate as compared
-
-    ensure_one_of(SIGMAS, sigma=sigma)
-    chosen, first = observed_of(experiment, readings, certificate)
-    return compared(chosen, first, observed_of(chosen, against, None)[1], sigma, common)
 
 
 def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:

@@ -133,7 +133,7 @@ class Validation(FitResult):
             *lines,
             (
                 f"predicted wrongly: {names}; the error model is too poor there, or the readings or"
-                " certificates contradict one another: see ballplate ladder and what fit suspects"
+                " certificates contradict one another: see ballplate models and what fit suspects"
             ),
         ]
 

@@ -10,8 +10,6 @@ from ballplate.cli.outputs import add_force, add_output, text_writer, write
 from ballplate.cli.table_options import rule
 from ballplate.cli.telling import complain, note
 
-GROUP = "measure"
-HELP = "make a table of readings of reports of CMM programs"
 DESCRIPTION = (
     "Read the centres of spheres out of reports that measuring programs write (DMIS output,"
     " PC-DMIS, Calypso, QIF), and write them as a table for fit. Positions, balls and probes are"

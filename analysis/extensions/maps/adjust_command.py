@@ -14,14 +14,12 @@ from ballplate.cli.telling import warn
 if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
 
-GROUP = "use"
-HELP = "predict what adjustments leave of a machine's errors, and compare with a second campaign"
 DESCRIPTION = (
     "Apply stated changes of scales and turns of guideways to a fitted machine: of a map file, or"
     " of an experiment with its readings. Predict what remains of scale errors, angles between the"
     " axes and errors along the diagonals of the volume, with U, and compare with what a second"
-    " campaign finds, by E_n. The exit status is 1 if that differs by more than the uncertainties,"
-    " or a fit is not as expected, otherwise 0."
+    " campaign finds, as diff does. The exit status is 1 if that shows a change, or nothing can be"
+    " compared, or a fit is not as expected, otherwise 0."
 )
 
 
@@ -103,7 +101,7 @@ def run(options: Namespace) -> int:
         write_noted(options, {options.output: lambda path: write_map(predicted, path)})
     show(options, found)
     warn(found.notes)
-    return 1 if complaint or (found.found is not None and not found.is_within) else 0
+    return 1 if complaint or (found.difference is not None and not found.is_within) else 0
 
 
 def _second(options: Namespace) -> tuple[FittedMap | None, bool]:

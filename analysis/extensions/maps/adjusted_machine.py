@@ -23,25 +23,20 @@ from ballplate.simulator.machines.protocol import Array, Unit
 from ballplate.simulator.maps.fit_verdict import verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap, readings_in_common
 
+from .comparison import ComparisonSettings
 from .corrected_points import corrected, drawn_rows
 from .machine_changes import MachineChange
-from .second_campaign import (
-    ROUNDING,
-    CampaignComparison,
-    CampaignFigures,
-    compared_campaigns,
-)
+from .map_difference import INDEPENDENT, MapDifference
+from .sources import map_difference
 
 # Points along each axis at which a change of the machine is followed, and the part of it that the
 # model may leave out.
 POINTS_ALONG = 4
 LEFT_OUT = 1e-3
+# Figures below this, in metres and radians, are rounding.
+ROUNDING = 1e-13
 
 CAMPAIGNS = "the first campaign", "the second campaign"
-INDEPENDENT = (
-    "The two campaigns are taken as independent. What both rest on alike, such as one certificate,"
-    " has no part in their difference and makes E_n too small."
-)
 
 
 @dataclass(frozen=True)
@@ -185,13 +180,9 @@ def _followed(fitted: FittedMap, values: Array, change: MachineChange) -> Array:
 class AdjustedMachine(Result):
     """What adjustments of a machine leave of its errors, and what a second campaign found.
 
-    `before` and `predicted` are the figures of `lines`, `found` those of the second campaign, None
-    without one; `normalised_errors` (m,) are their E_n, NaN where one is undetermined and where
-    both are exactly known and the same, infinite where they are exactly known and differ.
-    `compared` counts figures that have an E_n, and `largest_by_chance` is the size of E_n that any
-    of them exceeds at most once in a hundred by chance. `overall` compares scales and angles
-    together, as E_n does one: at most 1 in at least 95 % of pairs of campaigns, where nothing else
-    has changed. `predicted_map` is the machine as predicted.
+    `before` and `predicted` are the figures of `lines_of_machine`, `found` those of the second
+    campaign, and `difference` is that of its map less `predicted_map`, the machine as predicted;
+    both are None without a second campaign.
     """
 
     label: str
@@ -201,49 +192,48 @@ class AdjustedMachine(Result):
     before: tuple[LineValue, ...]
     predicted: tuple[LineValue, ...]
     found: tuple[LineValue, ...] | None
-    normalised_errors: Array
-    overall: float
-    compared: int
-    largest_by_chance: float
+    difference: MapDifference | None
     coverage_factor: float
     predicted_map: FittedMap
     remarks: tuple[str, ...] = ()
     verdicts: tuple[str, ...] = ()
 
     @property
-    def is_within(self) -> bool:
-        """Whether what was compared differs by no more than its uncertainties explain: scales and
-        angles together, and no single figure by as much as one of as many does once in a hundred.
+    def normalised_errors(self) -> Array:
+        """E_n (m,) of the figures; NaN where one is undetermined or exactly known."""
+        errors = []
+        for predicted, found in zip(self.predicted, self.found or (), strict=False):
+            u = np.hypot(predicted.standard_uncertainty, found.standard_uncertainty)
+            is_known = u > ROUNDING
+            apart = found.value - predicted.value
+            errors.append(apart / (self.coverage_factor * u) if is_known else np.nan)
+        return np.array(errors or [np.nan] * len(self.lines_of_machine))
+
+    @property
+    def is_within(self) -> bool | None:
+        """Whether the joint test of the second campaign's map shows no change from the prediction;
+        None where nothing can be tested.
         """
-        one_by_one = np.abs(self.normalised_errors[~np.isnan(self.normalised_errors)])
-        return bool((one_by_one <= self.largest_by_chance).all()) and not self.overall > 1.0
+        changed = None if self.difference is None else self.difference.is_changed
+        return None if changed is None else not changed
 
     @property
     def notes(self) -> tuple[str, ...]:
-        return (*self.remarks, *([INDEPENDENT] if self.found is not None else []))
+        return (*self.remarks, *(() if self.difference is None else (INDEPENDENT,)))
 
     def headline(self) -> str:
-        if self.found is None:
+        if self.difference is None:
             count = len(self.changes)
             return f"{number_of(count, 'change')}, predicted"
-        if not self.compared:
-            if any(self._is_exact(i) for i in range(len(self.lines_of_machine))):
-                return (
-                    "as predicted: figures that are exactly known by both campaigns, and the same"
-                )
-            return "nothing is determined by both campaigns"
-        return (
-            f"{'as predicted' if self.is_within else 'not as predicted'}: |E_n| at most"
-            f" {number(float(np.nanmax(np.abs(self.normalised_errors))), 3)} (of"
-            f" {self.compared}, above {number(self.largest_by_chance, 3)} at most once in a"
-            f" hundred), overall {number(self.overall, 3)} (above 1 at most once in twenty)"
-        )
+        verdicts = {True: "as predicted: ", False: "not as predicted: ", None: ""}
+        return f"{verdicts[self.is_within]}{self.difference.headline()}"
 
     def lines(self) -> list[str]:
         k = f"{self.coverage_factor:g}"
         heads = ["quantity", "before", f"U (k = {k})", "predicted", f"U (k = {k})"]
         heads += [] if self.found is None else ["found", f"U (k = {k})", "E_n"]
         rows = [[*heads, "unit"]]
+        errors = self.normalised_errors
         for i, one in enumerate(self.lines_of_machine):
             shown = {"rad": ARCSECOND, "1": 1e-6, "m": 1e-6}[one.unit]
             pairs = [self.before[i], self.predicted[i], *([self.found[i]] if self.found else [])]
@@ -255,7 +245,7 @@ class AdjustedMachine(Result):
                     _shown(self.coverage_factor * pair.standard_uncertainty / shown),
                 )
             ]
-            cells += [] if self.found is None else [self._shown_error(i)]
+            cells += [] if self.found is None else [_shown(float(errors[i]), "-")]
             unit = {"rad": "arcsec", "1": "µm/m", "m": "µm"}[one.unit]
             rows.append([one.name, *cells, unit])
         table = aligned(rows, [False, *[True] * (len(heads) - 1), False])
@@ -267,17 +257,8 @@ class AdjustedMachine(Result):
         changes = [one.words for one in self.changes]
         return [*changes, *self.verdicts, "", *table, *said, "", self.headline()]
 
-    def _shown_error(self, i: int) -> str:
-        """E_n of a figure; there is none where both campaigns know it exactly, and the same."""
-        error = float(self.normalised_errors[i])
-        return "-" if self._is_exact(i) and np.isnan(error) else _shown(error)
-
-    def _is_exact(self, i: int) -> bool:
-        """Whether a figure has no uncertainty in the prediction, nor in a second campaign."""
-        both = (self.predicted[i], *([self.found[i]] if self.found is not None else []))
-        return all(one.standard_uncertainty <= ROUNDING for one in both)
-
     def to_dict(self) -> dict[str, Any]:
+        errors = self.normalised_errors
         return {
             "title": self.title,
             "changes": [
@@ -297,21 +278,19 @@ class AdjustedMachine(Result):
                     "before": _data(self.before[i]),
                     "predicted": _data(self.predicted[i]),
                     **({} if self.found is None else {"found": _data(self.found[i])}),
-                    "normalised_error": finite(float(self.normalised_errors[i])),
+                    "normalised_error": finite(float(errors[i])),
                 }
                 for i, one in enumerate(self.lines_of_machine)
             },
-            "overall": finite(self.overall),
-            "compared": self.compared,
-            "largest_by_chance": finite(self.largest_by_chance),
-            "within": self.is_within if self.compared else None,
+            "within": self.is_within,
+            "difference": None if self.difference is None else self.difference.to_dict(),
             "lack_of_fit": list(self.verdicts),
             "notes": list(self.notes),
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each quantity."""
-        nothing = LineValue(np.nan, np.nan)
+        nothing, errors = LineValue(np.nan, np.nan), self.normalised_errors
         return [
             {
                 "quantity": one.name,
@@ -322,14 +301,14 @@ class AdjustedMachine(Result):
                 "u predicted": self.predicted[i].standard_uncertainty,
                 "found": (self.found[i] if self.found else nothing).value,
                 "u found": (self.found[i] if self.found else nothing).standard_uncertainty,
-                "E_n": float(self.normalised_errors[i]),
+                "E_n": float(errors[i]),
             }
             for i, one in enumerate(self.lines_of_machine)
         ]
 
 
-def _shown(value: float) -> str:
-    return "undetermined" if np.isnan(value) else number(value)
+def _shown(value: float, otherwise: str = "undetermined") -> str:
+    return otherwise if np.isnan(value) else number(value)
 
 
 def _data(one: LineValue) -> dict[str, Any]:
@@ -365,12 +344,10 @@ def adjusted_machine(
     k = fitted.coverage_factor
     before, predicted = line_values(fitted, lines), line_values(after, lines)
     found = None if second is None else line_values(second, lines)
-    comparison = CampaignComparison(np.full(len(lines), np.nan), 0, 1.0, float("nan"))
-    if second is not None and found is not None:
-        together = np.array([one.kind != "diagonal" for one in lines])
+    difference = None
+    if second is not None:
         # The changes' own uncertainty counts as part of the first campaign's, which is no smaller.
-        both = _figures(fitted, predicted), _figures(second, found)
-        comparison = compared_campaigns(*both, together, k)
+        difference = map_difference((after, second), ComparisonSettings(k))
     return AdjustedMachine(
         label,
         fitted.title,
@@ -379,10 +356,7 @@ def adjusted_machine(
         _listed(before),
         _listed(predicted),
         None if found is None else _listed(found),
-        comparison.normalised_errors,
-        comparison.overall,
-        comparison.compared,
-        comparison.largest_by_chance,
+        difference,
         k,
         after,
         _doubts(fitted, second),
@@ -392,12 +366,6 @@ def adjusted_machine(
             if one is not None
         ),
     )
-
-
-def _figures(fitted: FittedMap, found: tuple[Array, Array]) -> CampaignFigures:
-    """Figures of a campaign, with the degrees of freedom of its sigma."""
-    freedom = float(fitted.degrees_of_freedom) if fitted.sigma_is_estimated else np.inf
-    return CampaignFigures(*found, freedom)
 
 
 def _listed(found: tuple[Array, Array]) -> tuple[LineValue, ...]:

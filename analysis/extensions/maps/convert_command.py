@@ -1,4 +1,4 @@
-"""`ballplate convert`: the map of a fit in another error model."""
+"""`ballplate map --convert`: the map of a fit in another error model."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from pathlib import Path
 from ballplate.cli.common import FITTED, add_json, map_path
 from ballplate.cli.outputs import add_force, add_output, write
 
-GROUP = "more"
-HELP = "convert the map of a fit to another error model, with its covariance"
 DESCRIPTION = (
     "Convert a map that fit -o has written to another error model of the same volume: the nearest"
     " corrections by least squares, their covariance, and what the new model cannot follow in the"

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.simulator.readings.point_files import GivenPoints
 
-GROUP = "use"
-HELP = "correct points by the map of a fit, with their uncertainty"
 DESCRIPTION = (
     "Correct the scale readings of a CSV file by a map that fit -o has written: corrected"
     " co-ordinates, the correction that was added, and expanded uncertainties; lengths between"

@@ -1,4 +1,4 @@
-"""`ballplate curves`: the error functions of a fitted machine, with their bands."""
+"""`ballplate map --curves`: the error functions of a fitted machine, with their bands."""
 
 from __future__ import annotations
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from .fitted_errors_result import FittedErrorMap
     from .volumetric_results import MachineErrors
 
-GROUP = "more"
-HELP = "tell the parametric errors of a map that a fit left behind, with their uncertainties"
 DESCRIPTION = (
     "Tell every error function of a map file (fit -o) along its axis with its expanded uncertainty,"
     " the squareness errors as angles, and other numbers of the error model. Errors are the"

@@ -10,8 +10,6 @@ from ballplate.cli.outputs import UsageError, add_force, add_output, write
 
 from .lengths_command import coverage_factor
 
-GROUP = "evaluate"
-HELP = "compare two maps of a machine: which lengths, errors and balls have changed"
 DESCRIPTION = (
     "Compare two campaigns, or a campaign with an expected map: lengths, errors at points of the"
     " volume after the free motion between the frames is taken out, error functions, and balls"
@@ -35,6 +33,13 @@ def add_options(parser: ArgumentParser) -> None:
             "map file that fit -o wrote, machine file (an expected map), or experiment file whose"
             " section readings names its files; the second is compared with the first"
         ),
+    )
+    parser.add_argument(
+        "--readings",
+        metavar=("FIRST", "SECOND"),
+        nargs=2,
+        type=Path,
+        help="tables of readings of two experiment files, in place of those that they name",
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
@@ -87,7 +92,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fail", action="store_true", help="end with exit status 1 if a change is shown"
     )
-    add_output(parser, "--csv", metavar="FILE", help="write a line for each figure")
+    add_output(parser, "-o", "--output", metavar="FILE", help="write a line for each figure")
     add_picture(parser, "--plot", help="draw what changed, and E_n of all figures")
     add_force(parser)
     add_json(parser)
@@ -103,6 +108,7 @@ def _grid(text: str) -> int:
 def run(options: Namespace) -> int:
     """Compare, write and print; 1 with --fail if a change is shown."""
     from ballplate.cli.telling import complain
+    from ballplate.results.fit_of_file import fit_of_file
     from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
 
     from .comparison import ComparisonSettings, NotComparableError
@@ -114,8 +120,13 @@ def run(options: Namespace) -> int:
         stated = None
         if options.stated is not None:
             stated = Target(parse_length_function(options.stated), k).standard
+        first, second = (
+            options.files
+            if options.readings is None
+            else map(fit_of_file, options.files, options.readings)
+        )
         found = map_difference(
-            (options.files[0], options.files[1]),
+            (first, second),
             ComparisonSettings(k, options.grid, options.points, options.probe),
             options.shared is not None,
             stated,
@@ -123,7 +134,7 @@ def run(options: Namespace) -> int:
         )
     except (NotComparableError, NothingSharedError, QuantityError) as error:
         raise UsageError(error) from None
-    write(options, {options.csv: found.to_csv, options.plot: found.plot})
+    write(options, {options.output: found.to_csv, options.plot: found.plot})
     show(options, found)
     for note in found.notes:
         complain(note)

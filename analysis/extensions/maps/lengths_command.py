@@ -1,4 +1,4 @@
-"""`ballplate lengths`: lengths throughout the volume against a target."""
+"""`ballplate run --lengths`: lengths throughout the volume against a target."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ from ballplate.cli.outputs import (
 MOST_PAIRS = 500_000
 
 
-GROUP = "more"
-HELP = "map the uncertainty of lengths over the volume against a target"
 DESCRIPTION = (
     "Compute the standard uncertainty u of the length between every two points of a"
     " grid over the volume, measured on the corrected machine, and compare it and the"
@@ -77,7 +75,9 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="include the scatter of the two readings that measure a length",
     )
-    add_output(parser, "--csv", metavar="FILE", help="write a line for each point of the grid")
+    add_output(
+        parser, "-o", "--output", metavar="FILE", help="write a line for each point of the grid"
+    )
     add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")
     add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
     add_force(parser)
@@ -121,7 +121,7 @@ def run(options: Namespace) -> int:
     with progress(options) as shown:
         found = length_map(experiment, settings, shown.show)
     contents: dict[Path | None, Writer] = {
-        options.csv: _of_lines(point_csv(found)),
+        options.output: _of_lines(point_csv(found)),
         options.pairs: _of_lines(pair_csv(experiment, settings)),
         options.plot: found.plot,
     }

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from .map_places import Line
 
 
-GROUP = "use"
-HELP = "compute volumetric errors of a machine file, or of the map that a fit left behind"
 DESCRIPTION = (
     "Combine the parametric errors of a machine file, systematic and random, or the estimates of a"
     " map file (fit -o), with their expanded uncertainties, into volumetric errors: on a grid with"

@@ -73,5 +73,6 @@ def unjudged(design: Design) -> str:
     if count <= MOST_JUDGED:
         return too_many_entries(design)
     return (
-        f"{count} readings are too many to be judged one by one here; ballplate reliability does it"
+        f"{count} readings are too many to be judged one by one here; ballplate run --reliability"
+        " does it"
     )

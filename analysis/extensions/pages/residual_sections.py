@@ -204,7 +204,7 @@ def reliability_section(reliability: QuotedData) -> Html:
             caption = f"{title} that matter most"
             parts.append(table(f"reliability-{key}", caption, heads, rows, (0, 3, 5)))
             left = len(every) - len(rows)
-            told = f"{left} others are told by ballplate reliability --json."
+            told = f"{left} others are told by ballplate run --reliability --json."
             parts.append(note(told) if left else Html())
     return joined(parts)
 

@@ -1,5 +1,5 @@
-"""`ballplate reliability`: which biases a design would notice, and what those do that it would
-not.
+"""`ballplate run --reliability`: which biases a design would notice, and the
+effects of the others.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from functools import partial
 from ballplate.cli.common import add_file, add_json, number
 from ballplate.cli.outputs import UsageError, add_force, add_output, text_writer, write
 
-GROUP = "more"
-HELP = "find which biases of readings and certificates would be noticed, and what the others change"
 DESCRIPTION = (
     "Compute the redundancy of every observation of a design, the smallest biases of"
     " readings, certificates, probes and positions that a test of the residuals finds,"
@@ -47,7 +45,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--all", action="store_true", help="list every event, not only the worst of a kind"
     )
-    add_output(parser, "--csv", metavar="FILE", help="write a row for every observation")
+    add_output(parser, "-o", "--output", metavar="FILE", help="write a row for every observation")
     add_force(parser)
     add_json(parser)
 
@@ -74,10 +72,10 @@ def run(options: Namespace) -> int:
     if options.power <= options.false_alarm:
         raise UsageError("--power must be above --false-alarm; any test has at least that power")
     chosen = experiments(options)
-    if options.csv is not None and len(chosen) > 1:
+    if options.output is not None and len(chosen) > 1:
         names = ", ".join(str(one.name or one.label) for one in chosen)
         raise UsageError(
-            f"--csv writes the table of one experiment; choose one with --variant: {names}"
+            f"-o writes the table of one experiment; choose one with --variant: {names}"
         )
     found = []
     for k, experiment in enumerate(chosen):
@@ -85,8 +83,10 @@ def run(options: Namespace) -> int:
             result = reliability(
                 experiment, options.false_alarm, options.power, options.sigma, shown.show
             )
-        if options.csv is not None:
-            write(options, {options.csv: text_writer(partial(write_observations, result=result))})
+        if options.output is not None:
+            write(
+                options, {options.output: text_writer(partial(write_observations, result=result))}
+            )
         if options.json:
             found.append(result.to_dict())
         else:

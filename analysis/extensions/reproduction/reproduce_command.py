@@ -10,8 +10,6 @@ from pathlib import Path
 from ballplate.cli.common import trial_count
 from ballplate.cli.outputs import UsageError
 
-GROUP = "more"
-HELP = "compute published experiments or certified problems, and compare the figures"
 DESCRIPTION = (
     "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
     " shipped designs. Every legible figure is printed beside the computed one, with the"

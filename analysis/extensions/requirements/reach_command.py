@@ -10,8 +10,6 @@ from ballplate.cli.outputs import UsageError
 UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
 
 
-GROUP = "plan"
-HELP = "find the repeatability, certificate, repeats, balls or size that meets a target"
 DESCRIPTION = (
     "Solve for one unknown of a design at a time, with the others as in the file: the"
     " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from .read_points import CurvePoints
 
 
-GROUP = "more"
-HELP = "fit a spline with prescribed values and slopes to measured errors"
 DESCRIPTION = (
     "Fit a spline to errors along an axis or along the profile of a turned part, by least"
     " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
@@ -129,7 +127,8 @@ def add_options(parser: ArgumentParser) -> None:
     output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
     add_output(
         output,
-        "--coefficients",
+        "-o",
+        "--output",
         metavar="FILE",
         takes_screen=True,
         help="write the polynomials as CSV; - for the screen",
@@ -195,10 +194,10 @@ def run(options: Namespace) -> int:
     }
     if options.compensated is not None:
         contents[options.compensated] = found.compensated(options.nominal).csv()
-    polynomials = None if options.coefficients is None else found.coefficients()
-    is_screen = str(options.coefficients) == "-"
+    polynomials = None if options.output is None else found.coefficients()
+    is_screen = str(options.output) == "-"
     if polynomials is not None and not is_screen:
-        contents[options.coefficients] = polynomials
+        contents[options.output] = polynomials
     write(options, contents)
     if options.json:
         print_json([found.to_dict()])
@@ -235,5 +234,5 @@ def _check(options: Namespace, points: CurvePoints) -> None:
         raise UsageError("--magnification should be above 0, such as 200")
     if options.magnification is not None and options.whiskers is None:
         raise UsageError("--magnification is that of --whiskers; add that, or leave it out")
-    if options.json and str(options.coefficients) == "-":
-        raise UsageError("--json and --coefficients - both go to the screen; name a file for one")
+    if options.json and str(options.output) == "-":
+        raise UsageError("--json and -o - both go to the screen; name a file for one")

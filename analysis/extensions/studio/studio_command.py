@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 STUDIO = Needed("the studio needs", ("starlette", "uvicorn"), "studio")
 
-GROUP = "plan"
-HELP = "open a design in the browser, to move and change it and see its uncertainties"
 DESCRIPTION = (
     "Serve a page, to this machine only, on which the positions of a design are dragged, turned,"
     " added and switched off, and its settings changed, with rank, uncertainties and map after"

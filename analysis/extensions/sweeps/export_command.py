@@ -1,4 +1,4 @@
-"""`ballplate export`: a sweep's results as one table for other programs."""
+"""`ballplate sweep --export`: a sweep's results as one table for other programs."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 BAD_FILE = 3
 
 
-GROUP = "more"
-HELP = "write a sweep's results as CSV or Parquet"
 DESCRIPTION = (
     "Write a row for each cell of a store and a column for each figure, in metres and"
     " radians, with the unit in the column's name. From a damaged store, the cells that"

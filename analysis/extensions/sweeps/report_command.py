@@ -1,4 +1,4 @@
-"""`ballplate report`: a sweep's results as a page for people, or as tables for a document."""
+"""`ballplate sweep --report`: a page of a sweep's results, or their tables."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ SUFFIXES = {
 }
 
 
-GROUP = "more"
-HELP = "write a sweep's results as an HTML page, or its tables"
 DESCRIPTION = (
     "Write the results of a sweep as one HTML page that needs no network: tables,"
     " plots, rank, the best and the worst design; with --format text, markdown, csv or"
@@ -83,7 +81,7 @@ def run(options: Namespace) -> int:
         raise UsageError(f"{output} should end in one of {endings}; or state --format")
     form = options.format or SUFFIXES.get(suffix, "html")
     if form == "html" and PAGE.is_missing:
-        complain(f"ballplate report: {PAGE.told}")
+        complain(f"ballplate sweep --report: {PAGE.told}")
         return BAD_FILE
     if options.compare is not None and form != "html":
         raise UsageError("--compare is for the page; leave it out, or name a page with -o")

@@ -222,7 +222,7 @@ def shortcomings(store: Store, number: int, cells: int) -> tuple[str, ...]:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         told.append(f"cell {failed[0]}{more} failed: {reason}")
     if len(reasons) > MOST_REASONS:
-        told.append(f"and {len(reasons) - MOST_REASONS} reasons more; see ballplate export")
+        told.append(f"and {len(reasons) - MOST_REASONS} reasons more; see ballplate sweep --export")
     return tuple(told)
 
 

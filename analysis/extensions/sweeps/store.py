@@ -282,8 +282,8 @@ def definition_of(store: Store, sweep: int) -> dict[str, Any]:
         return checked_definition(sweep, *row)
     except (sqlite3.DatabaseError, UnreadableError) as error:
         text = (
-            f"the definition of sweep {sweep} cannot be read ({error}); ballplate export gives"
-            " its cells by their numbers"
+            f"the definition of sweep {sweep} cannot be read ({error}); ballplate sweep --export"
+            " gives its cells by their numbers"
         )
         raise StoreError(f"{store.path}: {text}") from None
 

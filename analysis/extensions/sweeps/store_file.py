@@ -27,8 +27,8 @@ PATIENCE = 20.0
 MAGIC = b"SQLite format 3\0"
 MEND = "name a store that ballplate sweep has made"
 GO_ON = (
-    "ballplate export and report give what can still be read, and ballplate sweep with --store and"
-    " a new name computes everything anew"
+    "ballplate sweep --export and --report give what can still be read, and ballplate sweep with"
+    " --store and a new name computes everything anew"
 )
 
 COLUMNS = {

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 BAD_FILE = 3
 
 
-GROUP = "plan"
-HELP = "compute a family of experiments into a store"
 DESCRIPTION = (
     "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
     " trials, Monte Carlo. Each finished cell is stored on disk; when started again, the"

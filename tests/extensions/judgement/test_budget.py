@@ -224,7 +224,7 @@ def test_what_is_undetermined_is_said(capsys: pytest.CaptureFixture[str]) -> Non
             whole[one.name].count,
             whole[one.name].undetermined,
         )
-    assert main(["budget", file]) == 0
+    assert main(["run", "--budget", file]) == 0
     line = next(
         line for line in capsys.readouterr().out.splitlines() if line.startswith("together")
     )
@@ -246,7 +246,7 @@ def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> N
 
 
 def test_options_without_readings_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["budget", str(TOP / "designs/quickstart.yaml"), "--sigma", "given"]) == 2
+    assert main(["run", "--budget", str(TOP / "designs/quickstart.yaml"), "--sigma", "given"]) == 2
     assert "--sigma goes with readings" in capsys.readouterr().err
 
 
@@ -270,7 +270,7 @@ def test_a_certificate_counts_whatever_is_said_of_the_table(
         ("with", [str(table), "--certificate", str(values)]),
         ("plain", [str(plain), "--unit", "mm", "--certificate", str(values)]),
     ):
-        assert main(["budget", design, *options, "--json"]) == (name != "without")
+        assert main(["run", "--budget", design, *options, "--json"]) == (name != "without")
         told[name] = json.loads(capsys.readouterr().out)
     assert told["with"] == told["plain"]
     assert told["with"]["sigma"] > 100.0 * told["without"]["sigma"]
@@ -296,7 +296,7 @@ def test_usage_shows_readings_in_brackets_where_they_may_be_left_out(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     for command, ending in (
-        ("budget", "FILE [READINGS ...]"),
+        ("run --budget", "FILE [READINGS ...]"),
         ("next", "FILE [READINGS ...]"),
         ("fit", "FILE [READINGS ...]"),
         ("import", "REPORT [REPORT ...]"),

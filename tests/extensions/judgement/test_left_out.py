@@ -1,6 +1,4 @@
-"""What is left out and predicted, against fits without it and dense linear algebra; two campaigns
-against their joint covariance.
-"""
+"""What is left out and predicted, against fits without it and dense linear algebra."""
 
 from __future__ import annotations
 
@@ -11,7 +9,6 @@ import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
-from ballplate.extensions.judgement.cross_validation import cross_validate
 from ballplate.extensions.judgement.left_out import (
     LeftGroup,
     groups_to_leave,
@@ -22,7 +19,6 @@ from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.same_readings import same_readings
@@ -223,37 +219,6 @@ def positions_of(experiment: Experiment) -> list[dict[str, object]]:
     return to_python(written(experiment.tree, "positions"))  # type: ignore[arg-type,return-value]
 
 
-def test_a_campaign_is_not_compared_with_itself() -> None:
-    """Neither in another order, nor with part of itself; positions read once are told."""
-    design = lay_out(small())
-    observed, other = campaign(design, 6), campaign(design, 7)
-    backwards = np.arange(len(observed.x))[::-1]
-    own, x = observed.design.readings, observed.x
-    some = np.flatnonzero(own.position > 0)
-    for rows in (np.arange(len(x)), backwards, some):
-        again = observe(design, own.select(rows), x[rows])
-        with pytest.raises(ExperimentError, match="both campaigns have the same readings"):
-            cross_validate(small(), observed, again)
-    assert cross_validate(small(), observed, other).cautions == ()
-    is_first = own.position == 0
-    mixed = np.where(is_first[:, None], x, other.x)
-    found = cross_validate(small(), observed, observe(design, own, mixed))
-    name = design.positions.names[0]
-    assert f"the same in both campaigns in {name}:" in found.cautions[0]
-    assert "may hide that the campaigns differ" in found.complaint
-    assert "agree" not in found.headline()
-    # So are the few that were read of a position, whichever campaign comes first.
-    rows = np.sort(np.concatenate([np.flatnonzero(is_first)[:4], np.flatnonzero(~is_first)]))
-    few = observe(design, own.select(rows), mixed[rows])
-    for pair in ((observed, few), (few, observed)):
-        assert cross_validate(small(), *pair).read_once == (name,)
-    # A nanometre makes other readings, of which most of a position have to be.
-    changed = np.flatnonzero(is_first)
-    for count, told in ((1, (name,)), (len(changed) // 2 + 1, ())):
-        mixed[changed[:count], 1] = x[changed[:count], 1] + 1e-9
-        assert cross_validate(small(), observed, observe(design, own, mixed)).read_once == told
-
-
 @pytest.mark.parametrize("digits", [9, 8, 7])
 def test_an_edit_makes_no_second_campaign(digits: int) -> None:
     """One reading of each position is left out, and the rest is rounded."""
@@ -265,8 +230,6 @@ def test_an_edit_makes_no_second_campaign(digits: int) -> None:
     for rows in (np.arange(len(x)), rest):
         again = observe(design, own.select(rows), np.round(x[rows], digits))
         assert same_readings(observed, again) == same_readings(again, observed) == "same"
-        with pytest.raises(ExperimentError, match="both campaigns have the same readings"):
-            cross_validate(small(), observed, again)
     # Part of a campaign is no other one either, and one of its own stays one, however coarse.
     half = np.flatnonzero(own.position < 3)
     part = observe(design, own.select(half), np.round(x[half], digits))
@@ -275,58 +238,3 @@ def test_an_edit_makes_no_second_campaign(digits: int) -> None:
         rounded = [replace(one, x=np.round(one.x, coarse)) for one in (observed, other)]
         for one, two in (rounded, (observed, rounded[1]), (rounded[0], other)):
             assert same_readings(one, two) == "none"
-
-
-def test_what_is_too_much_alike_is_doubted() -> None:
-    """Readings that all were moved by a tenth of their scatter are told by their likeness alone."""
-    design = lay_out(small())
-    observed = campaign(design, 6)
-    moved = 2e-8 * np.random.default_rng(5).standard_normal(observed.x.shape)
-    again = replace(observed, x=observed.x + moved)
-    found = cross_validate(small(), observed, again, "given")
-    # Their differences have a tenth of one campaign's scatter, of two 1 / sqrt(200).
-    assert found.sum_of_squares / found.dimensions == pytest.approx(1.0 / 200.0, rel=0.5)
-    assert scipy.stats.chi2.cdf(found.sum_of_squares, found.dimensions) < 1e-3
-    assert any("are as alike as these" in one for one in found.cautions)
-    assert not cross_validate(small(), observed, campaign(design, 7), "given").cautions
-
-
-def differences(count: int, common: bool = True) -> Real:
-    """Sums of squares, over their dimensions, of pairs of campaigns with the same certificate, or
-    each with its own.
-    """
-    design, found = lay_out(small()), []
-    for k in range(count):
-        seeds = [1000 + 2 * k + j for j in range(2)]
-        pair = [campaign(design, seed, k if common else seed) for seed in seeds]
-        one = cross_validate(small(), *pair, "given", common)
-        found.append(one.sum_of_squares / one.dimensions)
-        dimensions = one.dimensions
-    return np.array([*found, dimensions])
-
-
-@pytest.mark.parametrize("common", [True, False])
-def test_two_campaigns_differ_by_what_their_covariance_says(common: bool) -> None:
-    *ratios, dimensions = differences(10, common)
-    error = np.sqrt(2.0 / dimensions / len(ratios))
-    assert abs(np.mean(ratios) - 1.0) < 4.0 * error
-
-
-@pytest.mark.long
-def test_many_pairs_of_campaigns_differ_by_what_their_covariance_says() -> None:
-    *ratios, dimensions = differences(1000)
-    error = np.sqrt(2.0 / dimensions / len(ratios))
-    assert abs(np.mean(ratios) - 1.0) < 4.0 * error
-    beyond = np.mean(np.array(ratios) * dimensions > scipy.stats.chi2.isf(0.05, dimensions))
-    assert abs(beyond - 0.05) < 4.0 * np.sqrt(0.05 * 0.95 / len(ratios))
-
-
-def test_a_changed_machine_is_found() -> None:
-    design = lay_out(small())
-    first, second = campaign(design, 7), campaign(design, 8, 7)
-    x = second.x.copy()
-    x[:, 0] *= 1.0 + 4e-6
-    found = cross_validate(small(), first, replace(second, x=x), "given")
-    assert found.chance < 1e-6 and found.complaint
-    # An expansion of 4 ppm, of a length along x.
-    assert abs(found.lengths[0]) > 1e-6

@@ -118,7 +118,8 @@ def test_two_dimensions(tmp_path: Path) -> None:
 def test_the_command_writes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bp.write_map(fitted(), tmp_path / "map.yaml")
     arguments = [
-        "convert",
+        "map",
+        "--convert",
         str(tmp_path / "map.yaml"),
         "--to",
         "{kind: empirical, coefficients: 4}",
@@ -127,7 +128,7 @@ def test_the_command_writes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "the new error model does all that the old one did" in capsys.readouterr().out
     again = bp.load_map(tmp_path / "new.yaml")
     np.testing.assert_array_equal(again.values, bp.convert(fitted(), arguments[-1]).map.values)
-    assert main(["convert", str(tmp_path / "map.yaml"), "--to", "metric"]) == 1
+    assert main(["map", "--convert", str(tmp_path / "map.yaml"), "--to", "metric"]) == 1
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,7 @@ def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
         assert call(fit).to_dict() == call(fitted).to_dict()
     with pytest.raises(TypeError, match="give a fit, what its to_map"):
         bp.correct(3, points)  # type: ignore[arg-type]
-    for command, given in (("correct", [str(points)]), ("curves", [])):
+    for command, given in (("correct", [str(points)]), ("map", ["--curves"])):
         bp.write_map(fitted, folder / "named-map.yaml")
         told = []
         for name in ("named.yaml", "named-map.yaml"):

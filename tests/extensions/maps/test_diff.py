@@ -36,7 +36,7 @@ def test_maps_of_files_are_compared(
     tmp_path: Path, maps: list[str], fits: list[Fit], capsys: pytest.CaptureFixture[str]
 ) -> None:
     table, picture = tmp_path / "all.csv", tmp_path / "all.svg"
-    assert main(["diff", *maps, "--csv", str(table), "--plot", str(picture)]) == 0
+    assert main(["diff", *maps, "-o", str(table), "--plot", str(picture)]) == 0
     out = capsys.readouterr().out
     assert out.startswith("b less a: ") and "no change is shown" in out
     assert "the campaigns are taken to be independent" in out

@@ -400,12 +400,12 @@ def test_what_is_undetermined_is_said_everywhere(
         assert (moved > 1e-6) == bool(np.isnan(one.uncertainties).any()), one.name
     path = tmp_path / "map.yaml"
     bp.write_map(fitted, path)
-    assert main(["curves", str(path)]) == 0
+    assert main(["map", "--curves", str(path)]) == 0
     printed, told = capsys.readouterr()
     name = next(one.name for one in open_ if one.is_undetermined)
     line = next(line for line in printed.splitlines() if line.startswith(f"{name} "))
     assert "undetermined" in line and "undetermined; what these change is not stated" in told
-    assert main(["curves", str(path), "--format", "csv", "--error", name]) == 0
+    assert main(["map", "--curves", str(path), "--format", "csv", "--error", name]) == 0
     rows = capsys.readouterr().out.splitlines()[1:]
     # Zero where the frame holds it, and otherwise empty.
     assert {tuple(row.split(",")[3:5]) for row in rows} <= {("", ""), ("0", "0")} and len(
@@ -465,7 +465,7 @@ def test_commands_print_what_results_say(
     assert printed == found.to_dict()
     assert "correction" in printed["convention"] and printed["coverage_factor"] == 2.0
     picture = tmp_path / "curves.png"
-    assert main(["curves", str(path), "--plot", str(picture), "--error", "EXX"]) == 0
+    assert main(["map", "--curves", str(path), "--plot", str(picture), "--error", "EXX"]) == 0
     assert capsys.readouterr().out == "\n".join([*bp.curves(path, "EXX").lines(), ""])
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "<table" in bp.curves(path)._repr_html_() and "<table" in found._repr_html_()
@@ -511,7 +511,7 @@ def test_a_machine_file_has_no_map_and_no_probe(capsys: pytest.CaptureFixture[st
     gantry = str(TOP / "designs/park/machines/gec-like.yaml")
     assert main(["map", gantry, "--draw", "2"]) == 2
     assert "no random part" in capsys.readouterr().err
-    assert main(["curves", machine]) == 3
+    assert main(["map", "--curves", machine]) == 3
     assert "is no map file" in capsys.readouterr().err
 
 

@@ -201,7 +201,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         str(tmp_path / name) for name in ("design.yaml", "points.csv", "pairs.csv")
     )
     limits = ["--target", "0.1 um + L/10000000", "--grid", "3,2,3", "--coverage-factor", "1.5"]
-    assert main(["lengths", file, *limits, "--csv", points, "--pairs", pairs]) == 0
+    assert main(["run", "--lengths", file, *limits, "-o", points, "--pairs", pairs]) == 0
     out, err = capsys.readouterr()
     assert err == "" and "153 lengths between 18 points of a grid, with the probe down" in out
     assert (
@@ -223,7 +223,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     within = sum(float(row["u_um"]) <= float(row["target_um"]) for row in rows)
     assert within == found.whole.within[0]
     assert all(float(row["expanded_um"]) == pytest.approx(1.5 * float(row["u_um"])) for row in rows)
-    assert main(["lengths", file, *limits, "--json"]) == 0
+    assert main(["run", "--lengths", file, *limits, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["all"]["lengths"] == 153 and len(data["by_point"]) == 18
     assert data["all"]["maximum"] == found.whole.maximum[0]
@@ -234,13 +234,13 @@ def test_a_deficient_design_is_told_and_named(
 ) -> None:
     experiment_of(tmp_path, TEXT.replace("position_coefficients: 4", "position_coefficients: 6"))
     file = str(tmp_path / "design.yaml")
-    assert main(["lengths", file, "--grid", "3"]) == 1
+    assert main(["run", "--lengths", file, "--grid", "3"]) == 1
     out = capsys.readouterr().out
     assert (
         "rank deficiency 3; " in out
         and "change none of these lengths, but may change those of another --grid" in out
     )
-    assert main(["lengths", file, "--grid", "4"]) == 1
+    assert main(["run", "--lengths", file, "--grid", "4"]) == 1
     out = capsys.readouterr().out
     assert (
         "rank deficiency " in out
@@ -264,9 +264,9 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
             "885115 lengths are too many for --pairs",
         ),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),
-        (["--target", "1 um", "--csv", file], "which is read; name another"),
+        (["--target", "1 um", "-o", file], "which is read; name another"),
     ):
-        assert main(["lengths", file, *options]) == 2
+        assert main(["run", "--lengths", file, *options]) == 2
         assert told in capsys.readouterr().err
 
 
@@ -276,7 +276,17 @@ def test_the_picture(tmp_path: Path, grid: str) -> None:
     experiment_of(tmp_path)
     picture = tmp_path / "lengths.svg"
     assert (
-        main(["lengths", str(tmp_path / "design.yaml"), "--grid", grid, "--plot", str(picture)])
+        main(
+            [
+                "run",
+                "--lengths",
+                str(tmp_path / "design.yaml"),
+                "--grid",
+                grid,
+                "--plot",
+                str(picture),
+            ]
+        )
         == 0
     )
     text = picture.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""`ballplate reliability`, and what `fit` suspects, as their users see them."""
+"""`ballplate run --reliability`, and what `fit` suspects, as their users see them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Rows = list[dict[str, str]]
 
 def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "all.csv"
-    assert main(["reliability", QUICKSTART, "--csv", str(table)]) == 0
+    assert main(["run", "--reliability", QUICKSTART, "-o", str(table)]) == 0
     out = capsys.readouterr().out
     assert "754 observations; redundancy 580.0 in total" in out
     assert "estimated from the other residuals: 4.152 standard deviations" in out
@@ -44,7 +44,8 @@ def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture
     assert (
         main(
             [
-                "reliability",
+                "run",
+                "--reliability",
                 "designs/hurt_foss/bar-bell.yaml",
                 "--variant",
                 "length known",
@@ -66,7 +67,17 @@ def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture
 def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%", "--json"]
     assert (
-        main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--variant", "flat", *options]) == 0
+        main(
+            [
+                "run",
+                "--reliability",
+                "designs/hurt_foss/bar-bell.yaml",
+                "--variant",
+                "flat",
+                *options,
+            ]
+        )
+        == 0
     )
     assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(
         1.959964 + 1.281552, abs=1e-4
@@ -82,7 +93,7 @@ def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> N
 )
 def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     try:
-        status = main(["reliability", QUICKSTART, *options])
+        status = main(["run", "--reliability", QUICKSTART, *options])
     except SystemExit as left:
         status = int(str(left.code))
     assert status == 2 and told in capsys.readouterr().err
@@ -90,15 +101,23 @@ def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixtu
 
 def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (
-        main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--csv", str(tmp_path / "t.csv")])
+        main(
+            [
+                "run",
+                "--reliability",
+                "designs/hurt_foss/bar-bell.yaml",
+                "-o",
+                str(tmp_path / "t.csv"),
+            ]
+        )
         == 2
     )
     assert "choose one with --variant: length known, " in capsys.readouterr().err
     own = tmp_path / "own.yaml"
     own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
-    assert main(["reliability", str(own), "--csv", str(own)]) == 2
+    assert main(["run", "--reliability", str(own), "-o", str(own)]) == 2
     assert "would overwrite" in capsys.readouterr().err
-    assert main(["reliability", QUICKSTART, "--csv", str(tmp_path / "no" / "t.csv")]) == 3
+    assert main(["run", "--reliability", QUICKSTART, "-o", str(tmp_path / "no" / "t.csv")]) == 3
     assert "cannot be written" in capsys.readouterr().err
 
 

@@ -183,9 +183,9 @@ def test_coefficients_for_a_controller(
 ) -> None:
     """The file evaluates to the curve, in the units of its columns' names."""
     arguments = (*DOME, "--start-slope", "0", "--powers", powers)
-    assert run(*arguments, "--coefficients", "-") == 0
+    assert run(*arguments, "-o", "-") == 0
     text = capsys.readouterr().out
-    assert run(*arguments, "--coefficients", tmp_path / "c.csv", "--json") == 0
+    assert run(*arguments, "-o", tmp_path / "c.csv", "--json") == 0
     assert (tmp_path / "c.csv").read_text(encoding="utf-8") == text
     points = json.loads(capsys.readouterr().out)["points"]
     rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
@@ -263,7 +263,7 @@ def test_drawings(tmp_path: Path) -> None:
             ("--magnification", "300"),
             "--magnification is that of --whiskers; add that, or leave it out",
         ),
-        (("--json", "--coefficients", "-"), "both go to the screen"),
+        (("--json", "-o", "-"), "both go to the screen"),
         (("--evaluate", "x mm"), '--evaluate: "x mm" is not a length'),
     ],
 )

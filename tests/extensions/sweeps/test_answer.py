@@ -245,7 +245,7 @@ def test_every_sentence_is_what_the_exported_table_says(tmp_path: Path) -> None:
     for seed in range(25):
         path = tmp_path / f"{seed}.sqlite"
         random_sweep(path, seed)
-        assert main(["export", str(path), "-o", str(path.with_suffix(".csv"))]) == 0
+        assert main(["sweep", "--export", str(path), "-o", str(path.with_suffix(".csv"))]) == 0
         with path.with_suffix(".csv").open(encoding="utf-8") as file:
             table = list(csv.DictReader(file))
         with closing(open_store(path)) as store:

@@ -65,10 +65,18 @@ def commands(store: Path, *kinds: str) -> list[list[str]]:
     folder = store.parent
     every = {
         "sweep": ["sweep", str(folder / "small.yaml"), "--workers", "1"],
-        "csv": ["export", str(store), "-o", str(folder / "table.csv")],
-        "parquet": ["export", str(store), "-o", str(folder / "table.parquet")],
+        "csv": ["sweep", "--export", str(store), "-o", str(folder / "table.csv")],
+        "parquet": ["sweep", "--export", str(store), "-o", str(folder / "table.parquet")],
         **{
-            name: ["report", str(store), "--format", name, "-o", str(folder / f"report.{name}")]
+            name: [
+                "sweep",
+                "--report",
+                str(store),
+                "--format",
+                name,
+                "-o",
+                str(folder / f"report.{name}"),
+            ]
             for name in ("html", "text", "markdown", "latex")
         },
     }
@@ -221,7 +229,7 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
         path.write_bytes(content[:start] + b"\xa5" * size + content[start + size :])
     else:
         path.write_bytes(content[: len(content) - size])
-    assert main(["export", str(path), "-o", str(tmp_path / "t.csv")]) == 3
+    assert main(["sweep", "--export", str(path), "-o", str(tmp_path / "t.csv")]) == 3
     err = capsys.readouterr().err
     told = re.search(r"(\d+) of 1000 cells could not be read", err)
     table = read_table(tmp_path / "t.csv")
@@ -231,7 +239,10 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
     assert (table["U4_average_m"] == table["cell"] / 7).all() and (
         table["k"] == table["cell"]
     ).all()
-    assert main(["report", str(path), "--format", "text", "-o", str(tmp_path / "t.txt")]) == 3
+    assert (
+        main(["sweep", "--report", str(path), "--format", "text", "-o", str(tmp_path / "t.txt")])
+        == 3
+    )
     assert "unreadable" in (tmp_path / "t.txt").read_text() or len(table) > 200
 
 
@@ -455,8 +466,8 @@ def test_text_of_a_store_is_escaped(store: Path, capsys: pytest.CaptureFixture[s
         assert main(arguments) in (0, 1)
         out, err = capsys.readouterr()
         assert "\x1b" not in out + err and "\x07" not in out + err and "\u202e" not in out + err
-    assert main(["export", str(store), "-o", "-"]) == 0
-    assert main(["report", str(store), "--format", "text"]) == 0
+    assert main(["sweep", "--export", str(store), "-o", "-"]) == 0
+    assert main(["sweep", "--report", str(store), "--format", "text"]) == 0
     out = capsys.readouterr().out
     assert "\x1b" not in out and "\\x1b" in out
     for path in store.parent.glob("report.*"):

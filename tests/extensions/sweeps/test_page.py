@@ -43,7 +43,7 @@ def sweep(folder: Path, text: str) -> Path:
 def report(store: Path, *more: str) -> str:
     """Page of a store."""
     file = store.with_suffix(".html")
-    assert main(["report", str(store), "-o", str(file), *more]) == 0
+    assert main(["sweep", "--report", str(store), "-o", str(file), *more]) == 0
     return file.read_text(encoding="utf-8")
 
 
@@ -115,7 +115,7 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
 
 def test_same_store_same_bytes(plate_sizes: Path, plate_sizes_page: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.html"
-    assert main(["report", str(plate_sizes), "-o", str(again)]) == 0
+    assert main(["sweep", "--report", str(plate_sizes), "-o", str(again)]) == 0
     assert again.read_bytes() == plate_sizes_page.read_bytes()
 
 
@@ -199,7 +199,10 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
     text = page(store, read_results(store, 1))
     assert len(text) < 1_000_000
     found = assert_accessible(text)
-    assert "7800 cells more are not shown here; ballplate export gives all." in found.texts["p"]
+    assert (
+        "7800 cells more are not shown here; ballplate sweep --export gives all."
+        in found.texts["p"]
+    )
     # Lines of single cells for 6 of 20 values of a second axis, at the best cell's setting first.
     assert any(
         "c 1, the setting of the best cell; 6 of 20 values of b" in one
@@ -245,7 +248,8 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
         sys.executable,
         "-m",
         "ballplate",
-        "report",
+        "sweep",
+        "--report",
         store.path,
         "--run-modules",
         "--force",
@@ -305,9 +309,9 @@ def test_missing_packages_are_named(
     tmp_path: Path,
 ) -> None:
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    assert main(["report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 3
+    assert main(["sweep", "--report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 3
     assert "python -m pip install 'ballplate[report]'" in capsys.readouterr().err
-    assert main(["report", str(plate_sizes), "--format", "markdown"]) == 0
+    assert main(["sweep", "--report", str(plate_sizes), "--format", "markdown"]) == 0
 
 
 def test_python_writes_the_page_of_a_sweep(

@@ -107,7 +107,7 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
     assert [row.headings[0] for row in best.blocks[0].rows] == [str(k) for k in range(MOST_BEST)]
     assert {column.partition(" ")[0] for column in best.columns} == {"U4"}
     assert table.size == MOST_ROWS and table.headings == ("cell", "level")
-    assert table.notes[0] == "50 cells more are not shown here; ballplate export gives all."
+    assert table.notes[0] == "50 cells more are not shown here; ballplate sweep --export gives all."
 
 
 def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> None:
@@ -156,11 +156,11 @@ def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> No
 def test_the_command_writes_tables(
     small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    assert main(["report", str(small.path), "--format", "text"]) == 0
+    assert main(["sweep", "--report", str(small.path), "--format", "text"]) == 0
     assert capsys.readouterr().out == (GOLDEN / "text.txt").read_text(encoding="utf-8")
     for suffix, form in ((".md", "markdown"), (".tex", "latex"), (".csv", "csv"), (".txt", "text")):
         file = tmp_path / f"tables{suffix}"
-        assert main(["report", str(small.path), "-o", str(file)]) == 0
+        assert main(["sweep", "--report", str(small.path), "-o", str(file)]) == 0
         assert file.read_text(encoding="utf-8") == (GOLDEN / f"{form}.txt").read_text(
             encoding="utf-8"
         )
@@ -169,16 +169,17 @@ def test_the_command_writes_tables(
 def test_wrong_usage_is_told(
     small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    assert main(["report", str(small.path), "-o", str(small.path)]) == 2
+    assert main(["sweep", "--report", str(small.path), "-o", str(small.path)]) == 2
     assert "would overwrite" in capsys.readouterr().err
-    assert main(["report", str(small.path), "--sweep", "7", "--format", "text"]) == 3
+    assert main(["sweep", "--report", str(small.path), "--sweep", "7", "--format", "text"]) == 3
     assert "there is no such sweep; it has 1" in capsys.readouterr().err
-    assert main(["report", str(tmp_path / "none.sqlite"), "--format", "text"]) == 3
+    assert main(["sweep", "--report", str(tmp_path / "none.sqlite"), "--format", "text"]) == 3
     assert "there is no such store" in capsys.readouterr().err
     assert (
         main(
             [
-                "report",
+                "sweep",
+                "--report",
                 str(small.path),
                 "-o",
                 str(tmp_path / "no folder" / "a.html"),

@@ -112,7 +112,7 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
     capsys.readouterr()
 
     # Still to be read, with a warning.
-    assert main(["export", str(store), "-o", str(tmp_path / "old.csv")]) == 0
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "old.csv")]) == 0
     told = "4 rows were computed by method 1, before corrections to lengths of standards"
     assert told in capsys.readouterr().err
     old = pandas.read_csv(tmp_path / "old.csv")
@@ -129,7 +129,7 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
     # With the same seeds, so that only what was corrected differs.
     assert_same(rows(store), right)
 
-    assert main(["export", str(store), "-o", str(tmp_path / "new.csv")]) == 0
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "new.csv")]) == 0
     assert sweep(path) == 1
     assert "method" not in capsys.readouterr().err
 
@@ -336,7 +336,7 @@ def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize("content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\0" * 5000])
 def test_no_store(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "x.sqlite").write_bytes(content)
-    assert main(["export", str(tmp_path / "x.sqlite"), "-o", "-"]) == 3
+    assert main(["sweep", "--export", str(tmp_path / "x.sqlite"), "-o", "-"]) == 3
     out, err = capsys.readouterr()
     assert out == "" and err.startswith(f"{tmp_path}/x.sqlite: ") and "Traceback" not in err
 
@@ -348,7 +348,7 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sweep(path)
     store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
     for name in ("t.csv", "t.parquet"):
-        assert main(["export", str(store), "-o", str(tmp_path / name)]) == 0
+        assert main(["sweep", "--export", str(store), "-o", str(tmp_path / name)]) == 0
     # Not with pandas, some versions of which do not read every number to the last bit.
     with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
         written = list(csv.DictReader(stream))
@@ -356,10 +356,10 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in table.select_dtypes("float"):
         np.testing.assert_array_equal([float(row[name] or "nan") for row in written], table[name])
         np.testing.assert_array_equal(parquet[name], table[name])
-    assert main(["export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
-    assert main(["export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
-    assert main(["export", str(store), "--sweep", "5", "-o", "-"]) == 3
-    assert main(["export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
+    assert main(["sweep", "--export", str(store), "--sweep", "5", "-o", "-"]) == 3
+    assert main(["sweep", "--export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
     assert "there is no such store" in capsys.readouterr().err
 
 
@@ -459,12 +459,21 @@ def test_a_store_is_read_where_nothing_can_be_written(
     path = small_sweep(tmp_path, 2)
     sweep(path)
     before = sorted(file.name for file in tmp_path.iterdir())
-    assert main(["export", str(tmp_path / "small.sqlite"), "-o", "-"]) == 0
+    assert main(["sweep", "--export", str(tmp_path / "small.sqlite"), "-o", "-"]) == 0
     assert {file.name for file in tmp_path.iterdir()} <= {*before}
     with pytest.raises(sqlite3.OperationalError, match="readonly"):
         open_store(tmp_path / "small.sqlite").connection.execute("DELETE FROM result")
     assert (
-        main(["export", str(tmp_path / "small.sqlite"), "-o", str(tmp_path / "small.sqlite")]) == 2
+        main(
+            [
+                "sweep",
+                "--export",
+                str(tmp_path / "small.sqlite"),
+                "-o",
+                str(tmp_path / "small.sqlite"),
+            ]
+        )
+        == 2
     )
 
 

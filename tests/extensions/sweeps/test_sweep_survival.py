@@ -259,7 +259,7 @@ def test_one_writer_at_a_time(
     second = run("sweep", path)
     assert second.returncode == 3 and "another process is computing into it" in second.stderr
     # Reading goes on meanwhile.
-    assert run("export", store, "-o", tmp_path / "t.csv").returncode == 0
+    assert run("sweep", "--export", store, "-o", tmp_path / "t.csv").returncode == 0
 
 
 def test_the_number_of_workers_changes_no_bit(tmp_path: Path) -> None:

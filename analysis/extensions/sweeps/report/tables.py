@@ -150,7 +150,10 @@ def _below(
         found.append(Row((str(cell), *labels), entries))
     more = len(results.frame) - len(found)
     if more > 0 and rows is None:
-        notes = (f"{more} cells more are not shown here; ballplate export gives all.", *notes)
+        notes = (
+            f"{more} cells more are not shown here; ballplate sweep --export gives all.",
+            *notes,
+        )
     headings = ("cell", *(axis.name for axis in results.axes))
     columns = tuple(measure.title for measure in measures)
     return Table(name, caption, headings, columns, (Block("", tuple(found)),), notes=notes)

@@ -1,4 +1,4 @@
-"""`ballplate ladder`: which error model the readings call for."""
+"""`ballplate models`: which error model the readings call for."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from ballplate.cli.common import add_json, whole
 from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
 
-GROUP = "evaluate"
-HELP = "compare error models on readings: which one do they call for?"
 DESCRIPTION = (
     "Fit error models from the poorest to the richest that the design determines, kinematic ones"
     " with more and more coefficients and empirical ones, and recommend the poorest that no richer"
