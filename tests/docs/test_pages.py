@@ -46,23 +46,6 @@ class Page(HTMLParser):
             self.loaded.append(address)
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The pages, built with the network out of reach; the data sets of the page on the reproduction,
-    which `ballplate reproduce` draws as well, are few.
-    """
-    folder = tmp_path_factory.mktemp("docs")
-    nowhere = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
-    found = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "-D", "data_sets=4", DOCS, folder],
-        env={**os.environ, **nowhere},
-        capture_output=True,
-        text=True,
-    )
-    assert (found.returncode, found.stderr) == (0, "")
-    return folder
-
-
 def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
     pages = {path: Page(path) for path in built.rglob("*.html")}
     assert len(pages) >= 15
@@ -109,6 +92,9 @@ def test_examples_have_run(built: Path) -> None:
     # The text quotes these from the tables.
     for figure in ("0.2623", "1.525"):
         assert figure in tutorial
+    text = Page(built / "tutorial-fit.html").text
+    for figure in ("3.13(0.23)", "0.9594", "12.238", "0.377"):
+        assert figure in text
     assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
 
 
