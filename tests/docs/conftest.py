@@ -17,7 +17,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     which `ballplate reproduce` draws as well, are few.
     """
     folder = tmp_path_factory.getbasetemp()
-    # Processes of one session have folders beside one another.
+    # Processes of one session have folders next to one another.
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
     pages, complaint = folder / "docs-built", folder / "docs-built.txt"
@@ -27,9 +27,12 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
         while not complaint.exists():
             time.sleep(0.2)
     else:
-        unfinished = complaint.with_suffix(".part")
-        unfinished.write_text(build(Path("docs"), pages), encoding="utf-8")
-        unfinished.rename(complaint)
+        unfinished, text = complaint.with_suffix(".part"), "the build did not end"
+        try:
+            text = build(Path("docs"), pages)
+        finally:
+            unfinished.write_text(text, encoding="utf-8")
+            unfinished.rename(complaint)
     assert complaint.read_text(encoding="utf-8") == ""
     return pages
 
