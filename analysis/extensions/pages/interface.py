@@ -59,8 +59,9 @@ def page(
     compare: PathLike | None = None,
     report: Report = unreported,
 ) -> str:
-    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and `report`
-    write: HTML that needs no other file and no network. With a path it is written as well.
+    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and
+    `sweep --report` write: HTML that needs no other file and no network. With a path it is written
+    as well.
 
     Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
     drawings of designs whose error models are in Python need `run_modules`, and the store of

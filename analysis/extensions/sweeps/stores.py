@@ -1,4 +1,4 @@
-"""Sweeps and their stores from Python: what `ballplate sweep`, `export` and `report` do.
+"""Sweeps and their stores from Python: what `ballplate sweep` does.
 
 Every function raises `ballplate.StoreError` for a store that cannot be used, and otherwise what
 those of `ballplate.api` raise.
