@@ -166,6 +166,7 @@ OPTIONS = {
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
+    "maps": (["run", "designs/quickstart.yaml", "--lengths"],),
 }
 
 POOL = """

@@ -9,7 +9,7 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.judgement.ladder import ladder
+from ballplate.extensions.judgement.compared_models import compared_models
 from ballplate.gross_errors import refits
 from ballplate.gross_errors.refits import diagnosis_with_refits
 from ballplate.gross_errors.wording import diagnosis_words
@@ -149,7 +149,7 @@ def test_ladder_names_another_arrangement_before_richer_models(
     other_machine: tuple[bp.Experiment, object],
 ) -> None:
     observed = bp.fit(*other_machine).observed
-    found = ladder(other_machine[0], observed, most=4)
+    found = compared_models(other_machine[0], observed, most=4)
     assert found.is_none and found.to_dict()["recommended"] is None
     assert "the arrangement of the axes is MB1" in found.verdict()[0]
     assert "pitch" not in " ".join(found.lines())

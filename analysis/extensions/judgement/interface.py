@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ballplate.results.fit import Fit
 
     from .budget import UncertaintyBudget
-    from .ladder_result import Ladder
+    from .compared_models_result import ComparedModels
     from .left_out_result import Validation
 
 
@@ -36,7 +36,7 @@ def models(
     coefficients: int = 8,
     certificate: PathLike | pandas.DataFrame | None = None,
     report: Report = unreported,
-) -> Ladder:
+) -> ComparedModels:
     """Which error model readings call for: kinematic ones with up to so many `coefficients`,
     and empirical ones, compared by what richer ones explain, and what each changes in lengths.
 
@@ -45,13 +45,13 @@ def models(
     >>> bp.models(bp.quickstart(), readings, coefficients=6).recommended
     'kinematic, 5 and 5 coefficients'
     """
-    from .ladder import ladder as compared
+    from .compared_models import compared_models
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_whole(3, 12, coefficients=coefficients)
     ensure_report(report)
     chosen, observed = observed_of(experiment, readings, certificate)
-    return compared(chosen, observed, sigma, coefficients, report)
+    return compared_models(chosen, observed, sigma, coefficients, report)
 
 
 def validate(

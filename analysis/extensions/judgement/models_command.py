@@ -41,12 +41,12 @@ def run(options: Namespace) -> int:
     from ballplate.cli.common import show
     from ballplate.cli.progress import progress
 
-    from .ladder import ladder
+    from .compared_models import compared_models
     from .rungs import MOST_COEFFICIENTS
 
     experiment, observed = observed_readings(options)
     with progress(options) as shown:
         most = options.coefficients or MOST_COEFFICIENTS
-        result = ladder(experiment, observed, options.sigma, most, shown.show)
+        result = compared_models(experiment, observed, options.sigma, most, shown.show)
     show(options, result)
     return warn_of(result)

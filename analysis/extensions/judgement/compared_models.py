@@ -1,4 +1,4 @@
-"""A ladder of error models on an experiment's readings: which of them the readings call for.
+"""Error models compared on an experiment's readings: which of them the readings call for.
 
 Kinematic models with polynomials of more and more coefficients, and empirical ones, are compared by
 tests of what a richer model explains, as NPL Report CISE 15/98, section 5.3, compares two.
@@ -28,8 +28,8 @@ from ballplate.simulator.machines.protocol import Array, ErrorModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import uncertainties
 
+from .compared_models_result import ComparedModels, LengthChange, Rung
 from .lack_of_fit import PureError, chance_of, chance_words, pure_error
-from .ladder_result import Ladder, LengthChange, Rung
 from .nested import nested_sums
 from .rung_choice import (
     ROUNDING,
@@ -203,13 +203,13 @@ def fit_rung(experiment: Experiment, observed: ObservedReadings, model: LadderMo
 
 
 @single_threaded
-def ladder(
+def compared_models(
     experiment: Experiment,
     observed: ObservedReadings,
     sigma: Literal["estimated", "given"] | None = None,
     most: int = MOST_COEFFICIENTS,
     report: Report = unreported,
-) -> Ladder:
+) -> ComparedModels:
     """Which error model an experiment's readings call for, and what the others change in lengths.
 
     `sigma` overrides what the file says; polynomials have `most` coefficients at most.
@@ -257,7 +257,7 @@ def ladder(
         )
         for one in fits
     )
-    return Ladder(
+    return ComparedModels(
         experiment.label,
         experiment.title,
         observed,

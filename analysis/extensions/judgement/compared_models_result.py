@@ -1,4 +1,4 @@
-"""The result of a ladder of error models: text, data and rows."""
+"""The result of a comparison of error models: text, data and rows."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Rung:
 
 
 @dataclass(frozen=True, repr=False)
-class Ladder(FitResult):
+class ComparedModels(FitResult):
     """Error models on the same readings, and the one that these call for.
 
     `recommended` is the poorest that no richer one beats, and `error_model` what a file states for

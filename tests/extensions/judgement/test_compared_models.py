@@ -12,13 +12,13 @@ import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
-from ballplate.extensions.judgement.lack_of_fit import pure_error
-from ballplate.extensions.judgement.ladder import (
+from ballplate.extensions.judgement.compared_models import (
     _richest_polynomials,
     climb,
+    compared_models,
     fit_rung,
-    ladder,
 )
+from ballplate.extensions.judgement.lack_of_fit import pure_error
 from ballplate.extensions.judgement.nested import NestedSums, nested_sums
 from ballplate.extensions.judgement.rung_choice import (
     Comparison,
@@ -43,7 +43,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings, obs
 from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 
-from tests.extensions.judgement.ladder_campaigns import (
+from tests.extensions.judgement.model_campaigns import (
     KINDS,
     campaign,
     last_ones,
@@ -250,7 +250,7 @@ def test_none_follows_a_wave(sigma: str) -> None:
     generator = np.random.default_rng(5)
     a = 10.0 * uncertainties(3) * generator.standard_normal(len(uncertainties(3)))
     observed = readings_of(Wave(1e-6), a, generator)
-    found = ladder(quickstart(), observed, sigma, 5)  # type: ignore[arg-type]
+    found = compared_models(quickstart(), observed, sigma, 5)  # type: ignore[arg-type]
     assert found.is_none and found.complaint and found.to_dict()["recommended"] is None
     assert found.lines()[-2].startswith("none of these: ")
 
@@ -271,7 +271,7 @@ def test_pure_error_is_the_scatter_of_repeats_about_their_means() -> None:
     found = pure_error(observed.design, nominal_state(observed.design), x)
     np.testing.assert_allclose(found.sum_of_squares, square, rtol=1e-4)
     assert found.degrees_of_freedom == 3 * (len(x) - len(of_groups))
-    result = ladder(experiment, observed, "estimated", 4)
+    result = compared_models(experiment, observed, "estimated", 4)
     chosen = next(one for one in result.rungs if one.is_recommended)
     beyond = chosen.degrees_of_freedom - found.degrees_of_freedom
     ratio = (chosen.sum_of_squares - square) / beyond / (square / found.degrees_of_freedom)
@@ -373,7 +373,7 @@ def test_knowledge_of_one_models_parameters_is_refused() -> None:
     prior = [{"parameter": "EXX t^1", "value": "0 um", "standard_uncertainty": "1 um"}]
     experiment = small(priors=prior)
     with pytest.raises(ExperimentError, match="remove the priors"):
-        ladder(experiment, simulated(experiment))
+        compared_models(experiment, simulated(experiment))
 
 
 def test_two_dimensions() -> None:
@@ -419,7 +419,7 @@ def flat(**changed: object) -> Experiment:
 def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> None:
     """Nothing richer could be tried, and the file's model is no candidate."""
     experiment = flat()
-    found = ladder(experiment, simulated(experiment))
+    found = compared_models(experiment, simulated(experiment))
     chosen = next(one for one in found.rungs if one.is_recommended)
     assert not found.is_none and chosen.beaten.count == 0 and found.lengths.undetermined
     assert any("nothing shows that it is rich enough" in text for text in found.cautions)
@@ -427,7 +427,7 @@ def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> No
     assert "undetermined µm" not in "\n".join(found.lines())
     # A model that asks for less than the others leaves less open, and not a negative number.
     fewer = flat(error_model={"kind": "metric", "scale": "none"})
-    rungs = ladder(fewer, simulated(fewer)).rungs
+    rungs = compared_models(fewer, simulated(fewer)).rungs
     own = next(one for one in rungs if one.is_of_file)
     opens = [
         linearise(with_model(lay_out(fewer), model)).deficiency
@@ -440,7 +440,7 @@ def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> No
 def test_models_that_the_verdict_names_are_shown() -> None:
     """In this campaign the best of the richer ones is off the way up."""
     experiment = small()
-    found = ladder(experiment, simulated(experiment, 8))
+    found = compared_models(experiment, simulated(experiment, 8))
     assert found.beaten.by in found.verdict()[0]
     assert found.beaten.by in {one.model for one in found.rungs}
     # What a table says of the best richer model of each is the F-test of both.
