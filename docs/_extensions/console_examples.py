@@ -115,6 +115,9 @@ class _Example(SphinxDirective):
             # Without their modes: a checkout may be one that cannot be written.
             designs = Path(found.name, "designs")
             shutil.copytree(TOP / "designs", designs, copy_function=shutil.copyfile)
+            for path in (designs, *designs.rglob("*")):
+                if path.is_dir():
+                    path.chmod(0o755)
             self.env.temp_data["example_folder"] = found
         return Path(found.name)
 
