@@ -24,9 +24,11 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
+    ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
     ("pages", "reliability"): "pages show how gross errors would act",
+    ("reliability", "laboratory"): "offsets that are stated wrong are searched as in readings",
     ("studio", "pages"): "the studio moves designs as pages do",
     ("sweeps", "pages"): "the page of a sweep is a page",
     ("studio", "repair"): "the studio writes changes into the file as repairs are written",
@@ -101,7 +103,7 @@ def test_no_name_is_provided_twice() -> None:
 
 
 # What others build on.
-SOME = ("campaign", "maps", "reliability", "requirements")
+SOME = ("campaign", "laboratory", "maps", "reliability", "requirements")
 
 WITHOUT = """
 import sys
@@ -132,6 +134,10 @@ import ballplate as bp
 import contextlib, io, warnings
 
 fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+unsearched = [text for text in fit.warnings if "not looked for" in text]
+hidden = {"laboratory", "reliability"} & {*sys.argv[3:]}
+assert len(unsearched) == ("laboratory" in hidden) + bool(hidden), fit.warnings
+assert all("extension laboratory" in text or "extension reliability" in text for text in unsearched)
 assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
 with contextlib.suppress(SystemExit):
     main(["--help"])

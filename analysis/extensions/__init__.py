@@ -49,7 +49,10 @@ SHIPPED = (
         "laboratory",
         commands={"import": "import_command"},
         functions=_from("interface", "read_report"),
-        services=_from("reading_tables", "any_source_rows", "any_table_rows"),
+        services={
+            **_from("reading_tables", "any_source_rows", "any_table_rows"),
+            **_from("reading_checks", "ReadingChecks"),
+        },
     ),
     _here(
         "judgement",
@@ -65,6 +68,7 @@ SHIPPED = (
         "reliability",
         commands={"reliability": "reliability_command"},
         functions=_from("interface", "reliability"),
+        services=_from("searched_fit", "diagnosed"),
     ),
     _here(
         "certificates",

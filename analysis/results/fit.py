@@ -20,9 +20,6 @@ from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
-from ..gross_errors.exact_values import has_exact_values
-from ..gross_errors.suspects import Diagnosis
-from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
 from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
@@ -33,6 +30,7 @@ from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .diagnosis import Suspicion, has_exact_values, lack_of_fit
 from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
     CorrectedPoints,
@@ -69,11 +67,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .campaign_sigmas import CampaignSigmas
-
-
-def lack_of_fit(squares: float, freedom: int, diagnosis: Diagnosis, untested: str) -> LackOfFit:
-    """The lack of fit of a sum of squares; residuals that are `untested` may have a pattern."""
-    return LackOfFit(squares, freedom, len(diagnosis.suspects), bool(diagnosis or untested))
 
 
 REWEIGHTED = (
@@ -122,7 +115,7 @@ class Fit(FitResult):
     largest: tuple[Residual, ...]
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
-    diagnosis: Diagnosis = Diagnosis()
+    diagnosis: Suspicion | None = None
     untested: str = ""
     estimated: EstimatedFunctions | None = None
     variance_components: Any = None
@@ -179,7 +172,7 @@ class Fit(FitResult):
             return lines
         lines += ["", *self._residual_table()]
         if self.diagnosis:
-            lines += diagnosis_lines(self.diagnosis, self.observed.marks)
+            lines += self.diagnosis.lines(self.observed.marks)
         if self.variance_components is not None:
             lines += ["", *self.variance_components.lines()]
             lines += [REWEIGHTED] if self.is_reweighted else []
@@ -212,7 +205,7 @@ class Fit(FitResult):
     def to_dict(self) -> dict[str, Any]:
         suspected: dict[str, Any] = {}
         if self.diagnosis:
-            suspected = {"suspected": diagnosis_data(self.diagnosis, self.observed.marks)}
+            suspected = {"suspected": self.diagnosis.data(self.observed.marks)}
         return {
             "experiment": self.label,
             "title": self.title,
@@ -520,8 +513,7 @@ class Fit(FitResult):
             )
             if has_exact_values(self.design):
                 cure += "; several values that are stated as exact may be wrong, too"
-            shown = self.diagnosis
-            if shown.suspects or shown.scatter or shown.refit:
+            if self.diagnosis and self.diagnosis.names_causes:
                 cure = "see what is suspected"
             times = self.lack_of_fit.times
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
@@ -535,7 +527,9 @@ class Fit(FitResult):
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
-        if self.untested:
+        if self.untested and self.diagnosis is None:
+            found.append(self.untested)
+        elif self.untested:
             found.append(
                 f"{self.untested}: fit the means of repeated readings, with u as a column, to have"
                 " them tested"

@@ -117,12 +117,10 @@ def fit(
     # Loaded only now, so that what plans and checks need not load answers sooner.
     from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 
-    from ..gross_errors.leftover import too_many_entries
-    from ..gross_errors.refits import diagnosis_with_refits
-    from ..gross_errors.suspects import Diagnosis
     from .campaign_sigmas import campaign_sigmas
+    from .diagnosis import diagnosed, lack_of_fit
     from .estimates import estimated_functions, parameter_estimates
-    from .fit import Fit, lack_of_fit
+    from .fit import Fit
     from .observation_groups import groups_of, reweighted
     from .plates import plate_coordinates
     from .residuals import largest_residuals
@@ -141,9 +139,7 @@ def fit(
     at = linearised_fit(design, solution)
     own = at.degrees_of_freedom
     scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
-    untested, diagnosis = too_many_entries(design), Diagnosis()
-    if not untested:
-        diagnosis = diagnosis_with_refits(at, observed.x, own, estimated)
+    diagnosis, untested = diagnosed(at, observed.x, own, estimated)
     found = None
     if components is not None:
         found = _variance_components(experiment, at, observed.x, components)

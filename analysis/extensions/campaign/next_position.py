@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.gross_errors.wording import diagnosis_words
 from ballplate.planning.done import groups_taken
 from ballplate.results.adjustments import FEW
 from ballplate.results.campaign_sigmas import with_sigmas
@@ -31,6 +30,7 @@ from ballplate.simulator.readings.reading_sources import Source
 from ballplate.uncertainty.summaries import uncertainties
 
 from .next_result import NextStep, Offered
+from .redone import without_redone
 
 # One-sided level of the bound of sigma where it comes from few degrees of freedom.
 CONFIDENCE = 0.95
@@ -101,7 +101,7 @@ def next_step(
         is_sure = (
             math.isfinite(bound) and judge(goal, _uncertainty(at, experiment, goal, bound)).is_met
         )
-        suspected = tuple(diagnosis_words(fit.diagnosis, observed.marks))
+        suspected = tuple(fit.diagnosis.words(observed.marks)) if fit.diagnosis else ()
         found = replace(
             found, sigma=sigma, bound=bound, now=judged, is_sure=is_sure, suspected=suspected
         )
@@ -171,7 +171,7 @@ def _observed(experiment: Experiment, sources: Sequence[Source]) -> ObservedRead
         lay_out(experiment),
         every_ball=False,
         settings=experiment.readings,
-        last_count=True,
+        thinned=without_redone,
     )
 
 

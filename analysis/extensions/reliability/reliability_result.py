@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
-from ballplate.gross_errors.names import name
-from ballplate.gross_errors.patterns import DRIFTS, Patterns, single_kinds
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
@@ -34,6 +32,8 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.quantities import QUANTITIES
 
 from .effects import MOST_PLACES, across_probes
+from .names import name
+from .patterns import DRIFTS, Patterns, single_kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,16 +20,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, read_in_positions
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.readings import seen_places
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.geometry.motions import fit_motion
+from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, read_in_positions
-from ..design.observations.lengths import Lengths
-from ..design.observations.priors import Priors
-from ..design.observations.readings import seen_places
-from ..estimation.consensus import consensus_motion, distances
-from ..estimation.initial import initial_state
-from ..geometry.motions import fit_motion
-from ..machines.protocol import Array, Integers
+from .consensus import consensus_motion, distances
 
 AGAINST_DRAWING = 0.3
 # Extent across a line, as a fraction of that along it, below which balls are in one line.

@@ -7,15 +7,23 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.design.arrays import (
+    Design,
+    Readings,
+    nominal_places,
+    read_in_positions,
+)
+from ballplate.simulator.experiment.readings_section import (
+    CompensationSettings,
+    ReadingsSettings,
+)
+from ballplate.simulator.geometry.motions import fixes_pose
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.generate import NoReadingError, scale_readings
 
-from ..design.arrays import Design, Readings, nominal_places, read_in_positions
-from ..estimation.consensus import consensus_motion
-from ..experiment.readings_section import CompensationSettings, ReadingsSettings
-from ..geometry.motions import fixes_pose
-from ..inputs.messages import refused
-from ..inputs.settings import listing
-from ..machines.protocol import Array
-from .generate import NoReadingError, scale_readings
+from .consensus import consensus_motion
 from .gross_errors import AGAINST_DRAWING, ball_pitches
 
 
@@ -38,14 +46,18 @@ def as_scale_readings(
     machine's correction has added is taken off last, where it is stated.
 
     :raises ExperimentError: a position has too few balls for its part co-ordinates to be placed, or
-        the correction is too large to be taken off.
+        the correction is too large to be taken off; or not all co-ordinates were read.
     """
+    correction = settings.compensation
+    is_taken_off = isinstance(correction, CompensationSettings)
+    if design.positions.across is not None and (settings.coordinates == "part" or is_taken_off):
+        text = "part co-ordinates, and a correction to be taken off, need all co-ordinates of balls"
+        raise refused(file, f"{text}; give scale readings")
     if settings.coordinates == "part":
         x = _in_machine(design, readings, x, file)
     offsets = controller_offsets(design, settings)[readings.probe]
     if settings.coordinates in ("ball centres", "part"):
         x = x - offsets
-    correction = settings.compensation
     if isinstance(correction, CompensationSettings):
         machine = correction.machine()
         try:

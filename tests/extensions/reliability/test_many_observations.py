@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.reliability import effects
+from ballplate.extensions.reliability.leftover import entries, leftover
+from ballplate.extensions.reliability.patterns import patterns
 from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.extensions.reliability.response import responses
-from ballplate.gross_errors.leftover import entries, leftover
-from ballplate.gross_errors.patterns import patterns
 from ballplate.results.study import fit
 from ballplate.simulator.estimation.functions import BallPlaces, Distances, displacements
 from ballplate.simulator.estimation.linearisation import linearise
@@ -38,7 +38,9 @@ def test_the_entries_are_those_that_are_kept() -> None:
 def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     (experiment,) = load(QUICKSTART)
     rows, columns = entries(lay_out(experiment))
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
+    monkeypatch.setattr(
+        "ballplate.extensions.reliability.leftover.MOST_ENTRIES", rows * columns - 1
+    )
     with pytest.raises(ExperimentError) as caught:
         reliability(experiment)
     assert (
@@ -47,7 +49,7 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
         f" many to test for gross errors; at most {rows - 1} are possible with {columns} parameters"
         " of machine, poses and tied balls: read fewer balls, or in fewer positions"
     )
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
+    monkeypatch.setattr("ballplate.extensions.reliability.leftover.MOST_ENTRIES", rows * columns)
     reliability(experiment)
 
 
@@ -55,10 +57,12 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     (experiment,) = load(CERTIFIED / "three-planes.yaml")
     observed = read_readings(CERTIFIED / "three-planes.csv", lay_out(experiment))
     rows, columns = entries(observed.design)
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
+    monkeypatch.setattr("ballplate.extensions.reliability.leftover.MOST_ENTRIES", rows * columns)
     tested = fit(experiment, observed)
     assert tested.untested == "" and tested.cautions == ()
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
+    monkeypatch.setattr(
+        "ballplate.extensions.reliability.leftover.MOST_ENTRIES", rows * columns - 1
+    )
     found = fit(experiment, observed)
     assert (
         f"at most {rows - 1} are possible" in found.cautions[0]

@@ -6,11 +6,10 @@ from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.geometry.motions import fit_motion
+from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
-
-from ..computing.rounding import comparable
-from ..geometry.motions import fit_motion
-from ..machines.protocol import Array
 
 # Subsets tried, and the points that each is judged by. With a third of the points wrong, three
 # right ones are drawn together more than once in four draws.

@@ -10,16 +10,26 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.design.arrays import (
+    Design,
+    Readings,
+    locations,
+    measured,
+    nominal_state,
+    read_in_positions,
+)
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.experiment.readings_section import (
+    CompensationSettings,
+    ReadingsSettings,
+)
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from ..design.arrays import Design, Readings, locations, measured, nominal_state, read_in_positions
-from ..estimation.consensus import consensus_motion
-from ..estimation.initial import initial_state
-from ..experiment.readings_section import CompensationSettings, ReadingsSettings
-from ..inputs.quantities import format_length
-from ..inputs.yamltree import Mark
-from ..machines.protocol import Array
 from .common_causes import TURNED, poses_found
+from .consensus import consensus_motion
 from .coordinate_kinds import controller_offsets
 from .gross_errors import AGAINST_DRAWING, ball_pitches
 from .wrong_offsets import wrong_offsets

@@ -10,20 +10,20 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.judgement.ladder import ladder
-from ballplate.gross_errors import refits
-from ballplate.gross_errors.refits import diagnosis_with_refits
-from ballplate.gross_errors.wording import diagnosis_words
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-from ballplate.simulator.readings.wrong_offsets import (
+from ballplate.extensions.laboratory.wrong_offsets import (
     WrongOffsets,
     offset_differences,
     with_offsets,
 )
+from ballplate.extensions.reliability import refits
+from ballplate.extensions.reliability.refits import diagnosis_with_refits
+from ballplate.extensions.reliability.wording import diagnosis_words
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 
-from tests.reliability.designs import experiment
-from tests.reliability.offsets import (
+from tests.extensions.reliability.designs import experiment
+from tests.extensions.reliability.offsets import (
     DESIGNS,
     Mistake,
     Plan,

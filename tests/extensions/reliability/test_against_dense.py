@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.patterns import Patterns, patterns
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.reliability_result import Reliability
-from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -27,9 +27,9 @@ from ballplate.simulator.geometry.motions import rotation_from_vector
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import certified_coordinates, repeats, with_length_standard
+from tests.extensions.reliability.designs import MIXED, PLANE, PLATE, experiment
 from tests.reference import dense
 from tests.reference.designs import altered
-from tests.reliability.designs import MIXED, PLANE, PLATE, experiment
 
 Real = NDArray[np.float64]
 

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, Readings, measured, read_in_positions
+from ballplate.simulator.design.objects import Flags
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.readings import seen_places
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..design.arrays import Design, Readings, measured, read_in_positions
-from ..design.objects import Flags
-from ..design.observations.lengths import Lengths
-from ..design.observations.priors import Priors
-from ..design.observations.readings import seen_places
-from ..estimation.consensus import consensus_motion
-from ..geometry.motions import AXIS_NAMES
-from ..inputs.quantities import format_length
-from ..inputs.settings import listing
-from ..machines.protocol import Array, Integers
+from .consensus import consensus_motion
 from .gross_errors import AGAINST_DRAWING, AGAINST_READINGS, ball_pitches, find_gross_errors
 
 # Readings with a probe, beside others in their positions, that show its offset: fewer may be wrong

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.formatting import SHOWN, number, picked
+from ballplate.rank.proposed_bars import listed
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.motions import AXIS_NAMES
@@ -15,8 +17,6 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 
-from ..presentation.formatting import SHOWN, number, picked
-from ..rank.proposed_bars import listed
 from .cause_search import FAMILY, MOST
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order

@@ -1,7 +1,7 @@
 """How often one wrong probe offset is named: single mistakes in the offsets of three designs, and
 what reading and fit say of each.
 
-Run as `python -m tests.reliability.offsets` it prints the rates with their confidence limits.
+Run as `python -m tests.extensions.reliability.offsets` it prints the rates with their confidence limits.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from ballplate.extensions.laboratory.gross_error_messages import refuse_gross_errors
+from ballplate.extensions.laboratory.offsets_applied import doubt_about_offsets
+from ballplate.extensions.reliability.cause_search import FAMILY, Search
 from ballplate.extensions.reliability.power import noncentrality
-from ballplate.gross_errors.cause_search import FAMILY, Search
-from ballplate.gross_errors.refits import diagnosis_with_refits
-from ballplate.gross_errors.wording import diagnosis_words
+from ballplate.extensions.reliability.refits import diagnosis_with_refits
+from ballplate.extensions.reliability.wording import diagnosis_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
@@ -31,13 +33,11 @@ from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
-from ballplate.simulator.readings.gross_error_messages import refuse_gross_errors
 from ballplate.simulator.readings.observed_readings import observe
-from ballplate.simulator.readings.offsets_applied import doubt_about_offsets
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from tests.reliability.designs import PLATE, experiment
+from tests.extensions.reliability.designs import PLATE, experiment
 
 Real = NDArray[np.float64]
 

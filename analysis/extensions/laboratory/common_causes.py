@@ -12,13 +12,18 @@ from collections.abc import Iterator, Mapping
 from itertools import permutations, product
 
 import numpy as np
+from ballplate.simulator.design.arrays import (
+    Design,
+    Readings,
+    nominal_places,
+    read_in_positions,
+)
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.geometry.motions import AXIS_NAMES, fixes_pose
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
 
-from ..design.arrays import Design, Readings, nominal_places, read_in_positions
-from ..estimation.consensus import consensus_motion
-from ..experiment.readings_section import ReadingsSettings
-from ..geometry.motions import AXIS_NAMES, fixes_pose
-from ..inputs.settings import listing
-from ..machines.protocol import Array
+from .consensus import consensus_motion
 from .coordinate_kinds import controller_offsets
 from .gross_errors import AGAINST_DRAWING, ball_pitches
 

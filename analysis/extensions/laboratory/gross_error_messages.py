@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.objects import SLIGHTLY
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
 
-from ..design.arrays import Design, Readings
-from ..design.objects import SLIGHTLY
-from ..design.observations.lengths import Lengths
-from ..estimation.length_ratios import LengthRatio, doubtful_lengths
-from ..experiment.readings_section import ReadingsSettings
-from ..inputs.messages import ExperimentError, Message
-from ..inputs.quantities import format_length
-from ..inputs.yamltree import Mark
-from ..machines.protocol import Array
 from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
+from .length_ratios import LengthRatio, doubtful_lengths
 from .wrong_offsets import only_position, wrong_offsets
 
 

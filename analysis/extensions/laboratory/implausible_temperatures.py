@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from ..design.arrays import Design
-from ..design.influences.temperature import COLDEST, WARMEST
-from ..inputs.yamltree import Mark
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.influences.temperature import COLDEST, WARMEST
+from ballplate.simulator.inputs.yamltree import Mark
 
 
 def doubts_about_temperatures(design: Design, marks: Sequence[Mark]) -> tuple[str, ...]:

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from ..design.arrays import Design
-from ..design.observations.lengths import Lengths
-from ..machines.protocol import Array
-from .spheres import FLAT, fit_sphere
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
+from ballplate.simulator.machines.protocol import Array
 
 # Departures of the factor from one that are doubtful, and that no machine has; a length that is
 # only drawn may be off.

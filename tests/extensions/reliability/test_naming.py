@@ -11,7 +11,13 @@ from pathlib import Path
 import pytest
 from scipy.stats import binom
 
-from tests.reliability.naming import MISTAKES, MODEL_ERRORS, OUTCOMES, World, counts
+from tests.extensions.reliability.naming import (
+    MISTAKES,
+    MODEL_ERRORS,
+    OUTCOMES,
+    World,
+    counts,
+)
 
 PAGE = Path("docs/how-to/reliability.md")
 

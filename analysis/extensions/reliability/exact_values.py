@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from ballplate.results.diagnosis import has_exact_values
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
@@ -17,11 +18,6 @@ from .suspects import Diagnosis, Suspect
 # an estimate of a value's error from readings, and enough to tell values from one another that
 # contradict one another.
 TESTED_WITH = 0.1
-
-
-def has_exact_values(design: Design) -> bool:
-    """Whether any value of a design is stated as exact."""
-    return any(one.is_exact.any() for one in design.observations)
 
 
 def diagnosis_of_all(

@@ -9,9 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.gross_errors.cause_search import Search
-from ballplate.gross_errors.leftover import leftover
-from ballplate.gross_errors.scatter import log_chances, ratio, scatters, with_scatter
+from ballplate.extensions.reliability.cause_search import Search
+from ballplate.extensions.reliability.leftover import leftover
+from ballplate.extensions.reliability.scatter import (
+    log_chances,
+    ratio,
+    scatters,
+    with_scatter,
+)
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
@@ -23,8 +28,8 @@ from ballplate.simulator.readings.generate import noisy_certificate, noisy_readi
 from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 
-from tests.reliability.designs import MIXED, PLANE, experiment
-from tests.reliability.test_against_dense import numeric
+from tests.extensions.reliability.designs import MIXED, PLANE, experiment
+from tests.extensions.reliability.test_against_dense import numeric
 
 Real = NDArray[np.float64]
 

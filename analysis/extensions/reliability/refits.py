@@ -14,6 +14,13 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from ballplate.extensions.laboratory.wrong_offsets import (
+    WrongOffsets,
+    discrete_mistakes,
+    offset_differences,
+    stated_offsets,
+    with_offsets,
+)
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.priors import Priors
@@ -23,13 +30,6 @@ from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.readings.wrong_offsets import (
-    WrongOffsets,
-    discrete_mistakes,
-    offset_differences,
-    stated_offsets,
-    with_offsets,
-)
 
 from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search
 from .exact_values import diagnosis_of_all
