@@ -24,6 +24,7 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
+    ("judgement", "maps"): "campaigns are compared as maps are",
     ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",

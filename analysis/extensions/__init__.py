@@ -33,6 +33,7 @@ SHIPPED = (
             **_from("repair_tables", "certificate_data", "certificate_lines", "repair_data"),
             **_from("repair_tables", "repair_lines", "changes_in_words"),
             **_from("mending_command", "with_repairs"),
+            **_from("missing_bars", "bar_reasons"),
         },
     ),
     _here(

@@ -14,8 +14,8 @@ from ballplate.planning.done import groups_taken
 from ballplate.results.adjustments import FEW
 from ballplate.results.campaign_sigmas import with_sigmas
 from ballplate.results.fit import Fit
+from ballplate.results.fitting import fit as fit_observed
 from ballplate.results.study import PlannedUncertainty
-from ballplate.results.study import fit as fit_observed
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise

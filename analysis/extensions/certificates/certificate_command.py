@@ -113,7 +113,7 @@ def _stated(text: str) -> tuple[str, str]:
 
 def run(options: Namespace) -> int:
     """Print or write the certificate; 1 if there is something to complain of."""
-    from ballplate.results.study import fit
+    from ballplate.results.fitting import fit
 
     experiment, observed = observed_readings(options)
     result = fit(experiment, observed, options.sigma)

@@ -12,10 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data, number, picked
-from ballplate.presentation.result import FitResult
-from ballplate.results.campaign_sigmas import campaign_sigmas
-from ballplate.results.campaign_tests import (
+from ballplate.extensions.maps.campaign_tests import (
     TOO_ALIKE,
     TOO_RARE,
     EstimatedSigma,
@@ -24,6 +21,9 @@ from ballplate.results.campaign_tests import (
     joint_difference,
     with_common,
 )
+from ballplate.presentation.formatting import aligned, as_data, number, picked
+from ballplate.presentation.result import FitResult
+from ballplate.results.campaign_sigmas import campaign_sigmas
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.corrections import corrected_points, correction_rows

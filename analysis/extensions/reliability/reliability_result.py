@@ -22,11 +22,11 @@ from ballplate.presentation.formatting import (
 )
 from ballplate.presentation.panels import RowOfPoints, draw_rows
 from ballplate.presentation.result import Result
-from ballplate.rank.proposed_bars import listed
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Functions, function_name
 from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.settings import listed
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.quantities import QUANTITIES

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation.formatting import SHOWN, number, picked
-from ballplate.rank.proposed_bars import listed
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.settings import listed, listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 

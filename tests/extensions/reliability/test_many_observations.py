@@ -11,7 +11,7 @@ from ballplate.extensions.reliability.leftover import entries, leftover
 from ballplate.extensions.reliability.patterns import patterns
 from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.extensions.reliability.response import responses
-from ballplate.results.study import fit
+from ballplate.results.fitting import fit
 from ballplate.simulator.estimation.functions import BallPlaces, Distances, displacements
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

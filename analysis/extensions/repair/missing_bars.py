@@ -12,19 +12,21 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
+from ballplate.rank.verdict import relative_changes
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.settings import listed
 from ballplate.simulator.machines.protocol import Array
 
-from .proposed_bars import MISSING, bars_to_add, listed
+from .proposed_bars import MISSING, bars_to_add
 
 AXES = "xyz"
 
 
-def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
+def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
     """What bars and gauges lack, given what changes of the shared parameters (s, k) are open."""
     if not len(design.of(Lengths)) or not open_.shape[1] or not len(design.evaluation.points):
         return ()
@@ -48,16 +50,6 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
         cure = bars_to_add(design, strains, overall if is_free else None)
         found.append(f"{missing}: nothing determines {told}{f'; {cure}' if cure else ''}")
     return tuple(found)
-
-
-def relative_changes(design: Design, layout: SharedLayout, directions: Array) -> Array:
-    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
-    metres.
-    """
-    points = design.evaluation.points
-    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
-    jacobian = design.model.jacobian(points, np.zeros(len(design.model.parameters)), offsets)
-    return without_rigid_motion(points, jacobian @ directions[layout.model])
 
 
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.directions import directions
+from ballplate.simulator.inputs.settings import listed
 from ballplate.simulator.machines.protocol import Array
 
 # Singular values below this fraction of the largest: what readings tell of a direction through
@@ -138,8 +139,3 @@ def _in_words(chosen: list[tuple[str, str]], gauge_only: bool) -> str:
     parts = [f"all round at {height} of {listed(rings)} deg"] if rings else []
     parts += [f"at several elevations at azimuths of {listed(sides)} deg"] if sides else []
     return f"read the ball for example {' and '.join(parts)} as well"
-
-
-def listed(words: list[str]) -> str:
-    """Words with commas and an "and" before the last."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from ballplate.rank.missing_bars import _told
+from ballplate.extensions.repair.missing_bars import _told
 from ballplate.rank.verdict import Verdict
 from ballplate.results.study import check, predict
 from ballplate.simulator.experiment.load import load
