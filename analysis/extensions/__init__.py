@@ -34,6 +34,7 @@ SHIPPED = (
             **_from("repair_tables", "repair_lines", "changes_in_words"),
             **_from("mending_command", "with_repairs"),
             **_from("missing_bars", "bar_reasons"),
+            **_from("whole_pool", "pool_gap"),
         },
     ),
     _here(
@@ -44,6 +45,8 @@ SHIPPED = (
             **_from("sheet_command", "sheet_name"),
             **_from("campaign_picture", "draw_campaign"),
             **_from("sheet", "Sheet"),
+            **_from("drift_orders", "DriftOrders"),
+            **_from("earlier", "begun"),
         },
     ),
     _here(

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.planning.done import groups_taken
 from ballplate.results.adjustments import FEW
 from ballplate.results.campaign_sigmas import with_sigmas
 from ballplate.results.fit import Fit
@@ -29,6 +28,7 @@ from ballplate.simulator.readings.reading_files import read_readings
 from ballplate.simulator.readings.reading_sources import Source
 from ballplate.uncertainty.summaries import uncertainties
 
+from .done import groups_taken
 from .next_result import NextStep, Offered
 from .redone import without_redone
 

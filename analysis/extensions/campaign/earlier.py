@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from ballplate.planning.offer import Offer, offer
+from ballplate.planning.short_names import names_of_plan
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.whitening import CovarianceRoot
 from ballplate.simulator.experiment.load import load
@@ -17,8 +19,6 @@ from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
 
 from .done import done_candidates
-from .offer import Offer, offer
-from .short_names import names_of_plan
 
 
 def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.planning.set_ups import REST, SetUp, base_name, position_of, renamed
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
@@ -26,32 +27,11 @@ from ballplate.simulator.readings.reading_sources import named_rows
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
-# How what completes a position, and what sets it up again, is named.
-REST = "rest of "
+# How a plan names positions.
 SHORT = re.compile(r"[Pp][1-9][0-9]*")
-AGAIN = re.compile(r"(.*) again(?: ([1-9][0-9]*))?", re.DOTALL)
 
 # How often a ball is read with a probe, by ball and probe.
 Amounts = dict[tuple[int, str], int]
-
-
-@dataclass(frozen=True)
-class SetUp:
-    """Readings of one set-up of the candidate `base` of a pool.
-
-    `read` has the readings that were taken, `whole` those that were planned as well, and `rest`
-    what is still missing, None where nothing is. `is_last` marks the set-up that was read last.
-    """
-
-    base: int
-    read: Candidate
-    whole: Candidate
-    rest: Candidate | None
-    is_last: bool
-
-    @property
-    def name(self) -> str:
-        return self.read.name
 
 
 def done_candidates(
@@ -97,7 +77,7 @@ def done_candidates(
     for number, (as_read, base) in enumerate(zip(drawn, found.values(), strict=True)):
         own = _meant(as_read.name, planned)
         candidate = renamed(candidates[base], own)
-        item = _position(candidate)
+        item = position_of(candidate)
         taken = groups_taken(design, number, experiment, item)
         result.append(_set_up(experiment, candidate, base, taken, as_read.name == name))
     return tuple(result)
@@ -109,48 +89,6 @@ def _meant(name: str, planned: Mapping[str, str]) -> str:
         return planned[name]
     base = base_name(name)
     return planned[base] + name[len(base) :] if base in planned else name
-
-
-def renamed(candidate: Candidate, name: str) -> Candidate:
-    """A position under another name."""
-    if candidate.name == name:
-        return candidate
-    settings = {**candidate.settings, "name": name}
-    return replace(
-        candidate,
-        name=name,
-        item=replace(_position(candidate), name=name),
-        settings=settings,
-        drawn=False,
-    )
-
-
-def next_name(name: str, taken: Sequence[str]) -> str:
-    """The name of a further set-up of a position, which nothing else has.
-
-    >>> next_name("low", ["low"]), next_name("low", ["low", "low again"])
-    ('low again', 'low again 2')
-    """
-    found, k = f"{name} again", 1
-    while found in taken:
-        k += 1
-        found = f"{name} again {k}"
-    return found
-
-
-def base_name(name: str) -> str:
-    """The name of a position that another set-up of it has, too.
-
-    >>> base_name("low again 2"), base_name("low")
-    ('low', 'low')
-    """
-    again = AGAIN.fullmatch(name)
-    return name if again is None else again[1]
-
-
-def _position(candidate: Candidate) -> Position:
-    assert isinstance(candidate.item, Position)
-    return candidate.item
 
 
 def groups_taken(
@@ -198,7 +136,7 @@ def _set_up(
     is_last: bool,
 ) -> SetUp:
     assert experiment.pool is not None
-    item = _position(candidate)
+    item = position_of(candidate)
     planned = item.readings
     missing = tuple(_missing(planned, taken, experiment.layouts[item.artefact].names))
     read = candidate if not missing and _same(taken, planned) else _with_readings(candidate, taken)
@@ -210,7 +148,7 @@ def _set_up(
         else _with_readings(candidate, (*taken, *missing))
     )
     rest = _with_readings(candidate, missing)
-    changes = (len(_position(rest).probes) - 1) * experiment.pool.changes.probe
+    changes = (len(position_of(rest).probes) - 1) * experiment.pool.changes.probe
     seconds = rest.readings * candidate.reading_seconds + changes
     rest = replace(rest, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
     return SetUp(base, read, whole, rest, is_last)
@@ -280,7 +218,7 @@ def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> 
         if one.standard_uncertainty is not None:
             group["standard_uncertainty"] = _exactly(one.standard_uncertainty)
         groups.append(group)
-    item = replace(_position(candidate), readings=readings)
+    item = replace(position_of(candidate), readings=readings)
     return replace(candidate, item=item, settings={**said, "readings": groups})
 
 

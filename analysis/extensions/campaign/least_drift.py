@@ -8,6 +8,9 @@ from itertools import combinations, permutations, product
 from math import factorial, prod
 
 import numpy as np
+from ballplate.planning.drift_times import without_drift
+from ballplate.planning.orders import with_probes
+from ballplate.planning.schedule import first_readings
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.influences.drift import HOUR, Clock
 from ballplate.simulator.design.influences.protocol import (
@@ -24,9 +27,7 @@ from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 
-from .drift_in_orders import effects_on_distances, without_drift
-from .orders import with_probes
-from .schedule import first_readings
+from .drift_in_orders import effects_on_distances
 
 # Orders, of positions and of the probes within them, up to which all are tried; of more, exchanges
 # from so many random starts.

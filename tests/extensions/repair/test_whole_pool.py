@@ -10,11 +10,10 @@ from typing import NoReturn
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.repair import repair_search
+from ballplate.extensions.repair import repair_search, whole_pool
 from ballplate.extensions.repair.changes import ChangeKind, apply_all
-from ballplate.planning import whole_pool
+from ballplate.extensions.repair.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.planning.information import pool_information
-from ballplate.planning.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.results.study import planned_uncertainty
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

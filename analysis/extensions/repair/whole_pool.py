@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.planning.information import Information
+from ballplate.rank.verdict import Verdict, changed_names
+from ballplate.results.study import check
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing
 
-from ..rank.verdict import Verdict, changed_names
-from ..results.study import check
-from .information import Information
+from .repair_search import Repair, repairs
+from .repair_tables import changes_in_words
 
 # Names of errors, and cures, that are told.
 MOST_NAMES, MOST_CURES = 8, 2
@@ -46,8 +47,8 @@ class PoolGap:
 
     candidates: int
     verdict: Verdict
-    cures: tuple[Any, ...]
-    partial: tuple[Any, ...]
+    cures: tuple[Repair, ...]
+    partial: tuple[Repair, ...]
     sought: bool
 
     @property
@@ -66,10 +67,6 @@ class PoolGap:
         """What would determine it."""
         if self.verdict.as_expected:
             return "the file expects that"
-        if optional_service("repairs") is None:
-            return (
-                "the extension repair, which looks for changes that determine it, is not installed"
-            )
         if not self.sought:
             return (
                 "changes that would determine it were not looked for in so large a design; check"
@@ -79,15 +76,15 @@ class PoolGap:
         if not cures:
             return "no change was found that would determine it"
         all_of_it = "it" if self.cures else "part of it"
-        told = "; or ".join(service("changes_in_words")(one) for one in cures[:MOST_CURES])
+        told = "; or ".join(changes_in_words(one) for one in cures[:MOST_CURES])
         return f"what would determine {all_of_it}, offered or done beside these: {told}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
             "deficiency": self.verdict.deficiency,
             "undetermined": [str(one) for one in self.verdict.null],
-            "cures": [service("changes_in_words")(one) for one in self.cures],
-            "partial_cures": [service("changes_in_words")(one) for one in self.partial],
+            "cures": [changes_in_words(one) for one in self.cures],
+            "partial_cures": [changes_in_words(one) for one in self.partial],
             "cures_sought": self.sought,
         }
 
@@ -123,10 +120,9 @@ def pool_gap(
     if judged is None or judged.deficiency != told + sum(information.pose_open[k] for k in few):
         return None
     size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
-    repairs = optional_service("repairs")
-    is_sought = size <= MOST_WORK and not judged.as_expected and repairs is not None
+    is_sought = size <= MOST_WORK and not judged.as_expected
     try:
-        found = repairs(design, report=report) if is_sought and repairs is not None else None
+        found = repairs(design, report=report) if is_sought else None
     except UNTOLD:
         found = None
     cures, partial = ((), ()) if found is None else (found.complete, found.partial)

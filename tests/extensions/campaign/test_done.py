@@ -5,9 +5,10 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from ballplate.planning.done import SetUp, done_candidates
+from ballplate.extensions.campaign.done import done_candidates
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import run_sheet
+from ballplate.planning.set_ups import SetUp
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

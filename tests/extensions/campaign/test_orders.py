@@ -12,9 +12,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
+from ballplate.extensions.campaign.drift_in_orders import drift_effect
+from ballplate.extensions.campaign.least_drift import _Drift, _Ways, least_drift
 from ballplate.planning.changeover import kind_of
-from ballplate.planning.drift_in_orders import drift_effect
-from ballplate.planning.least_drift import _Drift, _Ways, least_drift
 from ballplate.planning.orders import ORDERS, ReadingOrder, in_order, with_probes
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.planning.selection import Campaign
@@ -98,7 +98,7 @@ def test_the_least_change_over_is_that_of_all_orders(campaign: Campaign) -> None
     every = min(
         changes_of(with_probes(mixed, campaign.pool.changes)) for mixed in permutations(own)
     )
-    told = {one.order: one.change_seconds for one in campaign.orders}
+    told = {one.order: one.change_seconds for one in campaign.orders.effects}
     assert told["change-over"] == every
     assert list(told) == list(ORDERS) and min(told.values()) == every
 
@@ -169,7 +169,7 @@ def changed_distances(campaign: Campaign, sheet: RunSheet, axis: int) -> Real:
 
 
 def test_what_a_drift_does_is_what_readings_with_it_do(campaign: Campaign) -> None:
-    for told in campaign.orders:
+    for told in campaign.orders.effects:
         sheet = run_sheet(
             campaign.chosen,
             campaign.pool.changes,
@@ -246,7 +246,7 @@ def test_no_order_has_less_drift_of_the_scales(campaign: Campaign) -> None:
         for way in probe_orders(mixed)
     }
     assert len(every) == 120 * 8
-    told = {one.order: one.of_scale for one in campaign.orders}
+    told = {one.order: one.of_scale for one in campaign.orders.effects}
     chosen = tuple((step.name, step.probes) for step in campaign.sheet.steps)
     assert every[chosen] == pytest.approx(min(every.values()), rel=1e-6)
     assert told["least-drift"] == pytest.approx(every[chosen], rel=1e-3)
@@ -301,8 +301,8 @@ def test_exchanges_find_an_order_near_the_least(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     campaign = planned(tmp_path, "least-drift")
-    monkeypatch.setattr("ballplate.planning.least_drift.MOST_TRIED", 3)
-    least = {one.order: one.of_scale for one in campaign.orders}["least-drift"]
+    monkeypatch.setattr("ballplate.extensions.campaign.least_drift.MOST_TRIED", 3)
+    least = {one.order: one.of_scale for one in campaign.orders.effects}["least-drift"]
     for seed in range(1, 6):
         args = campaign.experiment, campaign.chosen, campaign.pool.changes
         order = ReadingOrder("least-drift", seed, least_drift(*args, seed))
@@ -341,7 +341,7 @@ def test_sizes_of_drift_scale_what_it_does(tmp_path: Path) -> None:
     path = pool_file(tmp_path)
     one = bp.plan(path, positions=6, drift=["1 um/h", "1 ppm/h"])
     other = bp.plan(path, positions=6, drift=["3 um/h", "0.5 ppm/h"])
-    for first, second in zip(one.orders, other.orders, strict=True):
+    for first, second in zip(one.orders.effects, other.orders.effects, strict=True):
         assert second.of_point == pytest.approx(3.0 * first.of_point, rel=1e-6)
         assert second.of_scale == pytest.approx(0.5 * first.of_scale, rel=1e-6)
         assert second.estimated == pytest.approx(first.estimated, rel=1e-6)
