@@ -133,6 +133,7 @@ for line in (
 
 import ballplate as bp
 import contextlib, io, warnings
+from ballplate.extensions import SHIPPED
 
 fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
 unsearched = [text for text in fit.warnings if "not looked for" in text]
@@ -147,7 +148,8 @@ with contextlib.redirect_stderr(told):
     status = main(["run", quickstart, "--report", sys.argv[1] + ".html"])
 assert status == 0 or "is not installed" in told.getvalue(), told.getvalue()
 assert not hasattr(bp, "nosuch")
-from ballplate.extensions import SHIPPED
+missing = {name for one in SHIPPED if one.name in sys.argv[3:] for name in one.functions}
+assert not missing & {*dir(bp)} and {"fit", "check"} <= {*dir(bp)}
 for one in SHIPPED:
     if one.name in sys.argv[3:]:
         for command in one.commands:
@@ -172,6 +174,10 @@ OPTIONS = {
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
+    "ci": (
+        ["check", "designs/quickstart.yaml", "--format", "github"],
+        ["check", "designs/quickstart.yaml", "--format", "junit"],
+    ),
 }
 
 POOL = """
@@ -288,6 +294,7 @@ def test_an_extension_of_a_laboratory_is_found(
     assert capsys.readouterr().out == "6\n"
     assert bp.count("designs/quickstart.yaml") == 6
     vars(bp).pop("count")
+    assert "count" in dir(bp)
     with pytest.raises(SystemExit):
         main(["--help"])
     assert "print the number of positions of a design" in capsys.readouterr().out

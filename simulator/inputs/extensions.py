@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -174,6 +175,19 @@ def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
     """Names that extensions provide of a kind, in the order of the table."""
     extensions = (*shipped(), *(registered().extensions if with_registered else ()))
     return tuple(name for one in extensions for name in getattr(one, kind))
+
+
+def installed_functions() -> tuple[str, ...]:
+    """Functions of extensions that are there, shipped or installed besides."""
+    there = (*filter(_is_there, shipped()), *registered().extensions)
+    return tuple(name for one in there for name in one.functions)
+
+
+def _is_there(extension: Extension) -> bool:
+    try:
+        return find_spec(extension.package) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def provider(kind: str, name: str) -> Extension | None:

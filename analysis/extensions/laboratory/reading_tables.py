@@ -205,3 +205,10 @@ def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
         5,
     )
     return [f"{text}; odd: {named}: check these readings for dirt, or for another feature"]
+
+
+class OtherTables:
+    """The functions that read tables that are not plain."""
+
+    of_sources = staticmethod(any_source_rows)
+    of_table = staticmethod(any_table_rows)

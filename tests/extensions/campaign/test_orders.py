@@ -30,7 +30,7 @@ from ballplate.uncertainty.quantities import evaluation_points
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
-TOP = Path(__file__).parents[2]
+TOP = Path(__file__).parents[3]
 SET_UP, READING, PROBE, PLANE = 900.0, 12.0, 120.0, 1500.0
 TIMES = {"set_up": "15 min", "reading": "12 s", "probe_change": "2 min", "plane_change": "25 min"}
 DRIFT = {

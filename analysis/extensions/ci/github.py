@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ballplate.planning.checked_files import CheckedDesign, CheckedFile
+from ballplate.results.parts import scale_lines, scale_warnings, target_lines, verdict_lines
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
-
-from ..planning.checked_files import CheckedDesign, CheckedFile
-from ..results.parts import scale_lines, scale_warnings, target_lines, verdict_lines
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:
