@@ -248,4 +248,6 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])
+    from ballplate.simulator.inputs.extensions import installed_functions
+
+    return sorted({*_PLACES, *installed_functions(), "__version__"})

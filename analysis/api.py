@@ -443,7 +443,6 @@ def plan(
     from .planning.campaign import Request, campaign
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
-    from .planning.earlier import begun
     from .planning.orders import ORDERS
     from .simulator.experiment.load import with_pool
 
@@ -463,7 +462,10 @@ def plan(
     chosen = found[0] if len(found) == 1 else with_pool(experiment_of(experiment))
     taken = None if done is None else table_of("done", done)
     before = None if earlier is None else Path(earlier)
-    return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)
+    offered, choice = None, None
+    if taken is not None or before is not None:
+        offered, choice = service("begun")(chosen, taken, moved, before)
+    return campaign(chosen, request, offered, choice, workers, report)
 
 
 def load_map(path: PathLike) -> FittedMap:

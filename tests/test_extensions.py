@@ -25,9 +25,12 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
+    ("judgement", "maps"): "campaigns are compared as maps are",
+    ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
     ("pages", "reliability"): "pages show how gross errors would act",
+    ("reliability", "laboratory"): "offsets that are stated wrong are searched as in readings",
     ("studio", "pages"): "the studio moves designs as pages do",
     ("sweeps", "pages"): "the page of a sweep is a page",
     ("studio", "repair"): "the studio writes changes into the file as repairs are written",
@@ -102,7 +105,7 @@ def test_no_name_is_provided_twice() -> None:
 
 
 # What others build on.
-SOME = ("campaign", "maps", "reliability", "requirements")
+SOME = ("campaign", "laboratory", "maps", "reliability", "requirements")
 
 WITHOUT = """
 import sys
@@ -131,8 +134,13 @@ for line in (
 
 import ballplate as bp
 import contextlib, io, warnings
+from ballplate.extensions import SHIPPED
 
 fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+unsearched = [text for text in fit.warnings if "not looked for" in text]
+hidden = {"laboratory", "reliability"} & {*sys.argv[3:]}
+assert len(unsearched) == ("laboratory" in hidden) + bool(hidden), fit.warnings
+assert all("extension laboratory" in text or "extension reliability" in text for text in unsearched)
 assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
 with contextlib.suppress(SystemExit):
     main(["--help"])
@@ -141,7 +149,8 @@ with contextlib.redirect_stderr(told):
     status = main(["run", quickstart, "--report", sys.argv[1] + ".html"])
 assert status == 0 or "is not installed" in told.getvalue(), told.getvalue()
 assert not hasattr(bp, "nosuch")
-from ballplate.extensions import SHIPPED
+missing = {name for one in SHIPPED if one.name in sys.argv[3:] for name in one.functions}
+assert not missing & {*dir(bp)} and {"fit", "check"} <= {*dir(bp)}
 for one in SHIPPED:
     if one.name in sys.argv[3:]:
         for command in one.commands:
@@ -167,6 +176,10 @@ OPTIONS = {
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
     "maps": (["run", "designs/quickstart.yaml", "--lengths"],),
+    "ci": (
+        ["check", "designs/quickstart.yaml", "--format", "github"],
+        ["check", "designs/quickstart.yaml", "--format", "junit"],
+    ),
 }
 
 POOL = """
@@ -286,6 +299,7 @@ def test_an_extension_of_a_laboratory_is_found(
         assert capsys.readouterr().out == "6\n"
     assert bp.count(QUICKSTART) == 6
     vars(bp).pop("count")
+    assert "count" in dir(bp)
     with pytest.raises(SystemExit):
         main(["--help"])
     assert "print the number of positions of a design" in capsys.readouterr().out

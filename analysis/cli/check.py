@@ -115,6 +115,8 @@ def run(options: Namespace) -> int:
         goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
     )
     paths = matching_files(options.files)
+    if options.format == "junit":
+        service("junit_report")
     if options.fix and not options.diff:
         options.interruption.kept = partial(written, signatures(paths))
     files, statuses = [], [AS_EXPECTED]
@@ -129,9 +131,7 @@ def run(options: Namespace) -> int:
             if not wanted.repairs and options.format == "text":
                 _name_suggestions(checked, options)
     if options.format == "junit":
-        from .junit import junit_report
-
-        print(junit_report(files), end="")
+        print(service("junit_report")(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
         print_json([one.prediction.to_dict() for one in designs])
@@ -156,12 +156,11 @@ def _goals(options: Namespace) -> tuple[Any, ...]:
         raise UsageError("--share goes with --goal lengths; add it")
     if not options.goal:
         return ()
-    parse_goal, wrong_goal = service("parse_goal"), service("GoalError")
-
+    parse_goal = service("parse_goal")
     with_share = {"lengths": options.share}
     try:
         return tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
-    except wrong_goal as error:
+    except ValueError as error:
         raise UsageError(str(error)) from None
 
 
@@ -172,10 +171,8 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
     tell_notes(checked.notes)
     warn(checked.doubts)
     if options.format == "github":
-        from .github import annotation_lines
-
         workspace = os.environ.get("GITHUB_WORKSPACE")
-        for line in annotation_lines(checked, Path(workspace) if workspace else None):
+        for line in service("annotation_lines")(checked, Path(workspace) if workspace else None):
             print(line, flush=True)
     elif options.diff:
         for design in checked.designs:

@@ -173,9 +173,7 @@ def _sheet_name(text: str) -> Path:
 
 @argument_type
 def _drift(text: str) -> str:
-    from ..planning.drift_in_orders import drift_size
-
-    drift_size(text)
+    service("DriftOrders").ensure_size(text)
     return text
 
 
@@ -186,12 +184,14 @@ def run(options: Namespace) -> int:
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
-    from ..planning.earlier import begun
     from .excerpts import print_errors
     from .progress import progress
 
     experiment = single(options, planning=True)
-    offered, earlier = begun(experiment, options.done, options.moved, options.earlier)
+    offered, earlier = None, None
+    if options.done or options.earlier or options.moved:
+        begun = service("begun")
+        offered, earlier = begun(experiment, options.done, options.moved, options.earlier)
     asked = (options.hours, options.readings, options.positions)
     budget = None
     if any(value is not None for value in asked):

@@ -97,7 +97,7 @@ def fit_readings(
 
         return fit_lengths(experiment, observed, estimator, sigma)
     if estimator == "full":
-        from ..results.study import fit
+        from ..results.fitting import fit
 
         return fit(experiment, observed, sigma, monomials, components, reweight)
     from .distances import fit_alternative

@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 
 from ..results.estimates import ParameterEstimate
 from ..results.fit import Fit
+from ..results.fitting import fit
 from ..results.plates import axes_of_plates
-from ..results.study import fit
 from .reversal_result import ReversalFit, of_all_balls
 
 INSTEAD = "or fit without --estimator, which takes any positions"

@@ -30,17 +30,16 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "reach"),
-        services=_from("goals", "GoalError", "parse_goal") | _from("judged_goals", "judged_goals"),
+        services=_from("goals", "parse_goal") | _from("judged_goals", "judged_goals"),
     ),
     _here(
         "repair",
         functions=_from("interface", "repair"),
         services={
-            **_from("repair_search", "repairs"),
-            **_from("scale", "scale_certificate"),
-            **_from("repair_tables", "certificate_data", "certificate_lines", "repair_data"),
-            **_from("repair_tables", "repair_lines", "changes_in_words"),
+            **_from("suggestions", "suggested"),
             **_from("mending_command", "with_repairs"),
+            **_from("missing_bars", "bar_reasons"),
+            **_from("whole_pool", "pool_gap"),
         },
     ),
     _here(
@@ -62,6 +61,8 @@ SHIPPED = (
             **_from("sheet_command", "sheet_name"),
             **_from("campaign_picture", "draw_campaign"),
             **_from("sheet", "Sheet"),
+            **_from("drift_orders", "DriftOrders"),
+            **_from("earlier", "begun"),
         },
     ),
     _here(
@@ -72,7 +73,10 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "read_report"),
-        services=_from("reading_tables", "any_source_rows", "any_table_rows"),
+        services={
+            **_from("reading_tables", "OtherTables"),
+            **_from("reading_checks", "ReadingChecks"),
+        },
     ),
     _here(
         "judgement",
@@ -104,6 +108,7 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "reliability"),
+        services=_from("searched_fit", "diagnosed"),
     ),
     _here(
         "certificates",
@@ -182,7 +187,6 @@ SHIPPED = (
     _here(
         "pages",
         functions=_from("interface", "page", "view"),
-        services=_from("offered", "design_view", "fit_page_text", "fit_view"),
     ),
     _here(
         "sweeps",
@@ -202,8 +206,11 @@ SHIPPED = (
             **_from("running", "OtherSweepError"),
             **_from("store_file", "StoreError"),
         },
-        services=_from("running", "SweepResult"),
         schemas={"sweep": "sweep_schema"},
+    ),
+    _here(
+        "ci",
+        services=_from("github", "annotation_lines") | _from("junit", "junit_report"),
     ),
     _here(
         "studio",

@@ -14,25 +14,19 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
+from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 
 from ..results.study import predict
 from .bound import Bound, bound
-from .choice import CurvePoint, Gain
+from .choice import CurvePoint, DriftInOrders, Gain, OpenPool
 from .constraints import Budget, Constraints, constraints
 from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
-from .drift_in_orders import (
-    drift_effect,
-    in_time,
-    is_of_plates,
-    parse_drift_size,
-    without_drift,
-)
+from .drift_times import in_time, without_drift
 from .information import pool_information
-from .least_drift import least_drift
 from .offer import Offer, offer, open_directions
-from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
+from .orders import LEAST_CHANGE_OVER, OrderName
 from .schedule import Completion, run_sheet
 from .search import (
     GAIN,
@@ -47,7 +41,6 @@ from .search import (
 )
 from .selection import Campaign
 from .short_names import short_names
-from .whole_pool import pool_gap
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -162,7 +155,10 @@ def _campaign(
     information = pool_information(
         known, whole, is_about_balls(request.criterion), completed_by, report
     )
-    gap = pool_gap(known, pool.candidates, information, report) if information.deficiency else None
+    gap: OpenPool | None = None
+    gap_of = optional_service("pool_gap") if information.deficiency else None
+    if gap_of is not None:
+        gap = gap_of(known, pool.candidates, information, report)
     try:
         wanted = criterion(information, experiment, request.criterion)
     except ExperimentError as error:
@@ -205,9 +201,8 @@ def _campaign(
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
-    offers = _orders(experiment, pool, request, offered, chosen)
-    order = next(one for one in offers if one.name == (request.order or LEAST_CHANGE_OVER.name))
-    size = parse_drift_size(request.drift, experiment)
+    orders = _orders(experiment, pool, request, offered, chosen)
+    order = LEAST_CHANGE_OVER if orders is None else orders.chosen
     sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order=order)
     names = short_names(
         (step.position for step in sheet.steps), offered.names, [one.name for one in candidates]
@@ -239,18 +234,7 @@ def _campaign(
         interrupted,
         left_open,
         order=order,
-        drift=size,
-        orders=tuple(
-            drift_effect(
-                experiment,
-                one.name,
-                run_sheet(chosen, pool.changes, order=one),
-                pool.changes,
-                size,
-            )
-            for one in offers
-            if len(offers) > 1
-        ),
+        orders=orders,
         names=names,
         gap=gap,
     )
@@ -262,27 +246,19 @@ def _orders(
     request: Request,
     offered: Offer,
     chosen: Sequence[Candidate],
-) -> list[ReadingOrder]:
-    """The orders that are offered: where one is asked or a drift stated, all that there are.
-
-    :raises ExperimentError: an order is asked of a campaign that has begun, or that of the least
-        effect of drift where there are length standards.
+) -> DriftInOrders | None:
+    """The order to read in, and what a drift does in each, where that is asked or a drift is
+    stated; None where nothing drifts, or nobody can tell.
     """
-    is_stated = len(without_drift(experiment).influences) < len(experiment.influences)
-    is_asked = bool(request.order or request.drift)
-    if offered.done and is_asked:
-        text = "has begun, and its times are unknown; leave --order and --drift out"
-        raise _impossible(experiment, "pool", text)
-    if offered.done or not (is_asked or is_stated):
-        return [LEAST_CHANGE_OVER]
-    own = [one for one in chosen if isinstance(one.item, Position)]
-    found = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
-    if is_of_plates(experiment, own):
-        sequence = least_drift(experiment, chosen, pool.changes, request.seed)
-        return [*found, ReadingOrder("least-drift", request.seed, sequence)]
-    if request.order == "least-drift":
-        text = "has length standards, whose drift is not followed; ask for another --order"
-        raise _impossible(experiment, "pool", text)
+    if request.order or request.drift:
+        orders = service("DriftOrders")
+    elif len(without_drift(experiment).influences) < len(experiment.influences):
+        orders = optional_service("DriftOrders")
+    else:
+        return None
+    if orders is None:
+        return None
+    found: DriftInOrders = orders.of(experiment, pool, request, bool(offered.done), chosen)
     return found
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.load import load
@@ -19,10 +19,19 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
+from ..rank.verdict import Verdict
 from ..results.prediction import Advice, Prediction
 from ..results.study import check
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
+
+
+class SuggestedChanges(Protocol):
+    """What is suggested of a design, as lines of text and as plain data."""
+
+    def lines(self, judged: Verdict) -> list[str]: ...
+
+    def data(self) -> dict[str, Any]: ...
 
 
 @dataclass(frozen=True)
@@ -30,17 +39,16 @@ class CheckedDesign:
     """The verdict on one design; `place` is where its file should change, None where nothing is to
     be complained of, and `variant` its name in the file.
 
-    `repairs` are changes that would determine what is open, None where nothing is or none were
-    asked for. `goals` tell how each goal that was asked for is met, and `missed` what fails of
-    these and of what is weak.
+    `suggestions` are changes that would determine what is open, None where none were asked for.
+    `goals` tell how each goal that was asked for is met, and `missed` what fails of these and of
+    what is weak.
     """
 
     prediction: Prediction
     place: Mark | None
-    repairs: Any = None
+    suggestions: SuggestedChanges | None = None
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
-    certificate: Any = None
     variant: str | None = None
 
     @property
@@ -144,16 +152,14 @@ def checked_design(
 ) -> CheckedDesign:
     """An experiment judged, with changes looked for in its pool if there is one."""
     prediction = check(experiment, with_scale=True)
-    found, certificate = None, None
+    found: SuggestedChanges | None = None
     if with_pool is not None:
-        found = service("repairs")(with_pool, report=report)
-        certificate = service("scale_certificate")(with_pool, prediction.scale)
+        found = service("suggested")(with_pool, prediction, report)
     goals, missed = _judged(experiment, wanted.goals)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (number_of(count, "weakly determined direction"),)
-    design = CheckedDesign(prediction, None, found, goals, missed, certificate, experiment.name)
-    design = advised(design, wanted.repairs)
+    design = advised(CheckedDesign(prediction, None, found, goals, missed, experiment.name))
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (
@@ -164,16 +170,16 @@ def checked_design(
     return replace(design, place=experiment.place(steps))
 
 
-def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
-    """A design whose prediction tells what it was checked for besides the rank."""
+def advised(design: CheckedDesign) -> CheckedDesign:
+    """A design whose prediction tells what it was checked for besides the rank, and what is
+    suggested.
+    """
     prediction = design.prediction
     lines = [*design.goals]
     data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
-    if with_repairs:
-        lines += service("certificate_lines")(design.certificate)
-        lines += service("repair_lines")(design.repairs, prediction.verdict)
-        data["repairs"] = service("repair_data")(design.repairs)
-        data["scale_certificate"] = service("certificate_data")(design.certificate)
+    if design.suggestions is not None:
+        lines += design.suggestions.lines(prediction.verdict)
+        data |= design.suggestions.data()
     advice = Advice(design.missed, tuple(lines), data)
     return replace(design, prediction=replace(prediction, advice=advice))
 

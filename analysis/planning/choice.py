@@ -4,18 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
+from ballplate.simulator.inputs.messages import ExperimentError
 
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
-from .done import REST
-from .drift_in_orders import DriftEffect, DriftSize
 from .orders import LEAST_CHANGE_OVER, ReadingOrder
 from .schedule import Completion
-from .whole_pool import PoolGap
+from .set_ups import REST
+
+
+class DriftInOrders(Protocol):
+    """What a drift does in each order of a campaign, and the order that was chosen."""
+
+    @property
+    def chosen(self) -> ReadingOrder: ...
+
+    def lines(self, campaign: Any) -> list[str]: ...
+
+    def data(self) -> dict[str, Any]: ...
+
+
+class OpenPool(Protocol):
+    """What all candidates together leave undetermined, and what would determine it, in words."""
+
+    @property
+    def words(self) -> str: ...
+
+    @property
+    def remedy(self) -> str: ...
+
+    def to_dict(self) -> dict[str, Any]: ...
+
+    def refusing(self, error: ExperimentError) -> ExperimentError: ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +83,7 @@ class Selection:
     do better than, NaN where there is none. `drawn` is the criterion of the positions of the
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
     `drawn_words`; None without any. `prediction` judges what is chosen in full, in this `order`.
-    `orders` are what a `drift` does in each order, where that was asked. `names` are the short
+    `orders` tell what a drift does in each order, where that was asked. `names` are the short
     names of positions whose names the pool composed. `gap` is what the whole pool leaves
     undetermined, None where nothing.
     """
@@ -87,10 +112,9 @@ class Selection:
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
     order: ReadingOrder = LEAST_CHANGE_OVER
-    drift: DriftSize = DriftSize()
-    orders: tuple[DriftEffect, ...] = ()
+    orders: DriftInOrders | None = None
     names: Mapping[str, str] = field(default_factory=dict)
-    gap: PoolGap | None = None
+    gap: OpenPool | None = None
 
     def title_of(self, candidate: Candidate) -> str:
         """The name of a candidate, after its short name if it has one."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,18 +17,20 @@ from ..presentation.result import Result
 from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
-from .done import base_name
-from .drift_in_orders import DriftEffect, in_order_settings, in_time, is_of_plates
+from .drift_times import in_order_settings, in_time
 from .experiment_file import experiment_text
-from .orders import ORDERS
 from .run_sheet_tables import sheet_data, sheet_lines
 from .schedule import RunSheet, run_sheet
+from .set_ups import base_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Candidates left out, and reasons for leaving candidates out of the pool, that are told.
 TOLD = 5
+
+# What is said where nothing drifts: the size of a drift that would be told of, and no orders.
+WITHOUT_DRIFT: Mapping[str, Any] = {"drift": {"point": 1e-6, "scale": 1e-6}, "orders": []}
 
 
 @dataclass(frozen=True, repr=False)
@@ -140,8 +143,8 @@ class Campaign(Selection, Result):
             lines += ["", *_gain_table(self)]
         if self.curve:
             lines += ["", *_curve_table(self)]
-        if self.orders:
-            lines += ["", *_order_table(self)]
+        orders = [] if self.orders is None else self.orders.lines(self)
+        lines += ["", *orders] if orders else []
         return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
     def to_dict(self) -> dict[str, Any]:
@@ -174,8 +177,7 @@ class Campaign(Selection, Result):
             "left_out": [_gain_data(gain) for gain in self.left_out],
             "curve": [_point_data(point) for point in self.curve],
             "order": asdict(self.order),
-            "drift": asdict(self.drift),
-            "orders": [_order_data(one) for one in self.orders],
+            **(WITHOUT_DRIFT if self.orders is None else self.orders.data()),
             "run_sheet": sheet_data(self.sheet),
             "plan": self.prediction.to_dict(),
         }
@@ -195,59 +197,6 @@ class Campaign(Selection, Result):
         """
         figure: Figure = service("draw_campaign")(self, path)
         return figure
-
-
-def _order_table(campaign: Campaign) -> list[str]:
-    """What a drift does in each order, and which one is chosen."""
-    size = campaign.drift
-    rows = [
-        [
-            "order",
-            "hours",
-            "change-over, h",
-            f"{number(1e6 * size.point)} µm/h does",
-            f"{number(1e6 * size.scale)} ppm/h does",
-            "U6, no drift",
-            "drift estimated",
-            "",
-        ]
-    ]
-    budget = campaign.budget.seconds
-    for one in campaign.orders:
-        is_over = budget is not None and one.seconds > budget * (1.0 + 1e-9)
-        words = ["chosen"] if one.order == campaign.order.name else []
-        words += ["more hours than allowed"] if is_over else []
-        values = (one.of_point, one.of_scale, one.without, one.estimated)
-        rows.append(
-            [
-                ORDERS[one.order],
-                f"{one.seconds / HOUR:.2f}",
-                f"{one.change_seconds / HOUR:.2f}",
-                *(number(1e6 * value) for value in values),
-                ", ".join(words),
-            ]
-        )
-    places = (step.candidate for step in campaign.sheet.steps)
-    if not is_of_plates(campaign.experiment, places):
-        why = "no figures of drift: that of length standards is not followed"
-        return [*aligned(rows, [False, *[True] * 6, False]), why]
-    return [
-        *aligned(rows, [False, *[True] * 6, False]),
-        "what a drift that nobody knows of changes a distance between corrected points by at"
-        " most, and the mean uncertainty of these distances; µm",
-        *_chosen_without_drift(campaign),
-    ]
-
-
-def _chosen_without_drift(campaign: Campaign) -> list[str]:
-    """That the drift of the file had no part in the choice."""
-    drifts = [one for one in campaign.experiment.influences if one.in_order]
-    if not drifts:
-        return []
-    return [
-        "positions were chosen as if nothing drifted; U1 to U6 are those with the drift of the"
-        " file, in the order chosen"
-    ]
 
 
 def _interrupted(campaign: Campaign) -> list[str]:
@@ -352,13 +301,6 @@ def _gain_data(gain: Gain) -> dict[str, Any]:
         "without": finite(gain.without),
         "with": finite(gain.with_),
         "seconds": gain.candidate.seconds,
-    }
-
-
-def _order_data(effect: DriftEffect) -> dict[str, Any]:
-    return {
-        key: finite(value) if isinstance(value, float) else value
-        for key, value in asdict(effect).items()
     }
 
 

@@ -16,11 +16,11 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
 from .canonical import elementary_mixture, principal_directions
-from .missing_bars import reasons, relative_changes
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01
@@ -183,6 +183,7 @@ def verdict(
     weak, effect = _weak_roots(at, target)
     limit = weak_limit(design, target)
     open_ = np.concatenate([at.shared_null, weak], axis=1)
+    reasons = optional_service("bar_reasons")
     return Verdict(
         design.parameter_count,
         design.observation_count,
@@ -192,8 +193,18 @@ def verdict(
         found.gap if np.isinf(found.gap) else min(found.gap, GREAT),
         null_directions(at),
         _weak_directions(design, layout, weak, effect, limit),
-        reasons(design, layout, open_),
+        () if reasons is None else reasons(design, layout, open_),
     )
+
+
+def relative_changes(design: Design, layout: SharedLayout, directions: Array) -> Array:
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
+    metres.
+    """
+    points = design.evaluation.points
+    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
+    jacobian = design.model.jacobian(points, np.zeros(len(design.model.parameters)), offsets)
+    return without_rigid_motion(points, jacobian @ directions[layout.model])
 
 
 def null_directions(at: Linearisation) -> tuple[Direction, ...]:

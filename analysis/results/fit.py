@@ -12,7 +12,7 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
-from ballplate.simulator.inputs.extensions import optional_service, service
+from ballplate.simulator.inputs.extensions import function, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
@@ -20,9 +20,6 @@ from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
-from ..gross_errors.exact_values import has_exact_values
-from ..gross_errors.suspects import Diagnosis
-from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
 from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
@@ -33,6 +30,15 @@ from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .asked import (
+    AskedResult,
+    GroupVariances,
+    IssuedCertificate,
+    SpaceView,
+    picture_in_space,
+    shown_in_space,
+)
+from .diagnosis import Suspicion, has_exact_values, lack_of_fit
 from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
     CorrectedPoints,
@@ -69,11 +75,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .campaign_sigmas import CampaignSigmas
-
-
-def lack_of_fit(squares: float, freedom: int, diagnosis: Diagnosis, untested: str) -> LackOfFit:
-    """The lack of fit of a sum of squares; residuals that are `untested` may have a pattern."""
-    return LackOfFit(squares, freedom, len(diagnosis.suspects), bool(diagnosis or untested))
 
 
 REWEIGHTED = (
@@ -122,13 +123,13 @@ class Fit(FitResult):
     largest: tuple[Residual, ...]
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
-    diagnosis: Diagnosis = Diagnosis()
+    diagnosis: Suspicion | None = None
     untested: str = ""
     estimated: EstimatedFunctions | None = None
-    variance_components: Any = None
+    variance_components: GroupVariances | None = None
     is_reweighted: bool = False
     experiment: Experiment | None = None
-    bootstrap: Any = None
+    bootstrap: AskedResult | None = None
     campaigns: CampaignSigmas | None = None
     before_reweighting: LackOfFit | None = None
 
@@ -179,7 +180,7 @@ class Fit(FitResult):
             return lines
         lines += ["", *self._residual_table()]
         if self.diagnosis:
-            lines += diagnosis_lines(self.diagnosis, self.observed.marks)
+            lines += self.diagnosis.lines(self.observed.marks)
         if self.variance_components is not None:
             lines += ["", *self.variance_components.lines()]
             lines += [REWEIGHTED] if self.is_reweighted else []
@@ -212,7 +213,7 @@ class Fit(FitResult):
     def to_dict(self) -> dict[str, Any]:
         suspected: dict[str, Any] = {}
         if self.diagnosis:
-            suspected = {"suspected": diagnosis_data(self.diagnosis, self.observed.marks)}
+            suspected = {"suspected": self.diagnosis.data(self.observed.marks)}
         return {
             "experiment": self.label,
             "title": self.title,
@@ -314,22 +315,16 @@ class Fit(FitResult):
 
         :raises ValueError: the fit does not know its experiment.
         """
-        if self.experiment is None:
-            raise ValueError(
-                "the fit does not know its experiment, which a page names; fit it anew"
-            )
-        return str(service("fit_page_text")(self))
+        return str(function("page")(self))
 
-    def view(self) -> Any:
+    def view(self) -> SpaceView:
         """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
         or weak directions, which move; of a fit that has failed the positions alone.
         """
-        return service("fit_view")(self)
+        return shown_in_space(self)
 
     def _repr_html_(self) -> str:
-        view = optional_service("fit_view")
-        picture = "" if view is None else view(self)._repr_html_()
-        return self._written(as_html, ROWS_BESIDE_VIEW) + picture
+        return self._written(as_html, ROWS_BESIDE_VIEW) + picture_in_space(self)
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
@@ -362,7 +357,7 @@ class Fit(FitResult):
         with np.errstate(invalid="ignore", divide="ignore"):
             return found / np.outer(spread, spread)
 
-    def components(self, by: Grouping = "axis") -> Any:
+    def components(self, by: Grouping = "axis") -> GroupVariances:
         """How uncertain groups of observations are against what is stated of them, by restricted
         maximum likelihood; of a fit that is reweighted, against what has been estimated.
 
@@ -378,7 +373,10 @@ class Fit(FitResult):
         """
         ensure_one_of(GROUPINGS, by=by)
         at = self.functions.at
-        return service("variance_components")(self.label, self.title, at, self.observed.x, by)
+        found: GroupVariances = service("variance_components")(
+            self.label, self.title, at, self.observed.x, by
+        )
+        return found
 
     def with_trials(
         self, trials: int, seed: int, workers: int = 1, report: Report = unreported
@@ -442,7 +440,7 @@ class Fit(FitResult):
         datum: str | Sequence[str] = (),
         coverage_factor: float | None = None,
         about: Mapping[str, str] | None = None,
-    ) -> Any:
+    ) -> IssuedCertificate:
         """The co-ordinates of a plate's balls in its own axes with their full covariance, to be
         written as a page, tables, a digital calibration certificate or a GTC archive.
 
@@ -463,7 +461,8 @@ class Fit(FitResult):
         if coverage_factor is not None:
             ensure_positive("a coverage factor above 0", coverage_factor=coverage_factor)
         asked = plate, tuple(names), coverage_factor, about
-        return service("plate_certificate")(self, *asked)
+        found: IssuedCertificate = service("plate_certificate")(self, *asked)
+        return found
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
         """Residuals of a fit that has converged, for each position; in three dimensions as they are
@@ -520,8 +519,7 @@ class Fit(FitResult):
             )
             if has_exact_values(self.design):
                 cure += "; several values that are stated as exact may be wrong, too"
-            shown = self.diagnosis
-            if shown.suspects or shown.scatter or shown.refit:
+            if self.diagnosis and self.diagnosis.names_causes:
                 cure = "see what is suspected"
             times = self.lack_of_fit.times
             found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
@@ -535,7 +533,9 @@ class Fit(FitResult):
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
-        if self.untested:
+        if self.untested and self.diagnosis is None:
+            found.append(self.untested)
+        elif self.untested:
             found.append(
                 f"{self.untested}: fit the means of repeated readings, with u as a column, to have"
                 " them tested"

@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.yamltree import Mapping, read_tree
 from ballplate.simulator.readings.reading_files import read_readings
 
 from .fit import Fit
-from .study import fit
+from .fitting import fit
 
 
 def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import picked
@@ -19,6 +18,7 @@ from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
+from .asked import SpaceView, picture_in_space, shown_in_space
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .parts import (
     map_lines,
@@ -140,15 +140,14 @@ class Prediction(Result):
         names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
-    def view(self) -> Any:
+    def view(self) -> SpaceView:
         """The design in space: positions, ellipsoids of points and balls, and undetermined or weak
         directions, which move.
         """
-        return service("design_view")(self)
+        return shown_in_space(self)
 
     def _repr_html_(self) -> str:
-        view = optional_service("design_view")
-        return super()._repr_html_() + ("" if view is None else view(self)._repr_html_())
+        return super()._repr_html_() + picture_in_space(self)
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of U1 to U6; where these were not asked for, one with the rank and

@@ -65,9 +65,9 @@ TERMINAL = {
 }
 # What the commands load when they are run; loaded before, it takes no time for each of them.
 LOADED_BEFORE = (
-    "ballplate.cli.github",
+    "ballplate.extensions.ci.github",
     "ballplate.cli",
-    "ballplate.cli.junit",
+    "ballplate.extensions.ci.junit",
     "ballplate.montecarlo.experiments",
     "ballplate.montecarlo.comparison_tables",
     "matplotlib.figure",

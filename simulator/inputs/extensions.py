@@ -201,6 +201,19 @@ def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
     return tuple(name for one in extensions for name in getattr(one, kind))
 
 
+def installed_functions() -> tuple[str, ...]:
+    """Functions of extensions that are there, shipped or installed besides."""
+    there = (*filter(_is_there, shipped()), *registered().extensions)
+    return tuple(name for one in there for name in one.functions)
+
+
+def _is_there(extension: Extension) -> bool:
+    try:
+        return find_spec(extension.package) is not None
+    except ModuleNotFoundError:
+        return False
+
+
 def provider(kind: str, name: str) -> Extension | None:
     """The extension that provides a name; None where none does."""
     for one in shipped():

@@ -133,3 +133,8 @@ def shorten(text: str, limit: int = 60) -> str:
     """
     text = " ".join(text.split())
     return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+def listed(words: list[str]) -> str:
+    """Words with commas and an "and" before the last."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

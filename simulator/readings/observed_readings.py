@@ -13,12 +13,10 @@ import numpy as np
 from ..design.arrays import Design, Readings, in_sequence
 from ..design.observations.lengths import Lengths
 from ..estimation.spheres import fit_sphere
+from ..inputs.extensions import MissingExtensionError, service
 from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array, Integers
-from .common_causes import doubts_about_poses
-from .gross_error_messages import doubts_about_lengths, doubts_about_volume
-from .implausible_temperatures import doubts_about_temperatures
 
 # A gauge whose directions are no further from the planned ones than this (rad) has them.
 AS_PLANNED = 0.01
@@ -58,17 +56,16 @@ class ObservedReadings:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """What of them is possible, and unlikely to be meant: lengths, places, temperatures."""
-        of_volume = doubts_about_volume(self.design, self.x, self.marks)
-        of_poses = doubts_about_poses(self.design, self.x)
-        return (
-            *self.of_certificate,
-            *self.of_offsets,
-            *of_poses,
-            *doubts_about_lengths(self.design, self.x),
-            *of_volume,
-            *doubts_about_temperatures(self.design, self.marks),
-        )
+        """What of them is possible, and unlikely to be meant: lengths, places, temperatures; or
+        that nobody looked.
+        """
+        try:
+            checks = service("ReadingChecks")
+        except MissingExtensionError as error:
+            found: tuple[str, ...] = (f"mistakes in readings were not looked for ({error})",)
+        else:
+            found = checks.doubts_about_readings(self.design, self.x, self.marks)
+        return (*self.of_certificate, *self.of_offsets, *found)
 
 
 def reading_keys(readings: Readings) -> list[tuple[int, int, int]]:

@@ -5,7 +5,7 @@ name.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -15,21 +15,19 @@ import numpy as np
 from ..design.arrays import Design, Readings, in_sequence, measured, nominal_state
 from ..design.observations.readings import expected_readings
 from ..experiment.readings_section import ReadingsSettings, no_settings
+from ..inputs.extensions import optional_service, service
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.settings import hint, listing, number_of
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .coordinate_kinds import as_scale_readings, doubts_about_copies
-from .digits import doubts_about_digits, doubts_about_units
-from .gross_error_messages import refuse_gross_errors, with_names_swapped
 from .observed_readings import ObservedReadings, combine_standards, reading_keys
-from .offsets_applied import doubt_about_offsets, said_of
 from .reading_sources import Source, source_rows
-from .redone import without_redone
 
 AXES = ("x", "y", "z")
+
+Thinning = Callable[[Sequence[FileRow], Design], tuple[tuple[FileRow, ...], tuple[str, ...]]]
 
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
@@ -61,7 +59,7 @@ def read_readings(
     design: Design,
     every_ball: bool = True,
     settings: ReadingsSettings | None = None,
-    last_count: bool = False,
+    thinned: Thinning | None = None,
 ) -> ObservedReadings:
     """Readings of a file, or of several, as observations of a design.
 
@@ -72,11 +70,15 @@ def read_readings(
     reading has the uncertainty that the design plans for it, and one that is not planned the
     machine's repeatability. Influence quantities have further columns. A reading stands in the file
     no more often than the design plans it; one that is not planned, once. Unless `every_ball` has
-    to be read, some may be missing. With `last_count` those of positions that were read again
-    replace the earlier ones, which is `redone` in words.
+    to be read, some may be missing. `thinned` tells which rows count, and in words what was
+    left out, which is `redone`.
+
+    Whether readings can be of the ball that they name, and their co-ordinates of the stated kind,
+    the extension judges that reads other tables.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
-        cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
+        cannot be of the ball they name; all of a kind at once.
+    :raises MissingExtensionError: what the settings ask for needs that extension.
     """
     d, asked = design.dimension, settings or no_settings()
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
@@ -89,7 +91,7 @@ def read_readings(
 
     found = source_rows(sources, design, asked, messages, is_possible, units, empty)
     settings = found.settings
-    rows, redone = without_redone(found.rows, design) if last_count else (found.rows, ())
+    rows, redone = thinned(found.rows, design) if thinned else (found.rows, ())
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
@@ -111,12 +113,11 @@ def read_readings(
     if design.influences:
         beside = dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
-    if empty and (
-        settings.coordinates == "part" or settings.compensation not in (None, "off", "on")
-    ):
-        text = "part co-ordinates, and a correction to be taken off, need all co-ordinates of balls"
-        raise refused(sources[0], f"{text}; give scale readings")
-    x = as_scale_readings(design, readings, given, settings, sources[0])
+    is_plain = settings.coordinates in (None, "scale readings")
+    x = given
+    if not is_plain or settings.compensation not in (None, "off", "on"):
+        kinds = service("ReadingChecks")
+        x = kinds.as_scale_readings(design, readings, given, settings, sources[0])
     x = _where_not_read(rows, x, design, readings)
     if settings.coordinates != "part":
         _refuse_far_outside(rows, x if empty else given, design)
@@ -130,7 +131,8 @@ def read_readings(
     marks = tuple(row.mark for row in rows)
     swapped: tuple[str, ...] = ()
     if settings.swap_names:
-        readings, swapped = with_names_swapped(design, readings, x, marks)
+        swap = service("ReadingChecks").with_names_swapped
+        readings, swapped = swap(design, readings, x, marks)
     missing, unplanned = _compare(design, readings, marks)
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
@@ -138,16 +140,16 @@ def read_readings(
         raise refused(
             sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
-    doubt = found.doubts + doubt_about_offsets(design, readings, given, settings, rows[0].mark)
-    doubt += doubts_about_digits(design, given, uncertainty)
-    if has_uncertainty:
-        doubt += doubts_about_units(design, stated)
-    if settings.coordinates == "part":
-        doubt += doubts_about_copies(design, readings, given)
+    told, doubt = (*found.told, *swapped), found.doubts
+    checks = optional_service("ReadingChecks")
+    if checks is not None:
+        own = stated if has_uncertainty else None
+        doubt += checks.doubts_about_table(design, readings, given, own, settings, rows[0].mark)
+        told += checks.said_of(settings)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    told = (*found.told, *swapped, *said_of(settings))
     observed = replace(observed, told=told, of_offsets=doubt, redone=redone)
-    refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
+    if checks is not None:
+        checks.refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)
     return observed
 

@@ -91,7 +91,7 @@ def source_rows(
     rows: list[FileRow] = []
     wrong: list[Message] = []
     others = [one for one in tables if not _has_own_columns(one, settings, axes, units)]
-    read = optional_service("any_source_rows")
+    read = optional_service("OtherTables")
     if not others:
         for one in tables:
             rows += plain_rows(one, names, axes, wrong, units, empty)
@@ -102,7 +102,9 @@ def source_rows(
             return SourceRows(tuple(rows), (), settings)
     if read is None:
         raise ExperimentError(wrong) if wrong else _not_plain(others[0])
-    found: SourceRows = read(tables, design, settings, messages, is_possible, units, empty)
+    found: SourceRows = read.of_sources(
+        tables, design, settings, messages, is_possible, units, empty
+    )
     return found
 
 
@@ -124,10 +126,10 @@ def named_rows(
         if not wrong:
             return rows
     messages: list[Message] = []
-    read = optional_service("any_table_rows")
+    read = optional_service("OtherTables")
     if read is None:
         raise ExperimentError(wrong) if wrong else _not_plain(table)
-    found = read(table, names, settings, messages, lambda x: False, dimension, {}, empty)
+    found = read.of_table(table, names, settings, messages, lambda x: False, dimension, {}, empty)
     if messages:
         raise ExperimentError(messages)
     return tuple(found.rows)

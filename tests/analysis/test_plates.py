@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.results.fit import Fit
+from ballplate.results.fitting import fit
 from ballplate.results.plates import axes_of_plates, plate_coordinates
-from ballplate.results.study import fit
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances

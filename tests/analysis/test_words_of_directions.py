@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from ballplate.rank.proposed_bars import bar_directions
+from ballplate.extensions.repair.proposed_bars import bar_directions
 from ballplate.rank.verdict import deformation, shape
 
 GRID = np.array([[0.1 * x, 0.15 * y, 0.0] for x in range(4) for y in range(3)])

@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.cli.github import annotation_lines, in_message, in_property
-from ballplate.cli.junit import junit_report
+from ballplate.extensions.ci.github import annotation_lines, in_message, in_property
+from ballplate.extensions.ci.junit import junit_report
 from ballplate.extensions.repair.repair_search import Repairs, repairs
 from ballplate.planning.checked_files import CheckedFile, check_files
 from ballplate.simulator.experiment.model import Experiment

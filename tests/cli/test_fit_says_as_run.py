@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.results.fit import Fit
+from ballplate.results.fitting import fit
 from ballplate.results.prediction import Prediction
-from ballplate.results.study import fit, predict
+from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.layout import lay_out

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.results.study import fit
+from ballplate.results.fitting import fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.readings.reading_files import read_readings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.estimation.consensus import consensus_motion
+from ballplate.extensions.laboratory.consensus import consensus_motion
 from ballplate.simulator.geometry.rotations import rotation_matrix
 
 WITHIN = 1e-5

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 import yaml
 from ballplate import compare
+from ballplate.extensions.laboratory.gross_errors import find_gross_errors
 from ballplate.extensions.reliability.redundancy import reliability
-from ballplate.results.study import fit, predict
+from ballplate.results.fitting import fit
+from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import eliminate
@@ -22,7 +24,6 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.gross_errors import find_gross_errors
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings

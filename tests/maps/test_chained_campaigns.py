@@ -14,7 +14,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.results.campaign_sigmas import compared
-from ballplate.results.study import fit
+from ballplate.results.fitting import fit
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.hat import whitened_residuals

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from ballplate.rank import missing_bars
+from ballplate.extensions.repair import missing_bars
 
 from tests.mutation.forks import change, in_fork
 from tests.mutation.mutants import KINDS, mutants, mutated, source_of
@@ -66,7 +66,7 @@ def test_what_differs_in_each_run_is_no_difference_of_outputs() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork, which is missing here")
 def test_a_change_is_made_in_a_fork_only() -> None:
     """Also where another module imported the function by name before."""
-    name = "rank/proposed_bars.py"
+    name = "simulator/inputs/settings.py"
     of_last = [one for one in mutants(source_of(name), name) if one.kind == "comparison"][-1]
 
     def changed() -> str:

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 import yaml
+from ballplate.extensions.campaign.done import done_candidates
 from ballplate.planning.campaign import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.criteria import NAMES, CriterionName
-from ballplate.planning.done import SetUp, done_candidates
 from ballplate.planning.offer import offer
 from ballplate.planning.selection import Campaign
+from ballplate.planning.set_ups import SetUp
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

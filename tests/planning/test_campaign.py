@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.campaign.done import done_candidates
+from ballplate.extensions.campaign.earlier import earlier_choice
 from ballplate.planning.bound import Bound
 from ballplate.planning.campaign import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
-from ballplate.planning.done import done_candidates
-from ballplate.planning.earlier import earlier_choice
 from ballplate.planning.offer import offer
 from ballplate.planning.search import SelectionProblem
 from ballplate.results.study import predict

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.campaign.done import done_candidates
 from ballplate.planning.campaign import Request, campaign
 from ballplate.planning.constraints import Budget
-from ballplate.planning.done import done_candidates
 from ballplate.planning.information import pool_information
 from ballplate.planning.offer import offer
 from ballplate.planning.schedule import run_sheet

@@ -13,7 +13,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.done import renamed
+from ballplate.planning.set_ups import renamed
 from ballplate.planning.short_names import short_names
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Position

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from ballplate.estimators.reversal_fits import ReversalFit, fit_reversal
 from ballplate.results.fit import Fit
-from ballplate.results.study import fit
+from ballplate.results.fitting import fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.metric import Scale

@@ -13,7 +13,8 @@ import pytest
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
-from ballplate.results.study import fit, predict
+from ballplate.results.fitting import fit
+from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate

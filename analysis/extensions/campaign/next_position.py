@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.gross_errors.wording import diagnosis_words
-from ballplate.planning.done import groups_taken
 from ballplate.results.adjustments import FEW
 from ballplate.results.campaign_sigmas import with_sigmas
 from ballplate.results.fit import Fit
+from ballplate.results.fitting import fit as fit_observed
 from ballplate.results.study import PlannedUncertainty
-from ballplate.results.study import fit as fit_observed
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
@@ -30,7 +28,9 @@ from ballplate.simulator.readings.reading_files import read_readings
 from ballplate.simulator.readings.reading_sources import Source
 from ballplate.uncertainty.summaries import uncertainties
 
+from .done import groups_taken
 from .next_result import NextStep, Offered
+from .redone import without_redone
 
 # One-sided level of the bound of sigma where it comes from few degrees of freedom.
 CONFIDENCE = 0.95
@@ -101,7 +101,7 @@ def next_step(
         is_sure = (
             math.isfinite(bound) and judge(goal, _uncertainty(at, experiment, goal, bound)).is_met
         )
-        suspected = tuple(diagnosis_words(fit.diagnosis, observed.marks))
+        suspected = tuple(fit.diagnosis.words(observed.marks)) if fit.diagnosis else ()
         found = replace(
             found, sigma=sigma, bound=bound, now=judged, is_sure=is_sure, suspected=suspected
         )
@@ -171,7 +171,7 @@ def _observed(experiment: Experiment, sources: Sequence[Source]) -> ObservedRead
         lay_out(experiment),
         every_ball=False,
         settings=experiment.readings,
-        last_count=True,
+        thinned=without_redone,
     )
 
 

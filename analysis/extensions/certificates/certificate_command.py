@@ -111,7 +111,9 @@ def _stated(text: str) -> tuple[str, str]:
 
 def run(options: Namespace) -> int:
     """Print or write the certificate; 1 if there is something to complain of."""
-    from ballplate.results.study import fit
+    from ballplate.results.fitting import fit
+
+    from .plate_certificate import plate_certificate
 
     experiment, observed = observed_readings(options)
     result = fit(experiment, observed, options.sigma)
@@ -119,9 +121,8 @@ def run(options: Namespace) -> int:
     if not result.converged:
         return 1
     try:
-        found = result.certificate(
-            options.plate, options.datum, options.coverage_factor, options.about
-        )
+        asked = options.plate, options.datum, options.coverage_factor, options.about
+        found = plate_certificate(result, *asked)
         texts = {} if options.output is None else found.texts(options.output)
     except ValueError as error:
         raise UsageError(error) from None

@@ -38,7 +38,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print the budget of one experiment."""
-    from ballplate.results.study import fit
+    from ballplate.results.fitting import fit
 
     from .budget import budget
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.gross_errors.exact_values import diagnosis_of_all
-from ballplate.gross_errors.leftover import too_many_entries
-from ballplate.gross_errors.refits import diagnosis_with_refits
-from ballplate.gross_errors.wording import refit_words, suspect_words
+from ballplate.extensions.reliability.exact_values import diagnosis_of_all
+from ballplate.extensions.reliability.leftover import too_many_entries
+from ballplate.extensions.reliability.refits import diagnosis_with_refits
+from ballplate.extensions.reliability.wording import refit_words, suspect_words
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State

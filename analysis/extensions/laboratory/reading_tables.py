@@ -16,7 +16,6 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.tables import FileRow, header_names, header_texts
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.coordinate_kinds import controller_offsets
 from ballplate.simulator.readings.reading_sources import (
     Source,
     SourceRows,
@@ -28,6 +27,7 @@ from ballplate.simulator.readings.reading_sources import (
 
 from .any_table import TableRows, read_any_table
 from .clock_times import wrong_times
+from .coordinate_kinds import controller_offsets
 from .heading_words import heading, is_clock
 from .headings import Vocabulary
 from .name_matching import with_known_names
@@ -205,3 +205,10 @@ def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
         5,
     )
     return [f"{text}; odd: {named}: check these readings for dirt, or for another feature"]
+
+
+class OtherTables:
+    """The functions that read tables that are not plain."""
+
+    of_sources = staticmethod(any_source_rows)
+    of_table = staticmethod(any_table_rows)

@@ -126,7 +126,7 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
         if readings:
             raise UsageError(f"{file} is a map, which needs no readings; leave {readings[0]} out")
         return read_map(file), False
-    from ballplate.results.study import fit
+    from ballplate.results.fitting import fit
 
     chosen = Namespace(**{**vars(options), "files": [file], "readings": readings})
     experiment, observed = observed_readings(chosen)

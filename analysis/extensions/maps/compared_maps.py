@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.results.campaign_tests import EstimatedSigma
 from ballplate.results.fit import Fit
 from ballplate.results.map_of_fit import data_of, maps_known
 from ballplate.simulator.computing.threads import single_threaded
@@ -26,6 +25,7 @@ from ballplate.simulator.readings.same_readings import (
     same_readings,
 )
 
+from .campaign_tests import EstimatedSigma
 from .volumetric_errors import Volumetric
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.results.campaign_tests import orthonormal
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines, Integers
 
+from .campaign_tests import orthonormal
 from .compared_maps import MOTIONS, ComparedMap, motions
 from .normalised_errors import FigureGroup, JointTest, ValueDifference
 from .plates import PlateDifference, plate_differences

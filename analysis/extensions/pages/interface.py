@@ -16,7 +16,6 @@ from ballplate.simulator.inputs.arguments import (
     ensure_report,
     ensure_type,
 )
-from ballplate.simulator.inputs.extensions import function, optional_service
 
 if TYPE_CHECKING:
     from ballplate.results.fit import Fit
@@ -41,8 +40,12 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
     from ballplate.results.fit import Fit
     from ballplate.results.prediction import Prediction
 
-    if isinstance(given, Fit | Prediction):
-        return given.view()
+    from .offered import design_view, fit_view
+
+    if isinstance(given, Fit):
+        return fit_view(given)
+    if isinstance(given, Prediction):
+        return design_view(given)
     from ballplate.simulator.experiment.layout import lay_out
 
     from .embedded import View
@@ -85,16 +88,15 @@ def page(
     ensure_report(report)
     if path is not None:
         ensure_path("path", path)
-    kind = optional_service("SweepResult")
-    is_sweep = kind is not None and isinstance(given, kind)
-    if (run_modules or compare is not None) and not is_sweep:
+    of_sweep = getattr(given, "page_text", None)
+    if (run_modules or compare is not None) and of_sweep is None:
         raise ValueError("run_modules and compare go with sweeps only; leave them out")
     if isinstance(given, Fit):
-        text = given.page()
-    elif is_sweep:
-        sweep: Any = given
-        asked = sweep.store, sweep.number, "html", run_modules, report, compare
-        text = function("sweep_report")(*asked)
+        from .offered import fit_page_text
+
+        text = fit_page_text(given)
+    elif of_sweep is not None:
+        text = of_sweep(run_modules, compare, report)
     else:
         from .design_contents import page_of_design
 

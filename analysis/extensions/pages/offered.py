@@ -36,12 +36,16 @@ def fit_view(fit: Fit) -> View:
 
 
 def fit_page_text(fit: Fit) -> str:
-    """The page of a fit that knows its experiment."""
+    """The page of a fit.
+
+    :raises ValueError: it does not know its experiment.
+    """
+    if fit.experiment is None:
+        raise ValueError("the fit does not know its experiment, which a page names; fit it anew")
     # Loaded only now: views need no other extension.
     from .fit_contents import fit_contents
     from .fit_page import fit_page
 
-    assert fit.experiment is not None
     contents = fit_contents(
         fit.experiment,
         fit.observed,

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.gross_errors.leftover import columns_of_balls
-from ballplate.gross_errors.patterns import Patterns
 from ballplate.simulator.computing.rounding import first_largest_of_columns
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.readings import offset_sensitivity
@@ -25,6 +23,8 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.pairs import open_above, relative
 from ballplate.uncertainty.quantities import QUANTITIES
 
+from .leftover import columns_of_balls
+from .patterns import Patterns
 from .response import Response
 
 if TYPE_CHECKING:

@@ -8,10 +8,6 @@ import math
 from typing import Literal
 
 import numpy as np
-from ballplate.gross_errors.cause_search import FAMILY
-from ballplate.gross_errors.events import event_groups
-from ballplate.gross_errors.leftover import Columns, leftover, too_many_entries
-from ballplate.gross_errors.patterns import patterns
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
@@ -24,7 +20,11 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Integers
 from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 
+from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
+from .events import event_groups
+from .leftover import Columns, leftover, too_many_entries
+from .patterns import patterns
 from .power import noncentrality
 from .reliability_result import Effects, Reliability
 from .response import responses

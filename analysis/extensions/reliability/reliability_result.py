@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
-from ballplate.gross_errors.names import name
-from ballplate.gross_errors.patterns import DRIFTS, Patterns, single_kinds
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
@@ -24,16 +22,18 @@ from ballplate.presentation.formatting import (
 )
 from ballplate.presentation.panels import RowOfPoints, draw_rows
 from ballplate.presentation.result import Result
-from ballplate.rank.proposed_bars import listed
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Functions, function_name
 from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.settings import listed
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.quantities import QUANTITIES
 
 from .effects import MOST_PLACES, across_probes
+from .names import name
+from .patterns import DRIFTS, Patterns, single_kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

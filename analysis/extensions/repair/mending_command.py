@@ -22,6 +22,7 @@ from ballplate.simulator.inputs.yamltree import read_text
 
 from .mending import mended, to_write
 from .repair_tables import changes_in_words
+from .suggestions import Suggestions
 
 MARK = "\ufeff"
 BAD_FILE = 3
@@ -45,7 +46,8 @@ def with_repairs(
         mark, text = _text(path) if checked.designs else ("", "")
         new = text
         for design in checked.designs:
-            repair = to_write(design.repairs, design.prediction.verdict, wanted.nothing_weak)
+            found = _suggestions(design).repairs
+            repair = to_write(found, design.prediction.verdict, wanted.nothing_weak)
             name = f"{path}: {design.prediction.label}"
             if repair is None:
                 if not design.prediction.verdict.deficiency:
@@ -72,7 +74,10 @@ def with_repairs(
     if repaired and not status:
         names = [name for name in repaired if name is not None]
         (again,) = check_files([path], names, replace(wanted, repairs=options.suggest))
-        after = {design.variant: advised(design, with_repairs=True) for design in again.designs}
+        after = {
+            design.variant: advised(replace(design, suggestions=_suggestions(design)))
+            for design in again.designs
+        }
         messages += again.messages
     designs = tuple(
         after.get(one.variant, _as_asked(one, options.suggest)) for one in checked.designs
@@ -84,7 +89,13 @@ def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
     """Without suggestions where nothing is undetermined, unless these were asked for."""
     if with_suggestions or design.prediction.verdict.deficiency:
         return design
-    return advised(replace(design, repairs=None, certificate=None), with_repairs=True)
+    return advised(replace(design, suggestions=Suggestions()))
+
+
+def _suggestions(design: CheckedDesign) -> Suggestions:
+    """What was suggested of a design; nothing where nothing was looked for."""
+    given = design.suggestions
+    return given if isinstance(given, Suggestions) else Suggestions()
 
 
 def _text(path: Path) -> tuple[str, str]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from ballplate.rank.proposed_bars import bar_directions
 from ballplate.simulator.experiment.model import (
     Experiment,
 )
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.machines.protocol import Array
+
+from .proposed_bars import bar_directions
 
 
 def bars(d: int) -> Iterator[tuple[str, Array]]:

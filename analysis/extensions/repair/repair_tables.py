@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import finite, number
-from ballplate.rank.proposed_bars import listed
 from ballplate.rank.verdict import Verdict, changed_names, length
+from ballplate.simulator.inputs.settings import listed
 from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
 
 from .changes import KINDS

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation.formatting import as_data, picked
-from ballplate.results.study import fit, predict
+from ballplate.results.fitting import fit
+from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ballplate.results.fit import Fit
+from ballplate.results.fitting import fit
 from ballplate.results.prediction import Prediction
-from ballplate.results.study import fit, predict
+from ballplate.results.study import predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment

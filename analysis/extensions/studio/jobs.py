@@ -76,8 +76,8 @@ def _ensure_sweep(document: DesignDocument, settings: Mapping[str, Any]) -> None
 
 def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     """The fit of readings that were dropped on the page, with their residuals at the balls."""
+    from ballplate.results.fitting import fit
     from ballplate.results.residuals import reading_residuals
-    from ballplate.results.study import fit
     from ballplate.simulator.readings.reading_files import read_readings
 
     experiment = experiment_of(document)

@@ -86,6 +86,13 @@ class SweepResult(Result):
     def notes(self) -> tuple[str, ...]:
         return self.shortcomings
 
+    def page_text(self, run_modules: bool, compare: str | Path | None, report: Report) -> str:
+        """The page of the sweep, with another store to `compare` with beside it."""
+        from .report.sweep_page import sweep_page
+
+        beside = None if compare is None else Path(compare)
+        return sweep_page(self.store, self.number, run_modules, beside, report)
+
     def headline(self) -> str:
         one = self.summary
         left = f", {one.left} left" if one.left else ""

@@ -138,17 +138,13 @@ def sweep_report(
             raise ValueError("compare goes with a page only; leave it out")
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
+    if form == "html":
+        from .report.sweep_page import sweep_page
+
+        beside = None if compare is None else Path(compare)
+        return sweep_page(Path(store), sweep, run_modules, beside, report)
     with closing(open_store(Path(store))) as opened:
         results = read_results(opened, sweep)
-        if form == "html":
-            from .report.page import page
-            from .report.store_comparison import compared
-
-            beside = None
-            if compare is not None:
-                with closing(open_store(Path(compare))) as other:
-                    beside = compared(results, read_results(other, None), Path(compare).name)
-            return page(opened, results, run_modules, report, beside)
         from ballplate.presentation.formats import FORMATS
 
         from .report.tables import report_tables

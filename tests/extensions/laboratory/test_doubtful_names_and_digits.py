@@ -10,10 +10,10 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
+from ballplate.extensions.laboratory.digits import doubts_about_digits
 from ballplate.extensions.laboratory.symmetry import turns_onto_itself
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.digits import doubts_about_digits
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 

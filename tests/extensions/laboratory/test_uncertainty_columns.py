@@ -10,13 +10,13 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
+from ballplate.extensions.laboratory.digits import doubts_about_units
 from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.digits import doubts_about_units
 from ballplate.simulator.readings.reading_sources import source_text
 
 DESIGN = Path("designs/quickstart.yaml")

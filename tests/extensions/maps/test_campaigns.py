@@ -9,6 +9,7 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.maps.campaign_tests import EstimatedSigma
 from ballplate.extensions.maps.compared_maps import MappedValues, map_of_fit
 from ballplate.extensions.maps.comparison import ComparisonSettings, MapComparison, compared
 from ballplate.extensions.maps.normalised_errors import FigureGroup, ValueDifference
@@ -16,8 +17,7 @@ from ballplate.extensions.maps.shared_certificates import (
     NothingSharedError,
     with_shared_certificates,
 )
-from ballplate.results.campaign_tests import EstimatedSigma
-from ballplate.results.study import fit as fit_observed
+from ballplate.results.fitting import fit as fit_observed
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.machines.protocol import Array
 from scipy.stats import chi2, norm

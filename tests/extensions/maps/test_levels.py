@@ -9,16 +9,16 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.maps.compared_maps import MappedValues, motions
-from ballplate.extensions.maps.comparison import ComparisonSettings, compared
-from ballplate.extensions.maps.normalised_errors import ValueDifference
-from ballplate.extensions.maps.shared_certificates import with_shared_certificates
-from ballplate.results.campaign_tests import (
+from ballplate.extensions.maps.campaign_tests import (
     EstimatedSigma,
     joint_chance,
     orthonormal,
     single_chances,
 )
+from ballplate.extensions.maps.compared_maps import MappedValues, motions
+from ballplate.extensions.maps.comparison import ComparisonSettings, compared
+from ballplate.extensions.maps.normalised_errors import ValueDifference
+from ballplate.extensions.maps.shared_certificates import with_shared_certificates
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.machines.protocol import Array

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.cause_search import diagnosis
+from ballplate.extensions.reliability.leftover import Columns, leftover
+from ballplate.extensions.reliability.patterns import Patterns, patterns
 from ballplate.extensions.reliability.power import (
     alarm_limit,
     chance_of_alarm,
@@ -16,9 +19,6 @@ from ballplate.extensions.reliability.power import (
 )
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.reliability_result import Reliability
-from ballplate.gross_errors.cause_search import diagnosis
-from ballplate.gross_errors.leftover import Columns, leftover
-from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.special import nctdtr
 from scipy.stats import binom
 
-from tests.reliability.designs import MIXED, PLANE, PLATE, experiment
+from tests.extensions.reliability.designs import MIXED, PLANE, PLATE, experiment
 
 Real = NDArray[np.float64]
 FALSE_ALARM, POWER = 0.001, 0.8

@@ -1,0 +1,173 @@
+"""What a drift does to a campaign in the orders in which it can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.planning.drift_times import in_time, without_drift
+from ballplate.planning.orders import OrderName
+from ballplate.planning.schedule import RunSheet
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.influences.drift import (
+    DriftSettings,
+    PointDriftSettings,
+    ScaleDriftSettings,
+)
+from ballplate.simulator.estimation.functions import Distances, linear_functions
+from ballplate.simulator.estimation.linearisation import LinearFunctions, linearise
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment
+from ballplate.simulator.inputs.quantities import (
+    QuantityError,
+    parse_length_drift,
+    parse_ratio_drift,
+)
+from ballplate.simulator.machines.protocol import Array
+from ballplate.uncertainty.quantities import evaluation_points
+
+# Evaluation points between which distances are looked at, at the most.
+MOST_POINTS = 100
+
+
+@dataclass(frozen=True)
+class DriftSize:
+    """Sizes of a drift: of the reference point, in metres per hour, and of the scales, per hour."""
+
+    point: float = 1e-6
+    scale: float = 1e-6
+
+
+@dataclass(frozen=True)
+class DriftEffect:
+    """What a drift does where positions are read in an order that takes `seconds`, of which
+    `change_seconds` are change-over.
+
+    `of_point` and `of_scale` are the largest changes of a distance between corrected points, in
+    metres, by drifts of the size stated that nobody knows of; the drift of the point is along the
+    axis where it does most; NaN where a length standard is read, of which no drift is followed.
+    `without` is the mean uncertainty of these distances if nothing drifts,
+    and `estimated` that with the drifts as free parameters, NaN where these leave a distance
+    undetermined.
+    """
+
+    order: OrderName
+    seconds: float
+    change_seconds: float
+    of_point: float
+    of_scale: float
+    without: float
+    estimated: float
+
+
+def parse_drift_size(texts: Sequence[str], experiment: Experiment) -> DriftSize:
+    """Sizes of drifts as texts with units; without any those that the experiment states as standard
+    uncertainties, else 1 um/h and 1 ppm/h.
+
+    :raises QuantityError: a text is neither a length nor a ratio per time above zero.
+    """
+    size = DriftSize()
+    for one in experiment.influences:
+        if isinstance(one, DriftSettings):
+            for name, stated in (("point", one.axes), ("scale", one.scale)):
+                every = stated if isinstance(stated, tuple) else (stated,)
+                own = [getattr(each, "standard_uncertainty", None) or 0.0 for each in every]
+                size = replace(size, **{name: max(own)}) if max(own) > 0.0 else size
+    for text in texts:
+        size = replace(size, **drift_size(text))
+    return size
+
+
+def drift_size(text: str) -> dict[str, float]:
+    """Size of a drift, of the point or of the scale.
+
+    :raises QuantityError: it is neither a length nor a ratio per time above zero.
+
+    >>> drift_size("0.5 um/h"), drift_size("0.2 ppm/h")
+    ({'point': 5e-07}, {'scale': 2e-07})
+    """
+    try:
+        found = {"scale": parse_ratio_drift(text)}
+    except QuantityError:
+        found = {"point": parse_length_drift(text)}
+    if min(found.values()) <= 0.0:
+        raise QuantityError(f'"{text}" must be above zero; write for example "0.5 um/h"')
+    return found
+
+
+def is_of_plates(experiment: Experiment, positions: Iterable[Candidate]) -> bool:
+    """Whether all positions are of plates."""
+    return all(experiment.artefacts[one.item.artefact].role == "plate" for one in positions)
+
+
+@single_threaded
+def drift_effect(
+    experiment: Experiment, name: OrderName, sheet: RunSheet, changes: ChangeTimes, size: DriftSize
+) -> DriftEffect:
+    """What drifts of a size do to an experiment in the order of a run sheet.
+
+    With drifts as parameters of any prior uncertainty, functions f and drifts e have covariances
+    whose quotient cov(f, e) cov(e, e)^-1 is what f changes by where the drifts are held wrong.
+    """
+    change = sum(step.change_seconds for step in sheet.steps)
+    plain = without_drift(experiment)
+    if (
+        not is_of_plates(experiment, (step.candidate for step in sheet.steps))
+        or len(experiment.evaluation.points) == 1
+    ):
+        return DriftEffect(name, sheet.seconds, change, *[float("nan")] * 4)
+    found = {
+        known: effects_on_distances(
+            lay_out(
+                in_time(
+                    replace(plain, influences=(*plain.influences, _drift(size if known else None))),
+                    sheet,
+                    changes,
+                )
+            ),
+            experiment.dimension + 1,
+        )
+        for known in (True, False)
+    }
+    uncertainty, bias, posterior = found[True]
+    spread = np.sqrt(uncertainty**2 - np.einsum("mi,ij,mj->m", bias, posterior, bias))
+    scaled = np.abs(bias[np.isfinite(uncertainty)]) * np.array(
+        [size.point] * (bias.shape[1] - 1) + [size.scale]
+    )
+    return DriftEffect(
+        name,
+        sheet.seconds,
+        change,
+        float(scaled[:, :-1].max(initial=0.0)),
+        float(scaled[:, -1].max(initial=0.0)),
+        float(spread.mean()),
+        float(found[False][0].mean()),
+    )
+
+
+def _drift(size: DriftSize | None) -> DriftSettings:
+    """Drift of the point along each axis and of all scales, of unknown size or with these as prior
+    uncertainties.
+    """
+    point, scale = (None, None) if size is None else (size.point, size.scale)
+    return DriftSettings.model_construct(
+        kind="drift",
+        axes=PointDriftSettings.model_construct(standard_uncertainty=point),
+        scale=ScaleDriftSettings.model_construct(standard_uncertainty=scale),
+    )
+
+
+def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
+    """Uncertainties (m,) of distances between evaluation points, what they change by per unit of
+    each of the last p influence parameters (m, p), and the covariance (p, p) of these.
+    """
+    at, every = linearise(design), evaluation_points(design)
+    chosen = np.unique(np.linspace(0, len(every.points) - 1, MOST_POINTS).round().astype(int))
+    places = replace(every, points=every.points[chosen], probes=every.probes[chosen])
+    functions = linear_functions(at, Distances(places))
+    drifts = LinearFunctions(np.eye(len(at.layout))[at.layout.influences][-p:])
+    covariance = at.covariance(drifts, drifts)
+    bias = np.linalg.lstsq(covariance, at.covariance(drifts, functions), rcond=1e-12)[0].T
+    return at.uncertainty(functions), np.asarray(bias, float), covariance

@@ -1,0 +1,175 @@
+"""Orders in which a chosen campaign can be read, and what a drift does in each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ballplate.planning.campaign import Request
+from ballplate.planning.constraints import HOUR
+from ballplate.planning.orders import LEAST_CHANGE_OVER, ORDERS, ReadingOrder
+from ballplate.planning.schedule import run_sheet
+from ballplate.planning.selection import Campaign
+from ballplate.presentation.formatting import aligned, finite, number
+from ballplate.simulator.experiment.model import Candidate, Experiment, Pool, Position
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+
+from .drift_in_orders import (
+    DriftEffect,
+    DriftSize,
+    drift_effect,
+    drift_size,
+    is_of_plates,
+    parse_drift_size,
+)
+from .least_drift import least_drift
+
+
+@dataclass(frozen=True)
+class DriftOrders:
+    """What a drift of a `size` does to a campaign in each order, where that was asked; `chosen` is
+    the order that it is to be read in.
+    """
+
+    chosen: ReadingOrder
+    size: DriftSize
+    effects: tuple[DriftEffect, ...]
+
+    @staticmethod
+    def ensure_size(text: str) -> None:
+        """Refuse what is no size of a drift.
+
+        :raises QuantityError: it is none.
+        """
+        drift_size(text)
+
+    @classmethod
+    def of(
+        cls,
+        experiment: Experiment,
+        pool: Pool,
+        request: Request,
+        has_begun: bool,
+        chosen: Sequence[Candidate],
+    ) -> DriftOrders:
+        """The orders of chosen candidates of a pool, and what a drift does in each.
+
+        :raises ExperimentError: an order is asked of a campaign that has begun, or that of the
+            least effect of drift where there are length standards.
+        """
+        offers = _orders(experiment, pool, request, has_begun, chosen)
+        wanted = request.order or LEAST_CHANGE_OVER.name
+        order = next(one for one in offers if one.name == wanted)
+        size = parse_drift_size(request.drift, experiment)
+        effects = tuple(
+            drift_effect(
+                experiment,
+                one.name,
+                run_sheet(chosen, pool.changes, order=one),
+                pool.changes,
+                size,
+            )
+            for one in offers
+            if len(offers) > 1
+        )
+        return cls(order, size, effects)
+
+    def data(self) -> dict[str, Any]:
+        """The size of the drift and its effects as plain data."""
+        return {
+            "drift": asdict(self.size),
+            "orders": [_order_data(one) for one in self.effects],
+        }
+
+    def lines(self, campaign: Campaign) -> list[str]:
+        """A table of the orders of a campaign; nothing without any."""
+        return _order_table(self.size, self.effects, campaign) if self.effects else []
+
+
+def _orders(
+    experiment: Experiment,
+    pool: Pool,
+    request: Request,
+    has_begun: bool,
+    chosen: Sequence[Candidate],
+) -> list[ReadingOrder]:
+    """The orders that are offered: where one is asked or a drift stated, all that there are."""
+    is_asked = bool(request.order or request.drift)
+    if has_begun and is_asked:
+        text = "has begun, and its times are unknown; leave --order and --drift out"
+        raise _impossible(experiment, text)
+    if has_begun:
+        return [LEAST_CHANGE_OVER]
+    own = [one for one in chosen if isinstance(one.item, Position)]
+    found = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
+    if is_of_plates(experiment, own):
+        sequence = least_drift(experiment, chosen, pool.changes, request.seed)
+        return [*found, ReadingOrder("least-drift", request.seed, sequence)]
+    if request.order == "least-drift":
+        text = "has length standards, whose drift is not followed; ask for another --order"
+        raise _impossible(experiment, text)
+    return found
+
+
+def _impossible(experiment: Experiment, text: str) -> ExperimentError:
+    return refused(experiment.source, text, "pool")
+
+
+def _order_table(size: DriftSize, effects: Sequence[DriftEffect], campaign: Campaign) -> list[str]:
+    """What a drift does in each order, and which one is chosen."""
+    rows = [
+        [
+            "order",
+            "hours",
+            "change-over, h",
+            f"{number(1e6 * size.point)} µm/h does",
+            f"{number(1e6 * size.scale)} ppm/h does",
+            "U6, no drift",
+            "drift estimated",
+            "",
+        ]
+    ]
+    budget = campaign.budget.seconds
+    for one in effects:
+        is_over = budget is not None and one.seconds > budget * (1.0 + 1e-9)
+        words = ["chosen"] if one.order == campaign.order.name else []
+        words += ["more hours than allowed"] if is_over else []
+        values = (one.of_point, one.of_scale, one.without, one.estimated)
+        rows.append(
+            [
+                ORDERS[one.order],
+                f"{one.seconds / HOUR:.2f}",
+                f"{one.change_seconds / HOUR:.2f}",
+                *(number(1e6 * value) for value in values),
+                ", ".join(words),
+            ]
+        )
+    places = (step.candidate for step in campaign.sheet.steps)
+    if not is_of_plates(campaign.experiment, places):
+        why = "no figures of drift: that of length standards is not followed"
+        return [*aligned(rows, [False, *[True] * 6, False]), why]
+    return [
+        *aligned(rows, [False, *[True] * 6, False]),
+        "what a drift that nobody knows of changes a distance between corrected points by at"
+        " most, and the mean uncertainty of these distances; µm",
+        *_chosen_without_drift(campaign),
+    ]
+
+
+def _chosen_without_drift(campaign: Campaign) -> list[str]:
+    """That the drift of the file had no part in the choice."""
+    drifts = [one for one in campaign.experiment.influences if one.in_order]
+    if not drifts:
+        return []
+    return [
+        "positions were chosen as if nothing drifted; U1 to U6 are those with the drift of the"
+        " file, in the order chosen"
+    ]
+
+
+def _order_data(effect: DriftEffect) -> dict[str, Any]:
+    return {
+        key: finite(value) if isinstance(value, float) else value
+        for key, value in asdict(effect).items()
+    }

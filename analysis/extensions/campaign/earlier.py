@@ -1,0 +1,146 @@
+"""Identification of a design that was chosen earlier from the same pool."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import partial
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from ballplate.planning.offer import Offer, offer
+from ballplate.planning.short_names import names_of_plan
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.whitening import CovarianceRoot
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.yamltree import GivenText
+
+from .done import done_candidates
+
+
+def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
+    """Indices of the candidates that an experiment consists of: its positions by name, or by what
+    describes a short name, calibration items by content.
+
+    A position that was interrupted since stands for what completes it, or sets it up again, unless
+    no more was to be read of it than has been. Items of calibration that are no candidates belong
+    to the experiment in any case.
+
+    :raises ExperimentError: a position is no candidate.
+    """
+    message = partial(Message, str(chosen.source), 0, 0, "positions")
+    candidates = offered.candidates
+    rests = {one.rest for one in offered.interrupted}
+    places = {
+        one.name: k
+        for k, one in enumerate(candidates)
+        if isinstance(one.item, Position) and k not in rests
+    }
+    named = {
+        one.name: one.description if one.description in places else one.name
+        for one in chosen.positions
+        if one.name not in places
+    }
+    unknown = [name for name, meant in named.items() if meant not in places]
+    if unknown:
+        raise ExperimentError(
+            message(f'"{name}" is not a candidate of the pool; {hint(name, places)}')
+            for name in unknown
+        )
+    moved = [
+        one.name
+        for one in chosen.positions
+        if not _same_place(one, candidates[places[named.get(one.name, one.name)]].item)
+    ]
+    if moved:
+        told = "is elsewhere, or of another artefact, in the pool; give it another name"
+        raise ExperimentError(message(f'"{name}" {told}') for name in moved)
+    found = [
+        _now(offered, places[named.get(position.name, position.name)], position)
+        for position in chosen.positions
+    ]
+    for k, candidate in enumerate(candidates):
+        item = candidate.item
+        if not isinstance(item, Position) and any(
+            _equal(item, other) for other in chosen.calibration
+        ):
+            found.append(k)
+    return tuple(sorted(set(found)))
+
+
+def _now(offered: Offer, k: int, wanted: Position) -> int:
+    for one in offered.interrupted:
+        if one.part == k and wanted.count > offered.candidates[k].readings:
+            return one.again if one.rest is None else one.rest
+    return k
+
+
+def _same_place(one: Position, other: object) -> bool:
+    return (
+        isinstance(other, Position)
+        and one.artefact == other.artefact
+        and np.allclose(one.pose.rotation, other.pose.rotation, atol=1e-9)
+        and np.allclose(one.pose.origin, other.pose.origin, atol=1e-9)
+    )
+
+
+def _equal(one: Calibration, other: Calibration) -> bool:
+    return type(one) is type(other) and all(
+        np.array_equal(_plain(getattr(one, field.name)), _plain(getattr(other, field.name)))
+        for field in fields(cast(Any, one))
+    )
+
+
+def _plain(value: Any) -> Any:
+    """What a field of an item states: of a covariance the root, of a user's functions the names."""
+    if isinstance(value, CovarianceRoot):
+        return value.drawn(np.eye(len(value.own)))
+    return value.names if hasattr(value, "derivatives") else value
+
+
+def begun(
+    experiment: Experiment,
+    done: Path | GivenText | None = None,
+    moved: bool = False,
+    earlier: Path | None = None,
+) -> tuple[Offer | None, tuple[int, ...] | None]:
+    """What is offered where readings are `done` already, and the indices of an `earlier` choice of
+    a file; None for what is not there.
+
+    Where the artefact has `moved` since it was read last, a position interrupted there can only be
+    set up again.
+
+    :raises ExperimentError: what is wrong with both files.
+    """
+    if experiment.pool is None:
+        return None, None
+    pool, messages = experiment.pool, list[Message]()
+    chosen, before, names = None, None, dict[str, str]()
+    try:
+        if earlier is not None:
+            variants = load(earlier)
+            if len(variants) > 1:
+                text = "the file has several variants; name a design that was chosen"
+                raise refused(earlier, text, "variants")
+            before = variants[0]
+            names = names_of_plan(before, {one.name for one in pool.candidates})
+    except ExperimentError as error:
+        messages += error.messages
+    offered = offer(pool, known=names)
+    try:
+        if done is not None:
+            taken = done_candidates(done, experiment, names)
+            offered = offer(pool, taken, not moved, names)
+    except ExperimentError as error:
+        messages += error.messages
+    try:
+        if before is not None:
+            chosen = earlier_choice(before, offered)
+    except ExperimentError as error:
+        messages += error.messages
+    if messages:
+        raise ExperimentError(messages)
+    return offered, chosen

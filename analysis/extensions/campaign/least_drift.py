@@ -1,0 +1,262 @@
+"""The order of positions in which a drift of the scales changes distances least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+from math import factorial, prod
+
+import numpy as np
+from ballplate.planning.drift_times import without_drift
+from ballplate.planning.orders import with_probes
+from ballplate.planning.schedule import first_readings
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.influences.drift import HOUR, Clock
+from ballplate.simulator.design.influences.protocol import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    InfluenceSettings,
+)
+from ballplate.simulator.design.objects import Readings
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.machines.protocol import Array, Integers
+from numpy.typing import NDArray
+
+from .drift_in_orders import effects_on_distances
+
+# Orders, of positions and of the probes within them, up to which all are tried; of more, exchanges
+# from so many random starts.
+MOST_TRIED, STARTS = 100_000, 30
+
+# An order is better from this share on.
+GAIN = 1e-9
+
+
+@dataclass(frozen=True)
+class ScaleByBlock(Influence):
+    """Scales that are wrong by a ratio of their own in each of the `blocks`, what is read in one
+    position with one probe, and by the drift within blocks.
+    """
+
+    blocks: Blocks
+
+    @property
+    def parameters(self) -> tuple[InfluenceParameter, ...]:
+        """The ratios of blocks, then the drift within them."""
+        names = [f"scale {k}" for k in range(len(self.blocks.weight))]
+        return tuple(
+            InfluenceParameter(name, "1", 0.0, 1e-6, 1.0) for name in (*names, "scale within")
+        )
+
+    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
+        """What the scales say too much, by block and within."""
+        order = at.column("order").astype(np.int64)
+        is_here = self.blocks.of_reading[order][:, None] == np.arange(len(self.blocks.weight))
+        share = np.column_stack([is_here, self.blocks.within[order]])
+        return np.zeros(at.x.shape), at.x[:, :, None] * share[:, None, :]
+
+
+class ScaleByBlockSettings(InfluenceSettings):
+    """Settings that no file has."""
+
+    reading: tuple[float, ...]
+    probe_change: float
+
+    def influence(self, design: DesignParts) -> ScaleByBlock:
+        """The scales of all blocks of a design."""
+        count = len(design.positions.names)
+        clock = Clock(0.0, self.probe_change, self.reading, (0.0,) * count)
+        return ScaleByBlock(blocks(clock, design.readings))
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Readings of a position with a probe: `of_reading` (m,) tells the block, `within` (m,) hours
+    from its mean. By block (b,) are its `position` and `probe`, the number of readings in it as
+    `weight`, the `middle` of it in hours from the first reading of the position on, as the file has
+    the probes, and the `length` of what is read.
+    """
+
+    of_reading: Integers
+    within: Array
+    position: Integers
+    probe: Integers
+    weight: Array
+    middle: Array
+    length: Array
+
+    def hours(self, k: int, probes: Sequence[str], names: Sequence[str], change: float) -> Array:
+        """Hours of the middles of a position's blocks from its first reading on, where it is read
+        with its probes in this order.
+        """
+        own = np.flatnonzero(self.position == k)
+        order = np.argsort([list(probes).index(names[probe]) for probe in self.probe[own]])
+        length, found = self.length[own][order], np.empty(len(own))
+        found[order] = np.cumsum(length + change) - change - 0.5 * length
+        return found
+
+
+def blocks(clock: Clock, readings: Readings) -> Blocks:
+    """The blocks of a design, each position of which begins at zero by its clock."""
+    pairs, inverse = np.unique(
+        np.stack([readings.position, readings.probe], axis=1), axis=0, return_inverse=True
+    )
+    inverse = inverse.ravel()
+    hours = clock.seconds(readings) / HOUR
+    weight = np.bincount(inverse, readings.repeats).astype(float)
+    middle = np.bincount(inverse, hours * readings.repeats) / weight
+    position, probe = pairs.T
+    length = np.array(clock.reading)[position] * weight / HOUR
+    return Blocks(inverse, hours - middle[inverse], position, probe, weight, middle, length)
+
+
+@single_threaded
+def least_drift(
+    experiment: Experiment, chosen: Sequence[Candidate], changes: ChangeTimes, seed: int
+) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Names of positions, each with its probes in order, in the order in which the largest change
+    of a distance by a drift of the scales is least; of equal ones that with the least change-over.
+
+    Up to `MOST_TRIED` all orders of positions and of probes within them are tried. Of more, two
+    positions are exchanged, or the probes of one are read in another order, as long as that helps.
+    """
+    own = [one for one in chosen if isinstance(one.item, Position)]
+    settings = ScaleByBlockSettings(
+        reading=tuple(one.reading_seconds for one in own), probe_change=changes.probe
+    )
+    plain = without_drift(experiment)
+    by_block = replace(plain, influences=(*plain.influences, settings))
+    design = lay_out(with_chosen(by_block, chosen))
+    (scales,) = [one for one in design.influences if isinstance(one, ScaleByBlock)]
+    uncertainty, effects, _ = effects_on_distances(design, len(scales.blocks.weight) + 1)
+    ways = _ways(own, scales.blocks, design.probes.names, changes)
+    drift = _Drift(ways, scales.blocks.weight, effects[np.isfinite(uncertainty)])
+    options = [[way for way, (at, _) in enumerate(ways.each) if at == k] for k in range(len(own))]
+    if factorial(len(own)) * prod(map(len, options)) <= MOST_TRIED:
+        every = np.array(list(product(*options)), np.int64)
+        mixed = np.array(list(permutations(range(len(own)))), np.int64)
+        best, _ = drift.least(every[:, mixed].reshape(-1, len(own)))
+    else:
+        generator = np.random.default_rng(np.random.SeedSequence(seed))
+        orders = [
+            np.arange(len(own)),
+            *(generator.permutation(len(own)) for _ in range(STARTS - 1)),
+        ]
+        starts = [with_probes([own[k] for k in order], changes) for order in orders]
+        improved = [
+            drift.improved(
+                [ways.each.index((k, probes)) for k, (_, probes) in zip(order, start, strict=True)],
+                options,
+            )
+            for order, start in zip(orders, starts, strict=True)
+        ]
+        best, _ = drift.least(np.array(improved))
+    return tuple((own[k].name, probes) for k, probes in (ways.each[way] for way in best))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """Ways to read single positions, `each` a position's index and its probes in order. Hours: the
+    `middles` (w, b) of its blocks from when the position begins, what it `takes` (w,), and the
+    `change` (w, w) from one to another; `is_own` (w, b) tells which blocks are its own.
+    """
+
+    each: tuple[tuple[int, tuple[str, ...]], ...]
+    middles: Array
+    is_own: NDArray[np.bool_]
+    takes: Array
+    change: Array
+
+    def hours(self, sequences: Integers) -> tuple[Array, Array]:
+        """When the middles of blocks are (n, b), and the change-over (n,), of sequences (n, p) of
+        ways.
+        """
+        change = self.change[sequences[:, :-1], sequences[:, 1:]]
+        spent = self.takes[sequences[:, :-1]] + change
+        starts = np.cumsum(np.pad(spent, ((0, 0), (1, 0))), axis=1)
+        hours = np.zeros((len(sequences), self.middles.shape[1]))
+        for way, start in zip(sequences.T, starts.T, strict=True):
+            hours += self.middles[way] + start[:, None] * self.is_own[way]
+        return hours, change.sum(axis=1)
+
+
+def _ways(
+    own: Sequence[Candidate], told: Blocks, names: Sequence[str], changes: ChangeTimes
+) -> _Ways:
+    """All ways to read the positions that blocks are of."""
+    items = [one.item for one in own if isinstance(one.item, Position)]
+    each = [(k, probes) for k, item in enumerate(items) for probes in permutations(item.probes)]
+    middles = np.zeros((len(each), len(told.weight)))
+    is_own = told.position == np.array([k for k, _ in each])[:, None]
+    for row, (k, probes) in enumerate(each):
+        (first,) = first_readings(((own[k], probes),), changes)
+        # Probes of several groups stay in the order of the groups.
+        middle = told.middle[told.position == k]
+        if len(items[k].readings) == 1:
+            middle = told.hours(k, probes, names, changes.probe / HOUR)
+        middles[row, is_own[row]] = first / HOUR + middle
+    begun, ended = (np.array([probes[end] for _, probes in each]) for end in (0, -1))
+    place = np.unique([(one.item.artefact, one.plane) for one in own], axis=0, return_inverse=True)
+    at = place[1].ravel()[[k for k, _ in each]]
+    change = changes.plane * (at[:, None] != at) + changes.probe * (ended[:, None] != begun)
+    takes, change = np.array([own[k].seconds for k, _ in each]) / HOUR, change / HOUR
+    return _Ways(tuple(each), middles, is_own, takes, change)
+
+
+@dataclass(frozen=True, eq=False)
+class _Drift:
+    """Effects (d, b + 1) on distances of drifts in blocks of this `weight` (b,) and, in the last
+    column, within them.
+    """
+
+    ways: _Ways
+    weight: Array
+    effects: Array
+
+    def least(self, sequences: Integers) -> tuple[list[int], float]:
+        """Of sequences (n, p) of ways that with the smallest largest effect, and how large it is;
+        of equal ones that with the least change-over, or the first.
+
+        The effect on some distances is a lower bound of that on all. The sequence with the smallest
+        bound is looked at in full, and the distance that changes most there joins the others until
+        none changes more.
+        """
+        hours, change = self.ways.hours(sequences)
+        hours -= np.average(hours, axis=1, weights=self.weight)[:, None]
+        times = np.column_stack([hours, np.ones(len(hours))])
+        bounds = np.zeros(len(times))
+        while True:
+            k = int(bounds.argmin())
+            effect = np.append(np.abs(self.effects @ times[k]), 0.0)
+            largest = int(effect.argmax())
+            most = float(effect[largest]) * (1.0 + GAIN)
+            if effect[largest] <= bounds[k] * (1.0 + GAIN):
+                break
+            bounds = np.maximum(bounds, np.abs(times @ self.effects[largest]))
+        equal = np.flatnonzero(bounds <= most)
+        for k in equal[np.argsort(change[equal], kind="stable")]:
+            if np.abs(self.effects @ times[k]).max(initial=0.0) <= most:
+                break
+        return sequences[k].tolist(), most
+
+    def improved(self, best: list[int], options: Sequence[Sequence[int]]) -> list[int]:
+        """What exchanges of two positions, and other orders of the probes of one, lead to."""
+        least = np.inf
+        while True:
+            near = [best]
+            for i, j in combinations(range(len(best)), 2):
+                other = [*best]
+                other[i], other[j] = other[j], other[i]
+                near.append(other)
+            for i, way in enumerate(best):
+                others = options[self.ways.each[way][0]]
+                near += [[*best[:i], other, *best[i + 1 :]] for other in others]
+            found, size = self.least(np.array(near))
+            if size >= least * (1.0 - GAIN):
+                return best
+            best, least = found, size

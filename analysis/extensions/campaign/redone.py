@@ -1,0 +1,76 @@
+"""Readings of positions that were read again: the later ones count, in place of the earlier."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.tables import FileRow
+from ballplate.simulator.readings.observed_readings import reading_keys
+
+Names = tuple[str, ...]
+
+
+def without_redone(
+    rows: Sequence[FileRow], design: Design
+) -> tuple[tuple[FileRow, ...], tuple[str, ...]]:
+    """Rows of readings in the order in which they were taken, less what was read again, and in
+    words what was left out.
+
+    A position is read in runs of rows, between which another position, or another file, stands. A
+    run that reads balls again, more often than is planned, comes after the artefact was set up
+    anew: all that was read of the position before is left out. Readings that are repeated within a
+    run replace the earlier ones of the same ball and probe. A run of other balls or probes goes on
+    with the position.
+    """
+    planned = _planned(design)
+    kept: dict[str, list[int]] = {}
+    left_out: dict[str, int] = {}
+    repeated: dict[str, int] = {}
+    runs = groupby(range(len(rows)), lambda i: (rows[i].mark.file, rows[i].texts[0]))
+    for (_, position), members in runs:
+        own: dict[Names, list[int]] = {}
+        for i in members:
+            own.setdefault(rows[i].texts, []).append(i)
+        for texts, found in own.items():
+            surplus = len(found) - planned[texts]
+            if surplus > 0:
+                repeated[position] = repeated.get(position, 0) + surplus
+                del found[:surplus]
+        earlier = kept.get(position, [])
+        count = Counter(rows[i].texts for i in earlier)
+        if any(0 < count[texts] > planned[texts] - len(found) for texts, found in own.items()):
+            left_out[position] = left_out.get(position, 0) + len(earlier)
+            earlier = []
+        kept[position] = [*earlier, *(i for found in own.values() for i in found)]
+    told = [
+        f"{position} was read again: {number_of(count, 'reading')} taken before are left out"
+        for position, count in left_out.items()
+    ]
+    told += [
+        f"{position}: of {number_of(count, 'reading')} {'that are' if count > 1 else 'that is'}"
+        " repeated the last counts"
+        for position, count in repeated.items()
+    ]
+    chosen = sorted(i for members in kept.values() for i in members)
+    return tuple(rows[i] for i in chosen), tuple(told)
+
+
+def _planned(design: Design) -> Counter[Names]:
+    """How often each ball is planned to be read in a position with a probe, by name; once where it
+    is not planned.
+    """
+    readings = design.readings.expanded()
+    found: Counter[Names] = _AtLeastOnce(
+        (design.positions.names[k], design.balls.names[ball], design.probes.names[probe])
+        for k, ball, probe in reading_keys(readings)
+    )
+    return found
+
+
+class _AtLeastOnce(Counter[Names]):
+    def __missing__(self, key: Names) -> int:
+        return 1

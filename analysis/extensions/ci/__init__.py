@@ -1,0 +1,1 @@
+"""Checks as reports for build servers: annotations of GitHub and JUnit."""

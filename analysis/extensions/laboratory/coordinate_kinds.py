@@ -1,0 +1,116 @@
+"""Scale readings from what measuring programs write: centres of balls, in the machine's
+co-ordinates or in those of a part, with the machine's own correction or without.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from ballplate.simulator.design.arrays import (
+    Design,
+    Readings,
+    nominal_places,
+    read_in_positions,
+)
+from ballplate.simulator.experiment.readings_section import (
+    CompensationSettings,
+    ReadingsSettings,
+)
+from ballplate.simulator.geometry.motions import fixes_pose
+from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.generate import NoReadingError, scale_readings
+
+from .consensus import consensus_motion
+from .gross_errors import AGAINST_DRAWING, ball_pitches
+
+
+def controller_offsets(design: Design, settings: ReadingsSettings) -> Array:
+    """Offsets (l, d) that the measuring program has applied to ball centres."""
+    offsets = design.probes.offsets.copy()
+    for name, offset in (settings.offsets_in_controller or {}).items():
+        offsets[design.probes.names.index(name)] = offset
+    return offsets
+
+
+def as_scale_readings(
+    design: Design, readings: Readings, x: Array, settings: ReadingsSettings, file: object
+) -> Array:
+    """Scale readings (m, d) of co-ordinates (m, d) of the kind that the settings state.
+
+    Ball centres lose the offset that the controller has. Part co-ordinates are first put where the
+    nominal pose of each position has its balls: the estimated pose takes up the rest, and the
+    machine's errors are evaluated as far off as the artefact stood from its nominal pose. What the
+    machine's correction has added is taken off last, where it is stated.
+
+    :raises ExperimentError: a position has too few balls for its part co-ordinates to be placed, or
+        the correction is too large to be taken off; or not all co-ordinates were read.
+    """
+    correction = settings.compensation
+    is_taken_off = isinstance(correction, CompensationSettings)
+    if design.positions.across is not None and (settings.coordinates == "part" or is_taken_off):
+        text = "part co-ordinates, and a correction to be taken off, need all co-ordinates of balls"
+        raise refused(file, f"{text}; give scale readings")
+    if settings.coordinates == "part":
+        x = _in_machine(design, readings, x, file)
+    offsets = controller_offsets(design, settings)[readings.probe]
+    if settings.coordinates in ("ball centres", "part"):
+        x = x - offsets
+    if isinstance(correction, CompensationSettings):
+        machine = correction.machine()
+        try:
+            x = scale_readings(machine.model, x + offsets, machine.a, offsets)
+        except NoReadingError:
+            text = f"the correction of {correction.file} is too large to be taken off"
+            raise refused(file, text) from None
+    return x
+
+
+def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[str, ...]:
+    """What is doubtful about part co-ordinates (m, d) as the table has them: that two positions
+    have the same ones, which repeated measurements do not give, but a file that was copied does.
+    """
+    of_position = {
+        k: {
+            (int(ball), *place)
+            for ball, place in zip(
+                readings.ball[readings.position == k],
+                x[readings.position == k].tolist(),
+                strict=True,
+            )
+        }
+        for k in np.unique(readings.position).tolist()
+    }
+    doubts = []
+    for one, other in combinations(of_position, 2):
+        own = of_position[one]
+        if len(own) > design.dimension and own == of_position[other]:
+            names = design.positions.names
+            doubts.append(
+                f'positions "{names[one]}" and "{names[other]}" have the same readings to the last'
+                " digit; if one is a copy of the other, give what was read there"
+            )
+    return tuple(doubts)
+
+
+def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> Array:
+    """Part co-ordinates moved to where the nominal poses have the balls."""
+    pitch, placed = ball_pitches(design), np.empty_like(x)
+    poor = []
+    for k, rows, nominal in read_in_positions(design, readings):
+        there = nominal_places(design, k, readings.ball[rows])
+        if not fixes_pose(nominal):
+            poor.append(design.positions.names[k])
+            continue
+        reach = AGAINST_DRAWING * pitch[readings.ball[rows]]
+        rotation, origin, _ = consensus_motion(x[rows], there, reach)
+        placed[rows] = x[rows] @ rotation.T + origin
+    if poor:
+        text = (
+            f"too few balls were read in {listing(poor)} to place part co-ordinates; give these in"
+            " the machine's co-ordinates"
+        )
+        raise refused(file, text)
+    return placed

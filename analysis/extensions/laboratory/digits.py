@@ -1,0 +1,76 @@
+"""Digits and uncertainties in a table of readings, against the uncertainty that is stated."""
+
+from __future__ import annotations
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.quantities import LENGTH_UNITS, format_length
+from ballplate.simulator.machines.protocol import Array
+
+# Units, in metres, of whose powers of ten tables have the last digits, and the largest exponent.
+UNITS = (1.0, float(LENGTH_UNITS["in"]))
+FINEST = 10
+# A number is a multiple of its last digit to this part of that, and to so many metres: what is more
+# is a digit that was written.
+MULTIPLE, ROUNDING = 1e-4, 1e-12
+# Fewer co-ordinates than these do not tell digits.
+FEWEST = 12
+# Rounding that is told has a standard uncertainty above this part of that of readings.
+NOTABLE = 0.5
+# Uncertainties so many times those that are stated, or less, are rather in another unit.
+OTHER_UNIT = 100.0
+
+
+def last_digit(x: Array) -> float:
+    """The largest power of ten of a unit that all co-ordinates are multiples of, in metres; zero
+    where they have digits far below all readings.
+
+    >>> [round(last_digit(np.array([0.1234, 0.5]) * unit), 9) for unit in (1.0, 0.001, 0.0254)]
+    [0.0001, 1e-07, 2.54e-06]
+    >>> last_digit(np.array([0.25, 0.5 + 2e-7]))
+    1e-07
+    """
+    for exponent in range(FINEST + 1):
+        for unit in UNITS:
+            step = unit * 10.0**-exponent
+            count = x / step
+            if np.abs(count - np.round(count)).max(initial=0.0) <= min(MULTIPLE, ROUNDING / step):
+                return step
+    return 0.0
+
+
+def doubts_about_digits(design: Design, x: Array, uncertainty: Array | None) -> tuple[str, ...]:
+    """A sentence about co-ordinates (m, d) as the table has them, in metres, that are rounded more
+    coarsely than is in keeping with the standard `uncertainty` (m, d) of readings, or with the
+    repeatability; none where they are not.
+
+    Rounding to steps of q has the standard uncertainty q / sqrt(12) (GUM, 4.3.7).
+    """
+    known = x[~np.isnan(x)]
+    if len(known) < FEWEST:
+        return ()
+    step = last_digit(known)
+    rounding = step / np.sqrt(12.0)
+    stated = float(np.median(design.machine.repeatability if uncertainty is None else uncertainty))
+    if rounding <= NOTABLE * stated:
+        return ()
+    shown = [format_length(float(f"{one:.3g}")) for one in (step, rounding, stated)]
+    return (
+        f"the readings have no digit below {shown[0]}; such rounding has a standard uncertainty of"
+        f" {shown[1]}, beside the {shown[2]} that are stated of readings: give more digits, or"
+        " increase what is stated",
+    )
+
+
+def doubts_about_units(design: Design, uncertainty: Array) -> tuple[str, ...]:
+    """A sentence about standard uncertainties (m,) that a table has of its readings, if they are
+    so much larger or smaller than the repeatability that they are rather in another unit.
+    """
+    found, stated = float(np.median(uncertainty)), float(np.median(design.machine.repeatability))
+    if stated / OTHER_UNIT < found < stated * OTHER_UNIT:
+        return ()
+    shown = [format_length(float(f"{one:.3g}")) for one in (found, stated)]
+    return (
+        f"the table states a standard uncertainty of {shown[0]} of its readings, beside a"
+        f" repeatability of {shown[1]}: check the unit of its column",
+    )

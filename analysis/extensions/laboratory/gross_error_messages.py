@@ -1,0 +1,221 @@
+"""Messages about the lines of a file of readings that cannot be right, and their probable cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.objects import SLIGHTLY
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+
+from .common_causes import common_cause, mistaken_positions, words_of_mistaken
+from .gross_errors import WrongPosition, WrongReading, find_gross_errors
+from .length_ratios import LengthRatio, doubtful_lengths
+from .wrong_offsets import only_position, wrong_offsets
+
+
+def refuse_gross_errors(
+    design: Design, x: Array, marks: Sequence[Mark], settings: ReadingsSettings
+) -> None:
+    """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they
+    are said to be of.
+
+    `marks` tell where each of the design's readings stands, and `settings` what the scale readings
+    x (readings, d) were made of. The rules are those of
+    `readings.gross_errors` and `estimation.length_ratios`.
+
+    :raises ExperimentError: some readings are wrong; names all of them.
+    """
+    positions, readings = find_gross_errors(design, x)
+    mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
+    if mistakes:
+        causes = ", or if ".join(one.words(design) for one in mistakes)
+        text = (
+            f"the readings with different probes fit one another only if {causes}: correct the"
+            " offsets under probes, or the names of probes in the readings"
+        )
+        only = only_position(design, mistakes[0].probes[0])
+        if mistakes[0].is_off and only >= 0:
+            name = design.positions.names[only]
+            text += f"; or the artefact moved in position {name} between the probes: read it again"
+        raise marks[0].refused(text)
+    if positions:
+        seen = x + design.probes.offsets[design.readings.probe]
+        mistaken = mistaken_positions(design, design.readings, seen)
+        if {wrong.position for wrong in positions} <= set(mistaken):
+            raise marks[0].refused(words_of_mistaken(design, mistaken))
+    if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
+        cause = common_cause(design, x, settings)
+        if cause:
+            text = (
+                f"the readings of most positions do not fit; all do {cause}: correct the columns,"
+                " the unit or the readings section; otherwise the names of balls are wrong"
+            )
+            raise marks[0].refused(text)
+    messages = [_of_position(design, wrong, marks) for wrong in positions]
+    told: set[int] = set()
+    for wrong in readings:
+        if wrong.reading not in told:
+            messages.append(_of_reading(design, wrong, marks))
+            told |= {wrong.reading, wrong.partner}
+    if not messages:
+        doubtful = doubtful_lengths(design, x)
+        messages = [
+            marks[one.reading].message("", _of_length(design, one))
+            for one in doubtful
+            if one.is_impossible
+        ]
+    if messages:
+        raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
+
+
+def with_names_swapped(
+    design: Design, readings: Readings, x: Array, marks: Sequence[Mark]
+) -> tuple[Readings, tuple[str, ...]]:
+    """Readings of plates with the names of two balls swapped wherever scale readings x (m, d) show
+    that they are, and that in words; all others as they are.
+    """
+    plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
+    of_plates = replace(design, readings=readings.select(plate)).observed(
+        design.of(Lengths).select(np.zeros(0, np.int64))
+    )
+    ball, told = readings.ball.copy(), []
+    for wrong in find_gross_errors(of_plates, x[plate])[1]:
+        i, j = int(plate[wrong.reading]), int(plate[wrong.partner])
+        if wrong.other_ball < 0 or wrong.partner < wrong.reading:
+            continue
+        ball[i], ball[j] = readings.ball[j], readings.ball[i]
+        names = " and ".join(design.ball_label(int(readings.ball[k])) for k in (i, j))
+        told.append(
+            f"the names of balls {names} in position {design.positions.names[readings.position[i]]}"
+            f" were swapped (lines {marks[i].line} and {marks[j].line})"
+        )
+    return replace(readings, ball=ball), tuple(told)
+
+
+def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
+    """Sentences about standards whose lengths are all off by a factor that machines hardly have."""
+    return tuple(_of_length(design, one) for one in doubtful_lengths(design, x))
+
+
+def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
+    """A sentence about readings outside the volume, where error models are extrapolated, or none.
+
+    By less than a thousandth of the volume a reading is outside if an artefact was not set up just
+    as drawn.
+    """
+    volume = design.machine.volume
+    beyond = np.maximum(volume.lower - x, x - volume.upper)
+    far = np.flatnonzero((beyond > SLIGHTLY * volume.size).any(axis=1))
+    if not len(far):
+        return ()
+    i = int(far[beyond[far].max(axis=1).argmax()])
+    axis = int(beyond[i].argmax())
+    how = "below" if x[i, axis] < volume.lower[axis] else "above"
+    readings = design.readings
+    where = f" (line {marks[i].line})" if marks else ""
+    count = "1 reading is" if len(far) == 1 else f"{len(far)} readings are"
+    return (
+        (
+            f"{count} outside the measuring volume, and the error model is extrapolated there;"
+            f" furthest is ball {design.ball_label(int(readings.ball[i]))} in position"
+            f" {design.positions.names[readings.position[i]]} with probe"
+            f" {design.probes.names[readings.probe[i]]}, at {'xyz'[axis]} ="
+            f" {_shown(float(x[i, axis]))}, {_shown(float(beyond[i, axis]))} {how} it{where};"
+            " correct machine.volume, or the readings"
+        ),
+    )
+
+
+def _of_length(design: Design, one: LengthRatio) -> str:
+    name = design.artefacts.names[one.artefact]
+    what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
+    word = "stated" if one.is_known else "drawn"
+    stated = f"the {word} {format_length(one.stated)}" if one.is_radius else f"the {word} ones"
+    why = (
+        "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    )
+    ratio = f"{one.ratio:.3g}" if one.is_impossible else f"{one.ratio:.4f}"
+    return (
+        f"{name}: the read {what} {verb} {ratio} of {stated}{f'; {why}' if one.is_known else ''}:"
+        f" correct the {'radius' if one.is_radius else 'length'} in the experiment file, or the"
+        " unit of the readings"
+    )
+
+
+def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) -> Message:
+    first = marks[int(np.flatnonzero(design.readings.position == wrong.position)[0])]
+    name = design.positions.names[wrong.position]
+    artefact = design.artefacts.names[design.positions.artefact[wrong.position]]
+    if wrong.turned:
+        text = (
+            f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the"
+            " names of the balls that are read there, or the turn that the experiment file states"
+            " for the position"
+        )
+    else:
+        text = (
+            f"position {name}: only {wrong.agreeing} of {wrong.count} readings fit the {artefact}"
+            " in any one pose; correct the names of the balls that are read there, or the artefact"
+        )
+    return first.message("", text)
+
+
+def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> Message:
+    readings, i = design.readings, wrong.reading
+    ball = design.ball_label(int(readings.ball[i]))
+    position = design.positions.names[readings.position[i]]
+    far = _shown(float(np.sqrt(wrong.misfit @ wrong.misfit)))
+    if wrong.undecided:
+        elsewhere = design.positions.names[readings.position[wrong.partner]]
+        text = (
+            f"ball {ball} in position {position} is {far} from where it is in position"
+            f" {elsewhere}, line {marks[wrong.partner].line}; correct or remove one of the two"
+            " lines"
+        )
+    elif wrong.other_ball >= 0:
+        other = design.ball_label(wrong.other_ball)
+        text = f"ball {ball} in position {position} is where ball {other} should be; "
+        if wrong.partner >= 0:
+            text += (
+                f"swap the names of the balls in lines {marks[i].line} and"
+                f" {marks[wrong.partner].line}"
+            )
+        else:
+            text += "correct its name, or remove the line"
+    elif wrong.other_probe >= 0:
+        probe, other = (
+            design.probes.names[readings.probe[i]],
+            design.probes.names[wrong.other_probe],
+        )
+        text = (
+            f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the"
+            " name of the probe"
+        )
+    else:
+        along = ", ".join(
+            f"{axis} {'+' if part > 0 else ''}{_shown(float(part))}"
+            for axis, part in zip("xyz", wrong.misfit, strict=False)
+            if abs(part) > 0.01 * np.abs(wrong.misfit).max()
+        )
+        text = (
+            f"ball {ball} in position {position} is {far} from where it should be ({along});"
+            " correct or remove it"
+        )
+    return marks[i].message("", text)
+
+
+def _shown(length: float) -> str:
+    """A length to three digits.
+
+    >>> _shown(0.0123456)
+    '12.3 mm'
+    """
+    return format_length(float(f"{length:.3g}"))

@@ -1,0 +1,347 @@
+"""Detection of readings that cannot be of the stated ball, and of their probable cause.
+
+Two comparisons are made before anything is fitted, both of places after the best rigid motion of
+each position:
+
+- against the drawing: a reading is wrong if it is further from its ball's place than 0.3 of the
+  distance from that ball to its nearest neighbour. A drawing that is off by a tenth of that
+  distance passes.
+- against the other readings of the same ball: a reading is wrong if it is further from their median
+  than 0.02 of that distance *and* than ten times the median of all such differences. The latter is
+  what the machine's own errors and the noise amount to, so that a bad machine is not taken for bad
+  readings.
+
+Uncertain probe offsets widen the second limit by six of their standard uncertainties, up to the
+first limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design, read_in_positions
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.readings import seen_places
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.geometry.motions import fit_motion
+from ballplate.simulator.machines.protocol import Array, Integers
+from numpy.typing import NDArray
+
+from .consensus import consensus_motion, distances
+
+AGAINST_DRAWING = 0.3
+# Extent across a line, as a fraction of that along it, below which balls are in one line.
+FLAT = 1e-6
+AGAINST_READINGS = 0.02
+TIMES_USUAL = 10.0
+TIMES_OFFSET = 6.0
+
+# A different ball or probe explains a reading if it leaves no more than this share of the misfit.
+EXPLAINED = 0.25
+
+
+@dataclass(frozen=True)
+class WrongReading:
+    """A reading that is off by `misfit` (d,) metres; `other_ball`, `other_probe` explain it where
+    they are not -1.
+
+    `partner` is a reading that is wrong in the reverse way (exchanged balls), or that disagrees
+    with this one where nothing tells which of the two is right (`undecided`); -1 without.
+    """
+
+    reading: int
+    misfit: Array
+    other_ball: int = -1
+    other_probe: int = -1
+    partner: int = -1
+    undecided: bool = False
+
+
+@dataclass(frozen=True)
+class WrongPosition:
+    """A position whose readings fit the artefact turned onto itself, or in no pose at all.
+
+    `turned` states the turn in words and is empty in the latter case, where only `agreeing` of
+    `count` readings fit.
+    """
+
+    position: int
+    turned: str
+    agreeing: int
+    count: int
+
+
+@dataclass(frozen=True)
+class _Motions:
+    """Poses (k, d, d) and (k, d) that the readings of each position agree on, and which readings
+    agree (m,).
+    """
+
+    rotations: Array
+    origins: Array
+    agreeing: NDArray[np.bool_]
+
+
+def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
+    """Positions and readings that cannot be right, from scale readings x (readings, d).
+
+    Readings of Bryan gauges pass: their directions need not be those of the drawing.
+    """
+    compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
+    if len(compared) < len(design.readings):
+        of_others = replace(design, readings=design.readings.select(compared)).observed(
+            design.of(Lengths).select(np.zeros(0, np.int64))
+        )
+        positions, found = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
+        back = np.append(compared, -1)
+        return positions, [
+            replace(one, reading=int(back[one.reading]), partner=int(back[one.partner]))
+            for one in found
+        ]
+    return _gross_errors(design, x)
+
+
+def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
+    readings = design.readings
+    seen = seen_places(design, readings, x)
+    pitch = ball_pitches(design)
+    found, positions = _against_drawing(design, seen, pitch)
+    lost = np.isin(readings.position, [wrong.position for wrong in positions])
+    wrong = ~found.agreeing & ~lost
+    shape = design.balls.places
+    pairs: list[tuple[int, int]] = []
+    if not positions:
+        found, shape, wrong, pairs = _against_readings(design, x, seen, pitch, found, wrong)
+    named = _explained(design, seen, pitch, found, shape, np.flatnonzero(wrong))
+    for first, second in pairs:
+        apart = _in_frame(found, readings.position, seen)
+        named.append(
+            WrongReading(first, apart[first] - apart[second], partner=second, undecided=True)
+        )
+    return positions, sorted(named, key=lambda one: one.reading)
+
+
+def ball_pitches(design: Design) -> Array:
+    """Distance (n,) from each ball to the nearest one of its artefact, infinite for a single
+    ball.
+    """
+    from scipy.spatial import cKDTree
+
+    pitch = np.full(len(design.balls.places), np.inf)
+    for artefact in np.unique(design.balls.artefact):
+        own = design.balls.of(artefact)
+        if len(own) > 1:
+            pitch[own] = cKDTree(design.balls.places[own]).query(design.balls.places[own], 2)[0][
+                :, 1
+            ]
+    return pitch
+
+
+def _against_drawing(
+    design: Design, seen: Array, pitch: Array
+) -> tuple[_Motions, list[WrongPosition]]:
+    readings = design.readings
+    rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
+    agreeing = np.ones(len(readings), bool)
+    wrong = []
+    for k, rows, nominal in read_in_positions(design, readings):
+        if len(np.unique(readings.ball[rows])) < 2:
+            origins[k] = (seen[rows] - nominal @ rotations[k].T).mean(axis=0)
+            continue
+        reach = AGAINST_DRAWING * pitch[readings.ball[rows]]
+        rotations[k], origins[k], agreeing[rows] = consensus_motion(nominal, seen[rows], reach)
+        count = int(agreeing[rows].sum())
+        if 2 * count <= len(rows):
+            wrong.append(WrongPosition(k, "", count, len(rows)))
+        elif design.artefacts.is_plate[design.positions.artefact[k]] and not _in_line(nominal):
+            turned = _turned_onto_itself(design, int(k), rotations[k], pitch)
+            if turned:
+                wrong.append(WrongPosition(k, turned, count, len(rows)))
+    return _Motions(rotations, origins, agreeing), wrong
+
+
+def _in_line(places: Array) -> bool:
+    """Whether places (m, d) lie in one line in space, about which any turn fits."""
+    extent = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    return places.shape[1] == 3 and bool(extent[1] < FLAT * extent[0])
+
+
+def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: Array) -> str:
+    """In words the turn, against the pose as planned, that puts every ball where another one should
+    be; or ''.
+    """
+    from scipy.spatial import cKDTree
+
+    own = design.balls.of(design.positions.artefact[position])
+    balls = design.balls.places[own]
+    turn = design.positions.rotations[position].T @ rotation
+    centre = balls.mean(axis=0)
+    apart, nearest = cKDTree(balls).query((balls - centre) @ turn.T + centre)
+    if (nearest == np.arange(len(own))).all() or (apart > AGAINST_DRAWING * pitch[own]).any():
+        return ""
+    if design.dimension == 3 and turn[2, 2] < 0.5:
+        return "over"
+    return f"by {round(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))) % 360} degrees"
+
+
+def _in_frame(motions: _Motions, position: Integers, seen: Array) -> Array:
+    """Places seen (m, d) in the frames of the artefacts."""
+    return np.asarray(
+        np.einsum("mji,mj->mi", motions.rotations[position], seen - motions.origins[position])
+    )
+
+
+def _against_readings(
+    design: Design, x: Array, seen: Array, pitch: Array, found: _Motions, wrong: NDArray[np.bool_]
+) -> tuple[_Motions, Array, NDArray[np.bool_], list[tuple[int, int]]]:
+    """Compare readings of the same ball, after assembling each plate from its positions.
+
+    Returns the motions of the assembled artefacts, their shapes (n, d), which readings are wrong,
+    and pairs of readings of which one must be.
+    """
+    readings, wrong = design.readings, wrong.copy()
+    right = np.flatnonzero(~wrong)
+    # A ball without any reading keeps its place in the drawing.
+    start = initial_state(replace(design, readings=readings.select(right)), x[right])
+    rotations, origins, shape = start.rotations.copy(), start.origins.copy(), start.balls.copy()
+    for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]).tolist():
+        rotations[k], origins[k] = found.rotations[k], found.origins[k]
+    off_drawing = np.zeros(len(readings))
+    for k, rows, nominal in read_in_positions(design, readings):
+        off_drawing[rows] = distances(nominal, seen[rows], found.rotations[k], found.origins[k])
+    limit = (
+        AGAINST_READINGS * pitch[readings.ball]
+        + TIMES_OFFSET * _offset_uncertainties(design)[readings.probe]
+    )
+    limit = np.minimum(limit, AGAINST_DRAWING * pitch[readings.ball])
+    undecided: list[tuple[int, int]] = []
+    apart = np.zeros(len(readings))
+    for sweep in range(12):
+        motions = _Motions(rotations, origins, ~wrong)
+        local = _in_frame(motions, readings.position, seen)
+        use = np.flatnonzero(~wrong)
+        shape, count = _medians(local[use], readings.ball[use], shape)
+        apart = np.sqrt(((local - shape[readings.ball]) ** 2).sum(axis=1))
+        several = ~wrong & (count[readings.ball] > 1)
+        usual = float(np.median(apart[several])) if several.any() else 0.0
+        # Two readings share their difference, which here is told apart in full.
+        apart = np.where(count[readings.ball] == 2, 2.0 * apart, apart)
+        suspect = several & (apart > np.maximum(limit, TIMES_USUAL * usual))
+        if sweep >= 3:
+            fresh = _worst_of_each_ball(readings.ball, apart, suspect & (count[readings.ball] > 2))
+            # Two readings are equally far from their mean; the drawing may tell which of them is
+            # wrong.
+            halves = np.flatnonzero(suspect & (count[readings.ball] == 2))
+            two = halves[np.argsort(readings.ball[halves], kind="stable")].reshape(-1, 2)
+            clear = off_drawing[two].max(axis=1, initial=0.0) > 4 * off_drawing[two].min(
+                axis=1, initial=np.inf
+            )
+            decided = two[clear]
+            fresh[decided[np.arange(len(decided)), off_drawing[decided].argmax(axis=1)]] = True
+            undecided = [(int(i), int(j)) for i, j in two[~clear]]
+            if not fresh.any():
+                break
+            wrong |= fresh
+            suspect = np.zeros(len(readings), bool)
+        for k in design.plate_positions:
+            rows = np.flatnonzero((readings.position == k) & ~wrong & ~suspect)
+            if len(np.unique(readings.ball[rows])) > design.dimension:
+                places = shape[readings.ball[rows]]
+                if sweep < 2:
+                    # What is wrong has spread to all motions; most readings agree on better ones.
+                    rotations[k], origins[k], _ = consensus_motion(places, seen[rows], limit[rows])
+                else:
+                    rotations[k], origins[k] = fit_motion(places, seen[rows])
+    return _Motions(rotations, origins, ~wrong), shape, wrong, undecided
+
+
+def _offset_uncertainties(design: Design) -> Array:
+    """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
+    variance = np.where(design.probes.free, np.inf, 0.0)
+    known = np.flatnonzero(design.of(Priors).probe >= 0)
+    probe, axis = design.of(Priors).probe[known], design.of(Priors).component[known]
+    variance[probe, axis] = design.of(Priors).uncertainty[known] ** 2
+    return np.asarray(np.sqrt(variance.sum(axis=1)))
+
+
+def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Integers]:
+    """Median place (n, d) of the readings of each ball, and how many there are (n,)."""
+    count = np.bincount(ball, minlength=len(otherwise))
+    order = np.argsort(ball, kind="stable")
+    place = np.arange(len(ball)) - (np.cumsum(count) - count)[ball[order]]
+    table = np.full((len(otherwise), max(int(count.max(initial=0)), 1), local.shape[1]), np.nan)
+    table[ball[order], place] = local[order]
+    result = otherwise.copy()
+    result[count > 0] = np.nanmedian(table[count > 0], axis=1)
+    return result, count
+
+
+def _worst_of_each_ball(
+    ball: Integers, apart: Array, suspect: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Of the suspect readings, the one of each ball that is furthest off."""
+    worst = np.zeros(len(ball), bool)
+    rows = np.flatnonzero(suspect)
+    rows = rows[np.argsort(-apart[rows], kind="stable")]
+    worst[rows[np.unique(ball[rows], return_index=True)[1]]] = True
+    return worst
+
+
+def _explained(
+    design: Design, seen: Array, pitch: Array, motions: _Motions, shape: Array, wrong: Integers
+) -> list[WrongReading]:
+    """What the wrong readings probably are: of another ball, with another probe, or simply
+    wrong.
+    """
+    from scipy.spatial import cKDTree
+
+    readings = design.readings
+    named: list[WrongReading] = []
+    local = _in_frame(motions, readings.position, seen)
+    other_ball = np.full(len(readings), -1)
+    for artefact in np.unique(design.balls.artefact[readings.ball[wrong]]):
+        own = design.balls.of(artefact)
+        tree = cKDTree(shape[own])
+        rows = wrong[design.balls.artefact[readings.ball[wrong]] == artefact]
+        apart, nearest = tree.query(local[rows])
+        ball = own[nearest]
+        misfit = np.sqrt(((local[rows] - shape[readings.ball[rows]]) ** 2).sum(axis=1))
+        there = (apart < np.minimum(AGAINST_DRAWING * pitch[ball], EXPLAINED * misfit)) & (
+            ball != readings.ball[rows]
+        )
+        other_ball[rows[there]] = ball[there]
+    key = {
+        (int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])): int(i)
+        for i in wrong
+    }
+    # A loop over the wrong ones only, and these are few.
+    for i in map(int, wrong):
+        position, probe, ball_of = (
+            int(readings.position[i]),
+            int(readings.probe[i]),
+            int(readings.ball[i]),
+        )
+        should = motions.rotations[position] @ shape[ball_of] + motions.origins[position]
+        misfit_of = seen[i] - should
+        size = float(np.sqrt(misfit_of @ misfit_of))
+        with_probe = np.sqrt(
+            ((misfit_of + design.probes.offsets - design.probes.offsets[probe]) ** 2).sum(axis=1)
+        )
+        with_probe[probe] = np.inf
+        other_probe = int(with_probe.argmin())
+        if with_probe[other_probe] > min(EXPLAINED * size, AGAINST_DRAWING * pitch[ball_of]):
+            other_probe = -1
+        other = int(other_ball[i])
+        if other >= 0 and other_probe >= 0:
+            left = local[i] - shape[other]
+            if with_probe[other_probe] < np.sqrt(left @ left):
+                other = -1
+            else:
+                other_probe = -1
+        partner = key.get((position, probe, other), -1) if other >= 0 else -1
+        if partner >= 0 and other_ball[partner] != ball_of:
+            partner = -1
+        named.append(WrongReading(i, misfit_of, other, other_probe, partner))
+    return named

@@ -1,0 +1,106 @@
+"""Detection of standards whose lengths are all read too long or too short by one factor.
+
+A machine's scale errors would explain that as well, so that no fit shows it; but no scale is off by
+so much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
+from ballplate.simulator.machines.protocol import Array
+
+# Departures of the factor from one that are doubtful, and that no machine has; a length that is
+# only drawn may be off.
+DOUBTFUL, IMPOSSIBLE = 1e-3, 1e-2
+OFF_DRAWING = 0.3
+
+# Half of the lengths agree with the factor to within this share of its departure from one.
+AGREEMENT = 0.25
+
+
+@dataclass(frozen=True)
+class LengthRatio:
+    """Read lengths of an artefact over stated ones, the same `ratio` for all; the first has been
+    read in `reading`.
+
+    Lengths that are not known have been drawn.
+    """
+
+    artefact: int
+    ratio: float
+    stated: float
+    reading: int
+    is_radius: bool
+    is_known: bool
+
+    @property
+    def is_impossible(self) -> bool:
+        """Whether no machine has such a scale error."""
+        return abs(self.ratio - 1.0) > (IMPOSSIBLE if self.is_known else OFF_DRAWING)
+
+
+def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
+    """Artefacts whose stated lengths are off by a common factor of more than 0.1 %, from readings x
+    (readings, d).
+
+    Of unknown lengths the drawn ones, if they are off by more than 30 %.
+    """
+    given, readings = design.of(Lengths), design.readings
+    known = np.ones(len(given), bool) if given.free is None else given.free < 0
+    seen = x + design.probes.offsets[readings.probe]
+    artefact = design.balls.artefact[readings.ball[given.first]]
+    found = []
+    for one in np.unique(artefact):
+        mine = np.flatnonzero(artefact == one)
+        is_known = bool(known[mine[0]])
+        is_radius = bool(given.to_pivot[mine[0]])
+        if is_radius:
+            ratios = _of_radii(design, seen, mine)
+        else:
+            apart = seen[given.first[mine]] - seen[given.second[mine]]
+            size = np.sqrt((apart**2).sum(axis=1))
+            along = np.abs((apart * given.direction[mine]).sum(axis=1))
+            ratios = np.where(given.projected[mine], along, size) / given.value[mine]
+        if not len(ratios):
+            continue
+        ratio = float(np.median(ratios))
+        agree = float(np.median(np.abs(ratios - ratio))) < AGREEMENT * abs(ratio - 1.0)
+        if abs(ratio - 1.0) > (DOUBTFUL if is_known else OFF_DRAWING) and agree:
+            first = mine[0]
+            stated, reading = float(given.value[first]), int(given.first[first])
+            found.append(LengthRatio(int(one), ratio, stated, reading, is_radius, is_known))
+    return tuple(found)
+
+
+def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
+    """Radii of the spheres through the readings over the stated one, without those that the
+    readings hardly show.
+    """
+    given = design.of(Lengths)
+    position = design.readings.position[given.first[rows]]
+    found = []
+    for k in np.unique(position):
+        points = seen[given.first[rows[position == k]]]
+        centre, radius = fit_sphere(points, design.positions.origins[k])
+        away = points - centre
+        size = np.sqrt((away**2).sum(axis=1))
+        _, values, vh = np.linalg.svd(
+            np.column_stack([away / size[:, None], np.ones(len(size))]), full_matrices=False
+        )
+        if (
+            len(values) < points.shape[1] + 1
+            or len(points) <= len(values)
+            or values[-1] < FLAT * values[0]
+        ):
+            continue
+        scatter = np.sqrt(((size - radius) ** 2).sum() / (len(points) - len(values)))
+        uncertainty = scatter * np.sqrt(((vh[:, -1] / values) ** 2).sum())
+        ratio = radius / given.value[rows[0]]
+        if abs(ratio - 1.0) * given.value[rows[0]] > 10.0 * uncertainty:
+            found.append(ratio)
+    return np.array(found)

@@ -1,0 +1,213 @@
+"""Whether co-ordinates are scale readings or ball centres, as far as the readings tell.
+
+The offsets of two probes that read in one position differ; readings of both can be of one artefact
+only as what they are. A shift of all readings of a position is one of its pose: with one probe in
+each position, the two cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import (
+    Design,
+    Readings,
+    locations,
+    measured,
+    nominal_state,
+    read_in_positions,
+)
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.experiment.readings_section import (
+    CompensationSettings,
+    ReadingsSettings,
+)
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+from numpy.typing import NDArray
+
+from .common_causes import TURNED, poses_found
+from .consensus import consensus_motion
+from .coordinate_kinds import controller_offsets
+from .gross_errors import AGAINST_DRAWING, ball_pitches
+from .wrong_offsets import wrong_offsets
+
+# One hypothesis is right and another wrong if the readings scatter so many times more with the
+# latter, and by so many repeatabilities.
+CLEARLY = 5.0
+REPEATABILITIES = 5.0
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What co-ordinates may be: places of balls once so many times the offsets are added."""
+
+    name: str
+    times: float
+
+
+HYPOTHESES = (
+    Hypothesis("scale readings", 1.0),
+    Hypothesis("ball centres", 0.0),
+    Hypothesis("scale readings with offsets of the other sign", -1.0),
+)
+
+REMEDIES = {
+    "ball centres": (
+        "if the measuring program has applied the offsets of probes, write readings: {coordinates:"
+        ' ball centres} in the experiment file, or give --coordinates "ball centres"; otherwise'
+        " correct the offsets under probes"
+    ),
+    "scale readings": "write coordinates: scale readings, or correct offsets_in_controller",
+    "scale readings with offsets of the other sign": (
+        "correct the signs of the offsets under probes, or the names of probes that are exchanged"
+    ),
+}
+UNTOLD = (
+    "these readings do not tell whether the offsets of probes have been applied to them, since they"
+    " would agree either way; they are taken for scale readings: write readings: {coordinates:"
+    " scale readings} in the experiment file, or ball centres"
+)
+
+
+@dataclass(frozen=True)
+class OffsetVerdict:
+    """How far readings of positions that tell are from their balls (metres, the median), by
+    hypothesis, and the one that clearly is right; None where that cannot be told.
+    """
+
+    scatter: dict[str, float]
+    right: str | None
+
+
+def judge_offsets(
+    design: Design, readings: Readings, x: Array, applied: Array | None = None
+) -> OffsetVerdict:
+    """What co-ordinates (m, d) of readings of plates are; nothing is told where no position was
+    read with different offsets.
+
+    `applied` (l, d) are the offsets that are in ball centres, where they are not those of the
+    design.
+    """
+    plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
+    own = readings.select(plate)
+    # What is not read across a plate is where it was drawn, whatever the offset.
+    is_read = measured(design, own)
+    offsets = np.where(is_read, design.probes.offsets[own.probe], 0.0)
+    x = np.where(is_read, x[plate], locations(design, nominal_state(design), own))
+    telling = _of_several_offsets(own, offsets)
+    if not telling.any():
+        return OffsetVerdict({}, None)
+    pitch = ball_pitches(design)[own.ball]
+    left = offsets if applied is None else np.where(is_read, applied[own.probe], 0.0)
+    seen = {
+        one.name: x + (one.times * offsets if one.times else offsets - left) for one in HYPOTHESES
+    }
+    scatter = {
+        name: float(np.median(_apart(design, own, places)[telling]))
+        for name, places in seen.items()
+    }
+    first, second = sorted(scatter.values())[:2]
+    noise = float(np.max(design.machine.repeatability))
+    if second < max(CLEARLY * first, REPEATABILITIES * noise):
+        return OffsetVerdict(scatter, None)
+    right = min(scatter, key=lambda name: scatter[name])
+    return OffsetVerdict(
+        scatter, right if _is_of_drawing(design, own, seen[right], pitch) else None
+    )
+
+
+def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]:
+    """Which readings are of positions that were read with offsets that differ: only these tell."""
+    telling = np.zeros(len(readings), bool)
+    for k in np.unique(readings.position):
+        own = readings.position == k
+        telling[own] = (offsets[own] != offsets[own][0]).any()
+    return telling
+
+
+def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array) -> bool:
+    """Whether most places seen (m, d) are those of the artefact as drawn, position by position."""
+    for _, rows, nominal in read_in_positions(design, readings):
+        if len(np.unique(readings.ball[rows])) < 2:
+            continue
+        _, _, agreeing = consensus_motion(nominal, seen[rows], AGAINST_DRAWING * pitch[rows])
+        if 2 * agreeing.sum() <= len(rows):
+            return False
+    return True
+
+
+def _apart(design: Design, readings: Readings, seen: Array) -> Array:
+    """Distances (m,) of places seen (m, d) from those of their balls in the plates that they are
+    assembled to.
+    """
+    # Places seen are readings of a probe without an offset.
+    probes = replace(design.probes, offsets=np.zeros_like(design.probes.offsets))
+    state = initial_state(replace(design, readings=readings, probes=probes), seen)
+    places = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    apart = seen - places - state.origins[readings.position]
+    return np.asarray(np.sqrt((apart**2).sum(axis=1)))
+
+
+def doubt_about_offsets(
+    design: Design, readings: Readings, x: Array, settings: ReadingsSettings, mark: Mark
+) -> tuple[str, ...]:
+    """What is doubtful about co-ordinates x (m, d) as the table has them: whether they are scale
+    readings, where nothing states it and the readings do not tell.
+
+    :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
+    """
+    stated = settings.coordinates
+    is_read = measured(design, readings)
+    if not (is_read & (design.probes.offsets[readings.probe] != 0.0)).any():
+        return ()
+    verdict = judge_offsets(design, readings, x, controller_offsets(design, settings))
+    taken = "ball centres" if stated == "part" else stated or HYPOTHESES[0].name
+    if verdict.right is None:
+        return () if stated else (UNTOLD,)
+    if verdict.right == taken:
+        return ()
+    shown = {
+        name: format_length(float(f"{scatter:.2g}")) for name, scatter in verdict.scatter.items()
+    }
+    why = "which is stated" if stated else "the default"
+    if stated == "part":
+        why = "which part co-ordinates are, and part is stated"
+    text = (
+        f"readings with different probes agree to {shown[verdict.right]} (the median) as"
+        f" {verdict.right}, but only to {shown[taken]} as {taken}, {why}; {REMEDIES[verdict.right]}"
+    )
+    if verdict.right == "ball centres" and is_read.all():
+        found = poses_found(design, readings, x) or {}
+        if any(angle > TURNED for angle, _ in found.values()):
+            text += (
+                "; or write part instead, since the artefact stands turned against the plan in them"
+            )
+    if taken == HYPOTHESES[0].name and is_read.all():
+        mistakes = wrong_offsets(design, readings, x)
+        text += "".join(f"; or {one.words(design)}" for one in mistakes)
+    raise mark.refused(text)
+
+
+def said_of(settings: ReadingsSettings) -> tuple[str, ...]:
+    """What is to be known of estimates where co-ordinates are not scale readings of a machine
+    without correction.
+    """
+    said = []
+    if settings.coordinates == "part":
+        said.append(
+            "part co-ordinates were placed by the nominal poses: errors are estimated where the"
+            " artefact was planned to stand"
+        )
+    if settings.compensation == "on":
+        said.append(
+            "the machine's own correction was on: what is estimated are the errors that it leaves"
+        )
+    if isinstance(settings.compensation, CompensationSettings):
+        said.append(
+            f"the correction of {settings.compensation.file} was taken off: what is estimated are"
+            " all errors of the machine"
+        )
+    return tuple(said)

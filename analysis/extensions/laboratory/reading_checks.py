@@ -1,0 +1,70 @@
+"""What the reader of plain tables asks for: other kinds of co-ordinates, and a person's mistakes in
+readings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+
+from .common_causes import doubts_about_poses
+from .coordinate_kinds import as_scale_readings, doubts_about_copies
+from .digits import doubts_about_digits, doubts_about_units
+from .gross_error_messages import (
+    doubts_about_lengths,
+    doubts_about_volume,
+    refuse_gross_errors,
+    with_names_swapped,
+)
+from .implausible_temperatures import doubts_about_temperatures
+from .offsets_applied import doubt_about_offsets, said_of
+
+
+def doubts_about_table(
+    design: Design,
+    readings: Readings,
+    given: Array,
+    stated: Array | None,
+    settings: ReadingsSettings,
+    mark: Mark,
+) -> tuple[str, ...]:
+    """What is doubtful about co-ordinates (m, d) as a table has them, and about uncertainties (m,)
+    that it states, in words; `mark` is where it begins.
+
+    :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
+    """
+    doubts = doubt_about_offsets(design, readings, given, settings, mark)
+    doubts += doubts_about_digits(design, given, readings.uncertainty)
+    if stated is not None:
+        doubts += doubts_about_units(design, stated)
+    if settings.coordinates == "part":
+        doubts += doubts_about_copies(design, readings, given)
+    return doubts
+
+
+def doubts_about_readings(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
+    """What of scale readings (readings, d) is possible, and unlikely to be meant: places, lengths,
+    temperatures.
+    """
+    of_volume = doubts_about_volume(design, x, marks)
+    return (
+        *doubts_about_poses(design, x),
+        *doubts_about_lengths(design, x),
+        *of_volume,
+        *doubts_about_temperatures(design, marks),
+    )
+
+
+class ReadingChecks:
+    """The functions by which readings are placed and judged."""
+
+    as_scale_readings = staticmethod(as_scale_readings)
+    with_names_swapped = staticmethod(with_names_swapped)
+    said_of = staticmethod(said_of)
+    doubts_about_table = staticmethod(doubts_about_table)
+    refuse_gross_errors = staticmethod(refuse_gross_errors)
+    doubts_about_readings = staticmethod(doubts_about_readings)

@@ -1,0 +1,46 @@
+"""What a fit asks for: the search of its residuals for gross errors, in words and as data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+
+from .leftover import too_many_entries
+from .refits import diagnosis_with_refits
+from .suspects import Diagnosis
+from .wording import diagnosis_data, diagnosis_lines, diagnosis_words
+
+
+@dataclass(frozen=True)
+class DiagnosisInWords(Diagnosis):
+    """A diagnosis that can be told; `marks` tell where the readings stand."""
+
+    @property
+    def names_causes(self) -> bool:
+        return bool(self.suspects or self.scatter or self.refit)
+
+    def words(self, marks: Sequence[Mark] = ()) -> list[str]:
+        return diagnosis_words(self, marks)
+
+    def lines(self, marks: Sequence[Mark] = ()) -> list[str]:
+        return diagnosis_lines(self, marks)
+
+    def data(self, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
+        return diagnosis_data(self, marks)
+
+
+def diagnosed(
+    at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
+) -> tuple[DiagnosisInWords, str]:
+    """What is suspected of the observations behind a fit, and why there was no search where there
+    are too many of them; empty otherwise.
+    """
+    untested = too_many_entries(at.design)
+    if untested:
+        return DiagnosisInWords(), untested
+    return DiagnosisInWords(**vars(diagnosis_with_refits(at, x, freedom, sigma_is_estimated))), ""

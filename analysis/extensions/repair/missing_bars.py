@@ -1,0 +1,234 @@
+"""Reasons why bars and gauges leave scales or squareness undetermined: missing directions,
+unknown lengths.
+
+A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S
+u: a sum of the six products of its direction cosines. From a Bryan gauge comes the same less what a
+shift of its pivot would do. What is undetermined of the six is described by what the bars have in
+common.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+from ballplate.rank.verdict import relative_changes
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.settings import listed
+from ballplate.simulator.machines.protocol import Array
+
+from .proposed_bars import MISSING, bars_to_add
+
+AXES = "xyz"
+
+
+def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
+    """What bars and gauges lack, given what changes of the shared parameters (s, k) are open."""
+    if not len(design.of(Lengths)) or not open_.shape[1] or not len(design.evaluation.points):
+        return ()
+    strains = _open_strains(design, layout, open_)
+    if not strains.shape[1]:
+        return ()
+    found = []
+    unknown = not design.of(Lengths).is_known.any()
+    overall = _unit_strain(np.eye(design.dimension))
+    is_free = unknown and _is_among(overall, strains)
+    if is_free:
+        names = " and ".join(design.unknown_lengths.names)
+        found.append(
+            f"no length is known ({names}): the overall scale of the machine is undetermined"
+            " until one is calibrated"
+        )
+    left = _less(strains, overall) if is_free else strains
+    missing = _what_is_missing(design, strains, left) if left.shape[1] else ""
+    if missing:
+        told = _told(strains, design.dimension, is_free)
+        cure = bars_to_add(design, strains, overall if is_free else None)
+        found.append(f"{missing}: nothing determines {told}{f'; {cure}' if cure else ''}")
+    return tuple(found)
+
+
+def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
+    """Strains (products, k), orthonormal columns, that some open change of the machine's errors
+    amounts to.
+    """
+    points = design.evaluation.points
+    fields = relative_changes(design, layout, open_)
+    basis = np.stack(
+        [points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
+        2,
+    )
+    wanted = without_rigid_motion(points, basis)
+    flat = fields.reshape(-1, fields.shape[2])
+    flat = flat[:, (flat**2).sum(axis=0) > 0.0]
+    if not flat.shape[1]:
+        return np.zeros((_size(design.dimension), 0))
+    u, values, _ = np.linalg.svd(flat / np.linalg.norm(flat, axis=0), full_matrices=False)
+    spanned = u[:, values > MISSING * values[0]]
+    strain = wanted.reshape(len(flat), -1)
+    left = strain - spanned @ (spanned.T @ strain)
+    return _null_space(left, float(np.linalg.norm(strain, 2)))
+
+
+def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
+    """What all directions have in common that leaves strains open; empty where another reason must
+    do.
+
+    `left` is what remains of the open strains without the overall scale of a machine whose lengths
+    are all unknown.
+    """
+    given, d = design.of(Lengths), design.dimension
+    position = design.readings.position[given.first]
+    directions = given.direction.copy()
+    for k in np.unique(position[given.to_pivot]):
+        mine = given.to_pivot & (position == k)
+        directions[mine] -= directions[mine].mean(axis=0)
+    normals = _null_space(directions)
+    only_gauges = bool(given.to_pivot.all())
+    # Any three places lie in a plane.
+    few = only_gauges and np.bincount(position).max() <= d
+    with_plates = bool(design.artefacts.is_plate.any())
+    if with_plates:
+        # What else bars would have to do, plates may do.
+        normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]
+    what = "every place of the ball" if only_gauges else "every bar"
+    if given.to_pivot.any() and not only_gauges:
+        what = "every bar, and every place of a gauge's ball,"
+    if d == 3 and normals.shape[1] == 1 and not few:
+        lies = "lies in a plane parallel to" if only_gauges else "lies parallel to"
+        return f"{what} {lies} {_plane(normals[:, 0])}"
+    if d - normals.shape[1] == 1 and not few:
+        return f"{what} lies along {_axis(np.linalg.svd(directions)[2][0])}"
+    if with_plates:
+        return ""
+    if left.shape[1] == 1:
+        # With an unknown length the form need not be zero, only the same.
+        form = _matrix(left[:, 0], d)
+        values = np.einsum("mi,ij,mj->m", given.direction, form, given.direction)
+        if np.ptp(values) < MISSING:
+            who = "every direction of the bar" if given.to_pivot.any() else "every bar"
+            return f"{who} {_quadric(form - values.mean() * np.eye(d))}"
+    who = "places of the ball" if only_gauges else "bars' directions"
+    return f"the {who} are too few or too similar"
+
+
+def _quadric(form: Array) -> str:
+    """Words for directions u with u' `form` u = 0."""
+    values, vectors = np.linalg.eigh(form)
+    size = np.abs(values).max()
+    small = np.abs(values) < MISSING * size
+    if small.sum() == 1 and len(values) == 3:
+        high, low = np.argmax(values), np.argmin(values)
+        parts = [np.sqrt(values[high]) * vectors[:, high], np.sqrt(-values[low]) * vectors[:, low]]
+        planes = sorted(
+            _plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1])
+        )
+        return f"lies parallel to {planes[0]} or {planes[1]}"
+    for i in range(len(values)):
+        others = np.delete(values, i)
+        if len(values) == 3 and abs(others[0] - others[1]) < MISSING * size:
+            angle = np.degrees(np.arctan(np.sqrt(-values[i] / others[0])))
+            return f"is at {angle:.3g} deg to {_axis(vectors[:, i])}"
+    return "lies on one cone"
+
+
+def _told(strains: Array, d: int, without_one: bool) -> str:
+    """Scales and squareness that are open by themselves, in words; others as mixtures of them, one
+    of them left out.
+    """
+    pairs = list(combinations_with_replacement(range(d), 2))
+    pure = [
+        pair
+        for pair, unit in zip(pairs, np.eye(len(pairs)), strict=True)
+        if _is_among(unit, strains)
+    ]
+    scales = [AXES[i].upper() for i, j in pure if i == j]
+    square = [(AXES[i].upper(), AXES[j].upper()) for i, j in pure if i < j]
+    words = []
+    if len(scales) == 1 and square and all(scales[0] in pair for pair in square):
+        others = [a if b == scales[0] else b for a, b in square]
+        words.append(f"the scale of {scales[0]} nor its squareness to {' and '.join(others)}")
+    else:
+        if scales:
+            words.append(f"the {'scales' if len(scales) > 1 else 'scale'} of {listed(scales)}")
+        if square:
+            words.append(f"the squareness of {listed([f'{b} to {a}' for a, b in square])}")
+    more = strains.shape[1] - len(pure) - without_one
+    if more > 0:
+        touched = np.abs(strains).max(axis=1) > MISSING
+        for pair in pure:
+            touched[pairs.index(pair)] = False
+        names = [
+            (
+                f"the scale of {AXES[i].upper()}"
+                if i == j
+                else f"the squareness of {AXES[j].upper()} to {AXES[i].upper()}"
+            )
+            for (i, j), one in zip(pairs, touched, strict=True)
+            if one
+        ]
+        words.append(
+            f"{'a combination' if more == 1 else f'{more} combinations'} of {listed(names)}"
+        )
+    return " nor ".join(words)
+
+
+def _axis(vector: Array) -> str:
+    k = int(comparable(np.abs(vector)).argmax())
+    if abs(vector[k]) > 1.0 - MISSING**2:
+        return AXES[k]
+    told = np.where(np.abs(vector) > MISSING, vector, 0.0)
+    told *= np.sign(told[np.flatnonzero(told)[0]])
+    return f"({', '.join(f'{v + 0.0:.3g}' for v in told)})"
+
+
+def _plane(normal: Array) -> str:
+    axis = _axis(normal)
+    return (
+        f"the {AXES.replace(axis, '')} plane"
+        if len(axis) == 1
+        else f"the plane perpendicular to {axis}"
+    )
+
+
+def _size(d: int) -> int:
+    return d * (d + 1) // 2
+
+
+def _matrix(strain: Array, d: int) -> Array:
+    """Symmetric matrix (d, d) of a strain: the coefficients of u_i u_j, i <= j, in u' S u."""
+    found = np.zeros((d, d))
+    for value, (i, j) in zip(strain, combinations_with_replacement(range(d), 2), strict=True):
+        found[i, j] += 0.5 * value
+        found[j, i] += 0.5 * value
+    return found
+
+
+def _unit_strain(form: Array) -> Array:
+    """The strain of a symmetric matrix, of length one."""
+    pairs = combinations_with_replacement(range(len(form)), 2)
+    strain = np.array([form[i, j] if i == j else 2.0 * form[i, j] for i, j in pairs])
+    return strain / np.linalg.norm(strain)
+
+
+def _is_among(strain: Array, span: Array) -> bool:
+    """Whether a strain of length one is a mixture of orthonormal ones."""
+    return bool(np.linalg.norm(strain - span @ (span.T @ strain)) < 10 * MISSING)
+
+
+def _less(span: Array, direction: Array) -> Array:
+    """Orthonormal columns that span what of `span` is orthogonal to a direction in it."""
+    coefficients = span.T @ direction
+    return span @ _null_space(coefficients[None])
+
+
+def _null_space(rows: Array, size: float | None = None) -> Array:
+    """Orthonormal columns that the rows leave all but alone."""
+    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    _, values, directions = np.linalg.svd(triangle)
+    largest = values.max(initial=0.0) if size is None else size
+    return np.asarray(directions[int((values > MISSING * largest).sum()) :].T)

@@ -1,0 +1,170 @@
+"""What even all candidates of a pool together leave undetermined, and what would determine it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from ballplate.planning.information import Information
+from ballplate.rank.verdict import Verdict, changed_names
+from ballplate.results.study import check
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.settings import listing
+
+from .repair_search import Repair, repairs
+from .repair_tables import changes_in_words
+
+# Names of errors, and cures, that are told.
+MOST_NAMES, MOST_CURES = 8, 2
+
+# Positions that stand for all of a pool.
+MOST_SPANNING = 16
+
+# The search for changes takes about observations times parameters, so often as each direction is
+# looked at and this much besides; beyond the most of that, a few seconds, there is none.
+BESIDES, MOST_WORK = 20, 9e6
+
+# What a design with candidates, or the search for changes of it, may fail with.
+UNTOLD = (ExperimentError, AssertionError, np.linalg.LinAlgError)
+
+# In units of what the whole pool knows: what is not known; and what a few candidates are to know of
+# everything, as a part of their fair share.
+FAINT, EVEN = 1e-9, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class PoolGap:
+    """What all `candidates` of a pool leave undetermined, by the `verdict` of a design with as many
+    of them as leave the same; `cures` would determine all of it, or else `partial` ones some, if
+    they were `sought`.
+    """
+
+    candidates: int
+    verdict: Verdict
+    cures: tuple[Repair, ...]
+    partial: tuple[Repair, ...]
+    sought: bool
+
+    @property
+    def words(self) -> str:
+        """What stays open, by the names of the errors."""
+        null = self.verdict.null
+        names = dict.fromkeys(name for direction in null for name in changed_names(direction))
+        count = "one direction" if len(null) == 1 else f"{len(null)} directions"
+        return (
+            f"even all {self.candidates} candidates together leave {count} undetermined"
+            f" ({listing(names, MOST_NAMES)})"
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What would determine it."""
+        if self.verdict.as_expected:
+            return "the file expects that"
+        if not self.sought:
+            return (
+                "changes that would determine it were not looked for in so large a design; check"
+                " --suggest looks for them in a file without a pool"
+            )
+        cures = self.cures or self.partial
+        if not cures:
+            return "no change was found that would determine it"
+        all_of_it = "it" if self.cures else "part of it"
+        told = "; or ".join(changes_in_words(one) for one in cures[:MOST_CURES])
+        return f"what would determine {all_of_it}, offered or done beside these: {told}"
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "deficiency": self.verdict.deficiency,
+            "undetermined": [str(one) for one in self.verdict.null],
+            "cures": [changes_in_words(one) for one in self.cures],
+            "partial_cures": [changes_in_words(one) for one in self.partial],
+            "cures_sought": self.sought,
+        }
+
+    def refusing(self, error: ExperimentError) -> ExperimentError:
+        """An error of the pool with what stays open, and what would determine it."""
+        told = f"{self.words}; {self.remedy}"
+        return ExperimentError(replace(one, text=f"{one.text}; {told}") for one in error.messages)
+
+
+def pool_gap(
+    experiment: Experiment,
+    candidates: Sequence[Candidate],
+    information: Information,
+    report: Report = unreported,
+) -> PoolGap | None:
+    """What the candidates of a pool, the first of those that `information` is about, leave
+    undetermined together, and what would determine it; None where that cannot be told.
+
+    A few candidates that determine all that the others do stand for all: they leave the same
+    directions open, and what determines these in a design with the few does so in one with all,
+    which has the same observations and others. That two computations agree on how many directions
+    the few leave open is the condition for telling anything.
+    """
+    told = information.deficiency + information.balls_open
+    # Words beside a plan, which is as good without them: nothing wrong with them is a reason to
+    # withhold it.
+    try:
+        few = spanning(information, candidates)
+        design = with_chosen(experiment, [candidates[k] for k in few])
+        judged = check(design).verdict if few else None
+    except UNTOLD:
+        return None
+    if judged is None or judged.deficiency != told + sum(information.pose_open[k] for k in few):
+        return None
+    size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
+    is_sought = size <= MOST_WORK and not judged.as_expected
+    try:
+        found = repairs(design, report=report) if is_sought else None
+    except UNTOLD:
+        found = None
+    cures, partial = ((), ()) if found is None else (found.complete, found.partial)
+    return PoolGap(len(candidates), judged, cures, partial, is_sought)
+
+
+def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple[int, ...]:
+    """A few candidates that together determine all that a pool determines, in order; empty where
+    `MOST_SPANNING` positions do not.
+
+    All certificates are among them, positions that leave something of their own pose open, and
+    enough others to read every ball that is read; each further one adds most to what is known
+    least.
+    """
+    count = len(candidates)
+    unread = {k: _balls(one) for k, one in enumerate(candidates) if isinstance(one.item, Position)}
+    places = set(unread)
+    few = [k for k in range(count) if k not in places or information.pose_open[k]]
+    _take(unread, [k for k in few if k in places])
+    while any(unread.values()):
+        best = max(unread, key=lambda k: len(unread[k]))
+        few.append(best)
+        _take(unread, [best])
+    flat = information.matrices[:count].reshape(count, -1)
+    while True:
+        values, directions = np.linalg.eigh(information.of(few))
+        known, taken = values.min(initial=1.0), places.intersection(few)
+        is_even = known > EVEN * len(few) / count
+        if is_even or taken == places or len(taken) >= MOST_SPANNING:
+            return tuple(sorted(few)) if known > FAINT and len(taken) <= MOST_SPANNING else ()
+        scaled = directions / (values.clip(0.0) + FAINT)
+        gains = comparable(flat @ (scaled @ directions.T).ravel())
+        few.append(max(places - taken, key=lambda k: (gains[k], -k)))
+
+
+def _balls(candidate: Candidate) -> set[tuple[str, int]]:
+    assert isinstance(candidate.item, Position)
+    return {(candidate.item.artefact, ball) for ball in candidate.item.balls.tolist()}
+
+
+def _take(unread: dict[int, set[tuple[str, int]]], taken: Sequence[int]) -> None:
+    """Count as read what candidates read."""
+    read = {ball for k in taken for ball in unread[k]}
+    for balls in unread.values():
+        balls -= read

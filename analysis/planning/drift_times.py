@@ -1,0 +1,72 @@
+"""Times of a plan's readings, on which drifts depend."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ballplate.simulator.design.influences.drift import (
+    DriftPositionSettings,
+    DriftSettings,
+    DriftTimesSettings,
+)
+from ballplate.simulator.experiment.model import ChangeTimes, Experiment
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.quantities import format_duration
+
+from .schedule import RunSheet
+from .short_names import with_names
+
+
+def without_drift(experiment: Experiment) -> Experiment:
+    """The experiment without what depends on the order of readings."""
+    left = tuple(one for one in experiment.influences if not one.in_order)
+    return replace(experiment, influences=left)
+
+
+def in_time(
+    experiment: Experiment,
+    sheet: RunSheet,
+    changes: ChangeTimes,
+    names: Mapping[str, str] | None = None,
+) -> Experiment:
+    """An experiment of the positions of a run sheet in their order, whose drifts have the times of
+    that; `names` are the short names of positions.
+    """
+    chosen = with_chosen(with_names(experiment, names or {}), sheet.written)
+    placed = {one.name for one in chosen.positions}
+    positions = {
+        step.name: DriftPositionSettings.model_construct(
+            start=sheet.first_readings[step.name], reading=step.candidate.reading_seconds
+        )
+        for step in sheet.steps
+        if step.name in placed and not step.done
+    }
+    times = DriftTimesSettings.model_construct(probe_change=changes.probe)
+    timed = tuple(
+        one.model_copy(update={"positions": positions, "times": times})
+        if isinstance(one, DriftSettings)
+        else one
+        for one in chosen.influences
+    )
+    return replace(chosen, influences=timed)
+
+
+def in_order_settings(experiment: Experiment) -> dict[int, dict[str, Any]]:
+    """What an experiment file says of the times of its drifts, by their places among the influence
+    quantities.
+    """
+    found: dict[int, dict[str, Any]] = {}
+    for k, one in enumerate(experiment.influences):
+        if isinstance(one, DriftSettings):
+            places = (one.positions or {}).items()
+            times = one.times or DriftTimesSettings.model_construct()
+            found[k] = {
+                "times": {"probe_change": format_duration(times.probe_change)},
+                "positions": {
+                    name: {key: format_duration(value) for key, value in place.stated.items()}
+                    for name, place in places
+                },
+            }
+    return found

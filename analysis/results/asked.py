@@ -1,0 +1,61 @@
+"""What extensions answer of a prediction or a fit, as far as the kernel knows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from ballplate.simulator.inputs.extensions import function, optional_function
+
+
+class SpaceView(Protocol):
+    """A picture in space, which a notebook shows."""
+
+    def save(self, path: str | Path) -> None: ...
+
+    def _repr_html_(self) -> str: ...
+
+
+class AskedResult(Protocol):
+    """A result that is told as lines of text and as plain data."""
+
+    def lines(self) -> list[str]: ...
+
+    def to_dict(self) -> dict[str, Any]: ...
+
+
+class GroupVariances(AskedResult, Protocol):
+    """How uncertain `groups` of observations are, with the `weighting` of their variances."""
+
+    @property
+    def groups(self) -> Sequence[Any]: ...
+
+    @property
+    def weighting(self) -> Sequence[float]: ...
+
+
+class IssuedCertificate(AskedResult, Protocol):
+    """A plate's co-ordinates in its own axes, by their `datum`; `texts` are files by their names
+    that a path asks for.
+    """
+
+    @property
+    def datum(self) -> str: ...
+
+    def texts(self, path: str | Path) -> Mapping[Path, str]: ...
+
+
+def shown_in_space(result: object) -> SpaceView:
+    """The view of a prediction or a fit.
+
+    :raises MissingExtensionError: the extension that draws it is not installed.
+    """
+    found: SpaceView = function("view")(result)
+    return found
+
+
+def picture_in_space(result: object) -> str:
+    """The same as a notebook has it; empty without the extension that draws it."""
+    view = optional_function("view")
+    return "" if view is None else str(view(result)._repr_html_())

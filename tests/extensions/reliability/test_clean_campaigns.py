@@ -1,0 +1,148 @@
+"""Readings of which nothing is wrong, of few positions in different planes: such designs hide much,
+of which noise leaves a little.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ballplate.extensions.reliability.cause_search import Search, diagnosis
+from ballplate.extensions.reliability.patterns import patterns
+from ballplate.extensions.reliability.tails import log_chance
+from ballplate.extensions.reliability.wording import diagnosis_words
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.readings.observed_readings import observe
+from numpy.typing import NDArray
+from scipy.stats import beta, binom
+
+from tests.extensions.reliability.designs import PLATE, experiment
+from tests.extensions.reliability.test_search import jacobian
+
+QUICKSTART, CAMPAIGN = Path("designs/quickstart.yaml"), Path("designs/planning/campaign.yaml")
+
+# Positions of an experiment, the standard uncertainty of its readings, and the machine's errors.
+DESIGNS = [
+    (QUICKSTART, ["z high", "x low"], "2 um", "2 um"),
+    (QUICKSTART, ["z low", "y high"], "0.2 um", "2 um"),
+    (QUICKSTART, ["x low", "y high"], "2 um", "2 um"),
+    (QUICKSTART, ["x high", "y low"], "0.2 um", "20 um"),
+    (QUICKSTART, ["z low", "x low", "y low"], "0.2 um", "2 um"),
+    (QUICKSTART, ["z high", "x low", "y high"], "1 um", "5 um"),
+    (QUICKSTART, ["z low", "z high", "x low", "y low"], "0.5 um", "2 um"),
+    (CAMPAIGN, ["flat low", "upright"], "0.5 um", "0 um"),
+    (None, ["low", "near"], "1 um", "2 um"),
+    (None, ["low", "high", "near", "side"], "0.2 um", "2 um"),
+]
+
+Real = NDArray[np.float64]
+
+
+def of_positions(
+    file: Path | None, names: list[str], noise: str, machine: str, folder: Path
+) -> Experiment:
+    given = experiment(folder, PLATE) if file is None else load(file)[0]
+    errors = {"kind": "random", "position": machine, "rotation": "4 urad", "seed": 3}
+    if machine == "0 um":
+        errors = {"kind": "zero"}
+    changed = given.with_({"machine.repeatability": noise, "true_machine": errors})
+    return replace(changed, positions=tuple(p for p in changed.positions if p.name in names))
+
+
+def fits(given: Experiment, count: int) -> Iterator[tuple[Linearisation, Real]]:
+    """Fits of faultless readings of an experiment, and the readings."""
+    design = lay_out(given)
+    corners = design.machine.volume.corners
+    machine = true_machine(given.true_machine, design.model, *corners)
+    on_truth, truth = on_true_machine(design, machine)
+    for generator in np.random.default_rng(1).spawn(count):
+        certificate = noisy_certificate(design, truth, generator)
+        observed = observe(certificate, *noisy_readings(on_truth, truth, generator))
+        solution = estimate(observed.design, observed.x)
+        assert solution.status == "converged"
+        yield linearised_fit(observed.design, solution), observed.x
+
+
+def test_what_a_design_hides_is_not_looked_for_in_its_noise(tmp_path: Path) -> None:
+    """Any error along an axis that depends on the place on it, and some slips, are taken up by the
+    machine's errors, the plate and the poses here; dense least squares show it.
+    """
+    given = of_positions(*DESIGNS[0], tmp_path)
+    design = lay_out(given)
+    state = nominal_state(design)
+    x = expected_readings(design, state, design.readings)
+    taken, hidden = jacobian(design, state, x), []
+    for axis, letter in enumerate("xyz"):
+        place = np.unique(np.round(x[:, axis], 4), return_inverse=True)[1]
+        bias = np.zeros((len(taken), place.max() + 1))
+        bias[axis : x.size : 3] = np.eye(place.max() + 1)[place]
+        assert (shares_left(taken, bias) < 1e-9).all()
+        hidden.append(f"an error in {letter} that depends on {letter}")
+    events = patterns(design, state, None, every_start=True).matrix.toarray()
+    are_hidden = shares_left(taken, events) < 1e-9
+    assert 0 < are_hidden.sum() < 0.1 * len(are_hidden)
+    at, x = next(fits(given, 1))
+    search = Search(at, x, at.degrees_of_freedom, True)
+    assert search.smooth and not {one.words for one in search.smooth} & set(hidden)
+    assert not search.columns.information[are_hidden].any()
+
+
+def shares_left(taken: Real, biases: Real) -> Real:
+    """What columns (n, k) leave of the square of biases (n, b)."""
+    left, values, _ = np.linalg.svd(taken, full_matrices=False)
+    left = left[:, values > 1e-7 * values[0]]
+    rest = biases - left @ (left.T @ biases)
+    return np.asarray((rest**2).sum(axis=0) / (biases**2).sum(axis=0))
+
+
+def test_no_test_of_smooth_errors_is_significant_too_often(tmp_path: Path) -> None:
+    """At a level of one in ten."""
+    given, count = of_positions(*DESIGNS[0], tmp_path), 15
+    significant: Counter[str] = Counter()
+    for at, x in fits(given, count):
+        search = Search(at, x, at.degrees_of_freedom, True)
+        left = search.left
+        for one in search.smooth:
+            square, dimensions = ((one.columns.T @ left.residual) ** 2).sum(), one.columns.shape[1]
+            log_p = log_chance(square, left.sum_of_squares, dimensions, left.freedom, False)
+            significant[one.words] += int(log_p < np.log(0.1))
+    assert significant
+    for words, hits in significant.items():
+        assert binom.sf(hits - 1, count, 0.1) > 1e-4, words
+
+
+@pytest.mark.long
+def test_faultless_campaigns_are_hardly_ever_suspected(tmp_path: Path) -> None:
+    """Run with -s for the rates of the designs."""
+    each, total = 200, 0
+    for design in DESIGNS:
+        count = 0
+        for at, x in fits(of_positions(*design, tmp_path), each):
+            found = diagnosis(at, x, at.degrees_of_freedom, True)
+            count += bool(found)
+            for words in diagnosis_words(found):
+                print("   ", words)
+        total += count
+        print(f"{', '.join(design[1])}, {design[2]}: {rate(count, each)}", flush=True)
+        assert binom.sf(count - 1, each, 0.01) > 1e-3, design
+    print(f"all: {rate(total, each * len(DESIGNS))}")
+    assert total <= 0.01 * each * len(DESIGNS)
+
+
+def rate(count: int, trials: int) -> str:
+    """Suspected campaigns, with limits of 95 % confidence by Clopper and Pearson."""
+    low = beta.ppf(0.025, count, trials - count + 1) if count else 0.0
+    high = beta.ppf(0.975, count + 1, trials - count)
+    return f"{count} of {trials}, {count / trials:.2%} ({low:.2%} to {high:.2%})"

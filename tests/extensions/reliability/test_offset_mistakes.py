@@ -1,0 +1,195 @@
+"""One wrong offset, sign, exchange of probes or arrangement is named, before patterns of
+micrometres.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.extensions.judgement.compared_models import compared_models
+from ballplate.extensions.laboratory.wrong_offsets import (
+    WrongOffsets,
+    offset_differences,
+    with_offsets,
+)
+from ballplate.extensions.reliability import refits
+from ballplate.extensions.reliability.refits import diagnosis_with_refits
+from ballplate.extensions.reliability.wording import diagnosis_words
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+
+from tests.extensions.reliability.designs import experiment
+from tests.extensions.reliability.offsets import (
+    DESIGNS,
+    Mistake,
+    Plan,
+    drawn,
+    limits,
+    mistakes,
+    outcome,
+    plan,
+    rates,
+    sentences,
+)
+
+OBLIQUE = "three probes in each position"
+
+
+def mistake(given: Plan, words: str) -> Mistake:
+    (found,) = (one for one in mistakes(given.design) if one.words == words)
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("designs")
+
+
+@pytest.mark.parametrize(
+    ("name", "is_uncertain", "words"),
+    [
+        ("few balls", False, "z of left by 0.3 mm"),
+        ("few balls", False, "x of right by -2 mm"),
+        ("few balls", False, "z of right by 10 mm"),
+        ("few balls", False, "sign of x of left"),
+        ("few balls", True, "right and back"),
+        (OBLIQUE, True, "sign of y of c"),
+    ],
+)
+def test_a_mistake_in_the_offsets_is_named(
+    name: str, is_uncertain: bool, words: str, folder: Path
+) -> None:
+    given = plan(name, is_uncertain, folder)
+    wrong = mistake(given, words)
+    assert outcome(wrong, sentences(given, wrong, 5)) == "right"
+
+
+@pytest.mark.parametrize("is_uncertain", [False, True], ids=["exact", "uncertain"])
+def test_what_offsets_leave_is_what_an_estimate_with_them_leaves(
+    is_uncertain: bool, folder: Path
+) -> None:
+    """The quadratic form of all offsets, against an estimate with others."""
+    given = plan("few balls", is_uncertain, folder)
+    generator = np.random.default_rng(2)
+    true = generator.uniform(-1e-3, 1e-3, given.design.probes.offsets.shape)
+    design, x = drawn(given.design, true, 3)
+    free = refits._free_offsets(design, x)
+    assert free is not None
+    for size in (0.0, 1e-6, 1e-4):
+        change = true + size * generator.standard_normal(true.shape)
+        expected = estimate(with_offsets(design, change), x)
+        assert expected.status == "converged"
+        left = free.left(WrongOffsets((1, 2), change))
+        assert left == pytest.approx(expected.factor.sum_of_squares, rel=5e-3)
+        assert left > free.least
+
+
+def test_differences_of_offsets_are_those_of_the_readings(folder: Path) -> None:
+    given = plan(OBLIQUE, False, folder)
+    change = np.random.default_rng(1).uniform(-0.05, 0.05, given.design.probes.offsets.shape)
+    design, x = drawn(given.design, change, 4)
+    found = offset_differences(design, x)
+    expected = change - change.mean(axis=0)
+    shifts = found.shifts(len(change))
+    np.testing.assert_allclose(shifts - shifts.mean(axis=0), expected, atol=1e-4)
+    assert np.abs(found.left(change)).max() < 1e-4 < 0.01 < np.abs(found.left(0.0 * change)).max()
+
+
+def test_a_probe_of_one_position_may_be_an_artefact_that_moved(folder: Path) -> None:
+    both = "quarter_turns: 1, probes: [right, left]"
+    assert DESIGNS["few balls"].count("probes: [right, left]") == 2
+    text = DESIGNS["few balls"].replace("probes: [right, left]", "probes: [right]")
+    text = text.replace("quarter_turns: 1, probes: [right]", both)
+    given = Plan(lay_out(experiment(folder, text)))
+    (said,) = sentences(given, mistake(given, "x of left by 10 mm"), 7)
+    assert "the offset of probe left is another one (x is -40 mm, not -50 mm)" in said
+    assert said.endswith(
+        "; or the artefact moved in position near between the probes: read it again"
+    )
+
+
+def test_nothing_is_estimated_anew_where_nothing_is_unexplained(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = plan("few balls", False, folder)
+    monkeypatch.setattr(refits, "estimate", None)
+    change = np.zeros(given.design.probes.offsets.shape)
+    for size in (0.0, 5e-6):
+        change[1, 2] = size
+        design, x = drawn(given.design, change, 6)
+        at = linearised_fit(design, estimate(design, x))
+        found = diagnosis_with_refits(at, x, at.degrees_of_freedom, True)
+        assert len(found.suspects) == (size > 0.0) and not found.refit
+
+
+@pytest.fixture(scope="module")
+def other_machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[bp.Experiment, object]:
+    """A file that states MB2, and readings of a machine that is MB1."""
+    given = experiment(tmp_path_factory.mktemp("machine"), DESIGNS["few balls"])
+    return given, bp.simulate(given.with_({"error_model.arrangement": "MB1", "seed": 2}))
+
+
+def test_fit_names_another_arrangement(other_machine: tuple[bp.Experiment, object]) -> None:
+    found = bp.fit(*other_machine)
+    (words,) = diagnosis_words(found.diagnosis)
+    assert found.too_large and "the arrangement of the axes is MB1" in words
+    right = bp.fit(other_machine[0].with_({"error_model.arrangement": "MB1"}), other_machine[1])
+    assert found.diagnosis.refit is not None
+    assert found.diagnosis.refit.times == pytest.approx(right.sigma, rel=1e-6)
+    (data,) = found.to_dict()["suspected"]
+    assert data["kind"] == "arrangement" and data["name"] == "the arrangement of the axes is MB1"
+    assert any("see what is suspected" in one for one in found.cautions)
+
+
+def test_ladder_names_another_arrangement_before_richer_models(
+    other_machine: tuple[bp.Experiment, object],
+) -> None:
+    observed = bp.fit(*other_machine).observed
+    found = compared_models(other_machine[0], observed, most=4)
+    assert found.is_none and found.to_dict()["recommended"] is None
+    assert "the arrangement of the axes is MB1" in found.verdict()[0]
+    assert "pitch" not in " ".join(found.lines())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("is_uncertain", [False, True], ids=["exact", "uncertain"])
+@pytest.mark.parametrize("name", DESIGNS)
+def test_rates_of_naming_one_wrong_offset(
+    name: str, is_uncertain: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = rates(name, is_uncertain, tmp_path)
+    with capsys.disabled():
+        print("", name, *found.lines(), *found.failures, sep="\n")
+    assert found.every["wrong"] <= 0.02 * found.every.total()
+    assert found.large["right"] >= 0.9 * found.large.total() > 0.0
+
+
+@pytest.mark.long
+def test_rates_of_naming_the_arrangement(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Readings of each arrangement with the quickstart's design, fitted as each other one."""
+    given = experiment(tmp_path, DESIGNS["quickstart"])
+    every, wrong, right = 0, 0, 0
+    for number, true in enumerate(ARRANGEMENTS):
+        readings = bp.simulate(given.with_({"error_model.arrangement": true, "seed": number + 1}))
+        for stated in ARRANGEMENTS:
+            if ARRANGEMENTS[stated] == ARRANGEMENTS[true]:
+                continue
+            file = given.with_({"error_model.arrangement": stated})
+            refit = bp.fit(file, readings).diagnosis.refit
+            named = " ".join(refit.causes) if refit else ""
+            every, right = every + 1, right + (true in named)
+            wrong += bool(named) and true not in named
+    with capsys.disabled():
+        for words, count in (("the right arrangement", right), ("another one only", wrong)):
+            lower, upper = limits(count, every)
+            print(
+                f"\n{words}: {count} of {every}, {100 * count / every:.1f} % (95 %:"
+                f" {100 * lower:.1f} to {100 * upper:.1f} %)"
+            )
+    assert wrong <= 0.02 * every and right >= 0.9 * every

@@ -1,0 +1,423 @@
+"""What `check` says of bars and gauges that leave scales or squareness open."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from ballplate.extensions.repair.missing_bars import _told
+from ballplate.rank.verdict import Verdict
+from ballplate.results.study import check, predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+
+FOLDER = Path("designs/hurt_foss")
+NO_LENGTH = (
+    "no length is known (bar: length): the overall scale of the machine is undetermined until"
+    " one is calibrated"
+)
+SHIPPED = {
+    ("bar-bell", "length known"): (),
+    ("bar-bell", "length unknown"): (NO_LENGTH,),
+    ("bar-bell", "flat"): (
+        (
+            "every bar lies parallel to the xy plane: nothing determines the scale of Z nor its"
+            " squareness to X and Y; add for example a bar along z, one in the xz plane at 45 deg"
+            " and one in the yz plane at 45 deg"
+        ),
+    ),
+    ("bar-bell", "one axis"): (
+        (
+            "every bar lies along x: nothing determines the scales of Y and Z nor the squareness"
+            " of Y to X, Z to X and Z to Y; add for example a bar along y, one along z, one in"
+            " the xy plane at 45 deg, one in the xz plane at 45 deg and one in the yz plane at"
+            " 45 deg"
+        ),
+    ),
+    ("bar-bell", "axes only"): (
+        (
+            "the bars' directions are too few or too similar: nothing determines the squareness"
+            " of Y to X, Z to X and Z to Y; add for example a bar in the xy plane at 45 deg, one"
+            " in the xz plane at 45 deg and one in the yz plane at 45 deg"
+        ),
+    ),
+    ("bryan-gauge", "radius known"): (),
+    ("bryan-gauge", "radius unknown"): (NO_LENGTH.replace("bar: length", "gauge: radius"),),
+    ("bryan-gauge", "two pivots"): (),
+    ("bryan-gauge", "one height"): (
+        (
+            "every place of the ball lies in a plane parallel to the xy plane: nothing"
+            " determines the scale of Z nor its squareness to X and Y nor a combination of the"
+            " scale of X and the scale of Y; read the ball for example all round at elevations"
+            " of 60 and 45 deg as well"
+        ),
+    ),
+    ("bryan-gauge", "one plane"): (
+        (
+            "every place of the ball lies in a plane parallel to the xz plane: nothing"
+            " determines the scale of Y nor its squareness to X and Z; read the ball for example"
+            " all round at elevations of 60 and 30 deg as well"
+        ),
+    ),
+}
+
+
+def test_all_shipped_designs_are_told_of() -> None:
+    files = sorted(FOLDER.glob("*.yaml"))
+    assert {(path.stem, one.name) for path in files for one in load(path)} == set(SHIPPED)
+
+
+@pytest.mark.parametrize(("file", "variant"), SHIPPED)
+def test_shipped_designs(file: str, variant: str) -> None:
+    experiment = {one.name: one for one in load(FOLDER / f"{file}.yaml")}[variant]
+    verdict = check(experiment).verdict
+    assert verdict.reasons == SHIPPED[file, variant]
+    assert experiment.expected_rank_deficiency == verdict.deficiency
+
+
+def with_bars(
+    tmp_path: Path, directions: list[tuple[float, float]], **sections: object
+) -> Experiment:
+    """The shipped machine with bars at azimuths and elevations in degrees."""
+    content = yaml.safe_load((FOLDER / "bar-bell.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    content["machine"]["volume"] = {axis: ["-1 m", "1 m"] for axis in "xyz"}
+    content["positions"] = [
+        {
+            "name": str(k),
+            "pose": {
+                "origin": ["0 m", "0 m", "0 m"],
+                "rotation": ["0 deg", f"{-up} deg", f"{round_} deg"],
+            },
+        }
+        for k, (round_, up) in enumerate(directions)
+    ]
+    path = tmp_path / "bars.yaml"
+    path.write_text(yaml.safe_dump(content | sections), encoding="utf-8")
+    (experiment,) = load(path)
+    return experiment
+
+
+def reason(tmp_path: Path, directions: list[tuple[float, float]], **sections: object) -> str:
+    verdict = check(with_bars(tmp_path, directions, **sections)).verdict
+    assert verdict.deficiency and len(verdict.reasons) == 1
+    return verdict.reasons[0]
+
+
+def test_bars_on_a_cone(tmp_path: Path) -> None:
+    """At the same angle to an axis: then the squares of direction cosines are not independent."""
+    told = reason(tmp_path, [(20.0 * k, 30.0) for k in range(12)])
+    assert (
+        told
+        == "every bar is at 60 deg to z: nothing determines a combination of the scale of X, the scale"
+        " of Y and the scale of Z; add for example a bar along x"
+    )
+
+
+def test_bars_in_two_planes(tmp_path: Path) -> None:
+    told = reason(
+        tmp_path, [(90.0 * side, up) for side in (0, 1) for up in (0, 30, 60, 90, 120, 150)]
+    )
+    assert told in {
+        f"every bar lies parallel to the {one} plane or the {other} plane: nothing determines the"
+        " squareness of Y to X; add for example a bar in the xy plane at 45 deg"
+        for one, other in (("xz", "yz"), ("yz", "xz"))
+    }
+
+
+def test_a_gauge_in_two_planes(tmp_path: Path) -> None:
+    """Four azimuths are as two planes: the squareness of X and Y is never asked for."""
+    content = yaml.safe_load((FOLDER / "bryan-gauge.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    content["artefacts"]["gauge"]["directions"]["azimuths"] = 4
+    (tmp_path / "gauge.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    (told,) = check(load(tmp_path / "gauge.yaml")[0]).verdict.reasons
+    assert told.startswith("every direction of the bar lies parallel to the ")
+    assert (
+        ": nothing determines the squareness of Y to X; read the ball for example all round at an"
+        " elevation of" in told
+    )
+
+
+def test_bars_in_an_oblique_plane(tmp_path: Path) -> None:
+    told = reason(tmp_path, [(45.0, up) for up in (0, 30, 60, 90, 120, 150)])
+    assert told.startswith(
+        "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing"
+        " determines 3 combinations"
+    )
+
+
+def test_a_common_angle_without_a_known_length_leaves_two_open(tmp_path: Path) -> None:
+    verdict = check(
+        with_bars(tmp_path, [(20.0 * k, 30.0) for k in range(12)], calibration=[])
+    ).verdict
+    assert verdict.deficiency == 2 and verdict.reasons[0] == NO_LENGTH
+    assert verdict.reasons[1].startswith("every bar is at 60 deg to z")
+
+
+def test_other_models_are_told_the_same(tmp_path: Path) -> None:
+    """Of the many errors that bars in a plane leave to a kinematic machine, the reason for scales
+    and squareness.
+    """
+    directions = [(30.0 * k, 0.0) for k in range(6)]
+    model = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}
+    told = reason(tmp_path, directions, error_model=model, true_machine={"kind": "zero"})
+    assert told == SHIPPED["bar-bell", "flat"][0]
+
+
+def test_planes_and_axes_are_told_without_a_length_or_without_scales(tmp_path: Path) -> None:
+    upright = check(
+        with_bars(tmp_path, [(0.0, 30.0 * k) for k in range(6)], calibration=[])
+    ).verdict
+    assert upright.deficiency == 4 and upright.reasons[0] == NO_LENGTH
+    assert upright.reasons[1].startswith(
+        "every bar lies parallel to the xz plane: nothing determines the scale of Y nor its"
+        " squareness to X and Z; add for"
+    )
+    squareness = {
+        "error_model": {"kind": "metric", "scale": "none"},
+        "true_machine": {"kind": "zero"},
+    }
+    assert (
+        reason(tmp_path, [(30.0 * k, 0.0) for k in range(6)], **squareness)
+        == "every bar lies parallel to the xy plane: nothing determines the squareness of Z to X and Z"
+        " to Y; add for example a bar in the xz plane at 45 deg and one in the yz plane at"
+        " 45 deg"
+    )
+
+
+def test_a_combination_is_told_of_those_that_no_bar_tells_apart(tmp_path: Path) -> None:
+    """From bars at 45 deg in the xz plane the sum of two scales follows, and not their difference;
+    all else that a bar along y takes part in is open by itself.
+    """
+    told = reason(tmp_path, [(0.0, 45.0), (0.0, 135.0)])
+    assert (
+        "nothing determines the scale of Y nor its squareness to X and Z nor a combination of the"
+        " scale of X and the scale of Z;" in told
+    )
+
+
+@pytest.mark.parametrize("seed", [None, *range(5)])
+def test_any_basis_of_what_is_open_is_told_alike(seed: int | None) -> None:
+    """One in which each strain has its own scales and squareness, and mixtures of these."""
+    # Coefficients of u_x^2, u_x u_y, u_x u_z, u_y^2, u_y u_z and u_z^2.
+    strains = np.zeros((6, 3))
+    strains[[0, 5], 0] = np.sqrt(0.5), -np.sqrt(0.5)
+    strains[3, 1] = strains[1, 2] = 1.0
+    if seed is not None:
+        generator = np.random.default_rng(seed)
+        strains = strains @ np.linalg.qr(generator.standard_normal((3, 3)))[0]
+    assert _told(strains, 3, False) == (
+        "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale"
+        " of Z"
+    )
+
+
+def gauges(tmp_path: Path, few: int, many: int) -> str:
+    """The reason of two gauges on pivots of their own, read in few and in many places at one
+    height.
+    """
+    content = yaml.safe_load((FOLDER / "bryan-gauge.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    places = {
+        name: [[f"{k * 360 // count} deg", "30 deg"] for k in range(count)]
+        for name, count in (("few", few), ("many", many))
+    }
+    content["artefacts"] = {
+        name: {"kind": "bryan_gauge", "radius": "300 mm", "directions": own}
+        for name, own in places.items()
+    }
+    content["positions"] = [
+        {"name": name, "artefact": name, "pose": {"origin": ["500 mm", "400 mm", "100 mm"]}}
+        for name in places
+    ]
+    content["calibration"] = [
+        {"kind": "radius", "artefact": name, "standard_uncertainty": "0.5 um"} for name in places
+    ]
+    (tmp_path / "gauges.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    (told,) = check(load(tmp_path / "gauges.yaml")[0]).verdict.reasons
+    return told
+
+
+@pytest.mark.parametrize(("few", "many"), [(3, 3), (3, 4), (4, 3), (2, 9), (5, 5)])
+def test_any_three_places_lie_in_a_plane_and_more_do_not(
+    tmp_path: Path, few: int, many: int
+) -> None:
+    told = gauges(tmp_path, few, many)
+    assert told.startswith(
+        "the places of the ball are too few or too similar"
+        if max(few, many) == 3
+        else "every place of the ball lies in a plane parallel to the xy plane"
+    )
+
+
+# Azimuths and elevations of the bars that are proposed.
+BARS = {"along x": (0.0, 0.0), "along y": (90.0, 0.0), "along z": (0.0, 90.0)}
+BARS |= {f"in the xy plane at {sign}45 deg": (float(f"{sign}45"), 0.0) for sign in ("", "-")}
+BARS |= {f"in the xz plane at {sign}45 deg": (0.0, float(f"{sign}45")) for sign in ("", "-")}
+BARS |= {f"in the yz plane at {sign}45 deg": (90.0, float(f"{sign}45")) for sign in ("", "-")}
+ROUND = [(30.0 * k, 0.0) for k in range(6)]
+UPRIGHT = [(0.0, 30.0 * k) for k in range(6)]
+
+
+@pytest.mark.parametrize("calibration", ["given", "none"])
+@pytest.mark.parametrize(
+    "given",
+    [
+        ROUND,
+        UPRIGHT,
+        [(0.0, 0.0)],
+        ROUND[:2],
+        [(20.0 * k, 30.0) for k in range(12)],
+        [(45.0, 30.0 * k) for k in range(6)],
+    ],
+)
+def test_the_bars_that_are_proposed_cure(
+    tmp_path: Path, given: list[tuple[float, float]], calibration: str
+) -> None:
+    sections: dict[str, object] = {"calibration": []} if calibration == "none" else {}
+    before = check(with_bars(tmp_path, given, **sections)).verdict
+    left = 0 if calibration == "given" else 1
+    proposed = (
+        before.reasons[-1]
+        .split("; add for example a bar ")[1]
+        .replace(" and one ", ", one ")
+        .split(", one ")
+    )
+    assert len(proposed) == before.deficiency - left
+    after = check(with_bars(tmp_path, given + [BARS[one] for one in proposed], **sections)).verdict
+    assert after.deficiency == left and not any(
+        "nothing determines" in one for one in after.reasons
+    )
+    # None of them is too many.
+    for k in range(len(proposed)):
+        fewer = [BARS[one] for one in proposed[:k] + proposed[k + 1 :]]
+        assert check(with_bars(tmp_path, given + fewer, **sections)).verdict.deficiency == left + 1
+
+
+@pytest.mark.parametrize("tilt", [2.5, 3.0, 3.5, 4.5, 6.0])
+def test_the_bars_that_are_proposed_cure_what_others_hardly_tell(
+    tmp_path: Path, tilt: float
+) -> None:
+    """Of the scale of Z bars that are hardly tilted tell the square of the tilt, which is no
+    deficiency of the rank: it takes one bar, and not any.
+    """
+    given = [(30.0 * k, tilt * (k % 2)) for k in range(12)]
+    before = check(with_bars(tmp_path, given)).verdict
+    assert before.deficiency == 0 and len(before.weak) == 1
+    (told,) = before.reasons
+    assert "nothing determines the scale of Z; add for example a bar along z" in told
+    for one, cures in (("along z", True), ("along x", False)):
+        after = check(with_bars(tmp_path, [*given, BARS[one]])).verdict
+        assert (after.reasons == () and after.weak == ()) == cures
+
+
+@pytest.mark.parametrize("calibrated", [True, False])
+@pytest.mark.parametrize(
+    "given",
+    [
+        "one height",
+        "two heights",
+        "one plane",
+        "half a plane and upright",
+        "height and upright",
+        "three places",
+    ],
+)
+def test_the_places_that_are_proposed_cure(tmp_path: Path, given: str, calibrated: bool) -> None:
+    around = [30 * k for k in range(12)]
+    places = {
+        "one height": [(a, 30) for a in around],
+        "two heights": [(a, up) for a in around for up in (30, 60)],
+        "one plane": [(a, up) for a in (0, 180) for up in (10, 40, 70)],
+        "half a plane and upright": [*((0, up) for up in (0, 20, 40, 60)), (0, 90)],
+        "height and upright": [*((a, 30) for a in around), (0, 90)],
+        "three places": [(0, 10), (90, 30), (200, 60)],
+    }[given]
+    content = yaml.safe_load((FOLDER / "bryan-gauge.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    if not calibrated:
+        content["calibration"] = []
+
+    def verdict_of(places: list[tuple[int, int]]) -> Verdict:
+        content["artefacts"]["gauge"]["directions"] = [
+            [f"{a} deg", f"{up} deg"] for a, up in places
+        ]
+        (tmp_path / "gauge.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+        return check(load(tmp_path / "gauge.yaml")[0]).verdict
+
+    told, _, cure = verdict_of(places).reasons[-1].partition("; read the ball for example ")
+    assert ("too few" in told) == (
+        given in {"two heights", "height and upright", "three places"}
+    ), told
+    more = []
+    for part in cure.removesuffix(" deg as well").split(" and at several"):
+        numbers = [int(number) for number in re.findall("[0-9]+", part)]
+        ring = "all round" in part
+        more += [
+            (a + 1, up) if ring else (up, a)
+            for up in numbers
+            for a in (around if ring else (16, 46, 74))
+        ]
+    assert more and verdict_of(places + more).deficiency == (not calibrated)
+
+
+def test_nothing_is_said_where_plates_tell_what_bars_do_not(tmp_path: Path) -> None:
+    """A plate with calibrated co-ordinates upright in the volume beside bars in the xy plane."""
+    content = {
+        "artefacts": {
+            "bar": {"kind": "two_spheres", "length": "500 mm", "role": "length_standard"},
+            "plate": {"kind": "grid", "balls": [3, 3], "size": ["400 mm", "400 mm"]},
+        },
+        "positions": [
+            *(
+                {"name": f"bar {k}", "artefact": "bar", "pose": {"origin": 3 * ["0 m"]}}
+                for k in range(2)
+            ),
+            *(
+                {
+                    "name": f"{plane} plane",
+                    "artefact": "plate",
+                    "plane": plane,
+                    "level": "100 mm",
+                    "corner": {axis: "0 mm" for axis in "xyz" if axis != plane},
+                }
+                for plane in "xyz"
+            ),
+        ],
+        "calibration": [
+            {
+                "kind": "distances",
+                "artefact": "bar",
+                "pairs": "all",
+                "standard_uncertainty": "1 um",
+            },
+            {"kind": "coordinates", "artefact": "plate", "standard_uncertainty": "1 um"},
+        ],
+    }
+    verdict = check(with_bars(tmp_path, [], **content)).verdict
+    assert verdict.deficiency == 0 and verdict.reasons == ()
+    # What a plate of unknown shape leaves open is not for want of bars.
+    content["calibration"] = content["calibration"][:1]
+    verdict = check(with_bars(tmp_path, [], **content)).verdict
+    assert verdict.deficiency == 1 and verdict.reasons == ()
+
+
+def test_the_overall_scale_with_an_unknown_length_is_what_the_plan_leaves_open() -> None:
+    unknown = {one.name: one for one in load(FOLDER / "bryan-gauge.yaml")}["radius unknown"]
+    found = predict(unknown)
+    (direction,) = found.verdict.null
+    assert [part.name for part in direction.functions] == ["scale x", "scale y", "scale z"]
+    np.testing.assert_allclose(
+        [part.peak for part in direction.functions], direction.functions[0].peak, rtol=1e-9
+    )
+    (radius,) = direction.lengths
+    assert radius.name == "gauge: radius"
+    assert radius.change / 0.3 == pytest.approx(direction.functions[0].peak, rel=1e-9)
+    assert (
+        found.quantities["U3 ratios"].undetermined == 3
+        and found.quantities["U3 angles"].undetermined == 0
+    )
