@@ -26,7 +26,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.formatting import aligned, as_data, number, picked
+from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import FitResult
 from ..rank.verdict import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
@@ -114,25 +114,22 @@ class LengthFit(FitResult):
         )
         return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in self.lengths]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """Solved length equations as plain data in metres and radians; what is open is None."""
         found = self.solution
-        data: dict[str, Any] = as_data(
-            {
-                "experiment": self.label,
-                "title": self.title,
-                **picked(found, "estimator", "equations", "degrees_of_freedom"),
-                "status": _status(self),
-                "rank_deficiency": found.deficiency,
-                "factors": dict(zip(FACTORS, self.factors, strict=True)),
-                "adjustments": adjustment_data(self.adjustments),
-                "pivots": dict(self.pivots),
-                "spheres": dict(self.spheres),
-                "lengths": dict(self.lengths),
-                **self.said(),
-            }
-        )
-        return data
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            **picked(found, "estimator", "equations", "degrees_of_freedom"),
+            "status": _status(self),
+            "rank_deficiency": found.deficiency,
+            "factors": dict(zip(FACTORS, self.factors, strict=True)),
+            "adjustments": adjustment_data(self.adjustments),
+            "pivots": dict(self.pivots),
+            "spheres": dict(self.spheres),
+            "lengths": dict(self.lengths),
+            **self.said(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each adjustment of the machine."""

@@ -172,7 +172,7 @@ class ReversalFit(FitResult):
         lines += aligned(rows, [False, True, True, True, True, False])
         return [*lines, "", *_ball_lines(self)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The reversal as plain data in metres and radians; `multiple_redundancy` has the full
         fit.
         """

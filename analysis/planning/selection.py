@@ -144,7 +144,7 @@ class Campaign(Selection, Result):
             lines += ["", *_order_table(self)]
         return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The campaign as data for JSON, in metres and seconds."""
         return {
             "experiment": self.prediction.label,

@@ -11,6 +11,7 @@ from ballplate.simulator.inputs.settings import number_of
 
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
+from .formatting import as_data
 from .table import Block, Entry, Row, Table
 
 if TYPE_CHECKING:
@@ -43,11 +44,15 @@ class Result:
         """The result as lines of text, as the command prints it."""
         raise NotImplementedError
 
+    def data(self) -> dict[str, Any]:
+        """The content of `to_dict`, of any objects; what is undetermined may be NaN."""
+        raise NotImplementedError
+
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, as the command's --json prints it; what is undetermined is
         None.
         """
-        raise NotImplementedError
+        return dict(as_data(self.data()))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -23,6 +23,7 @@ from ballplate.simulator.inputs.arguments import ensure_type
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
+from ..presentation.columns import Columns
 from ..uncertainty.quantities import task_distances
 
 ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]
@@ -272,18 +273,13 @@ def parameter_estimates(
     )
 
 
-def estimate_rows(estimates: Sequence[ParameterEstimate]) -> list[dict[str, Any]]:
-    """One row of a table for each estimate."""
-    return [
-        {
-            "parameter": one.name,
-            "kind": one.kind,
-            "value": one.value,
-            "standard uncertainty": one.standard_uncertainty,
-            "unit": one.unit,
-        }
-        for one in estimates
-    ]
+ESTIMATE_COLUMNS: Columns = {
+    "parameter": "name",
+    "kind": "kind",
+    "value": ("value", "standard_uncertainty"),
+    "standard uncertainty": ("standard_uncertainty", 3),
+    "unit": "unit",
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

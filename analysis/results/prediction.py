@@ -13,7 +13,8 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.formatting import picked
+from ..presentation.columns import table_rows
+from ..presentation.formatting import given
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
@@ -21,6 +22,7 @@ from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .parts import (
+    QUANTITY_COLUMNS,
     map_lines,
     quantities_data,
     quantity_data,
@@ -104,20 +106,18 @@ class Prediction(Result):
         lines += ["", *influence_table(self.influences)] if self.influences else []
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found = {
             "experiment": self.label,
             "title": self.title,
             **verdict_data(self.verdict),
             "sigma": 1.0,
             "quantities": quantities_data(self.quantities),
-            **(
-                {}
-                if self.quantities or self.lengths is None
-                else {"lengths": quantity_data(self.lengths)}
+            **given(
+                lengths=None if self.quantities else self.lengths and quantity_data(self.lengths),
+                tasks=task_data(self.tasks),
+                influences=influence_data(self.influences),
             ),
-            **({"tasks": task_data(self.tasks)} if self.tasks else {}),
-            **({"influences": influence_data(self.influences)} if self.influences else {}),
             "scale": scale_data(self.scale),
             **({} if self.advice is None else self.advice.data),
         }
@@ -155,10 +155,8 @@ class Prediction(Result):
         U6.
         """
         if self.quantities:
-            return [
-                {"symbol": symbol, **quantity_row(quantity)}
-                for symbol, quantity in self.quantities.items()
-            ]
+            columns = {"symbol": list(self.quantities), **QUANTITY_COLUMNS}
+            return table_rows(columns, list(self.quantities.values()))
         judged, lengths = self.verdict, self.lengths
         return [
             {
@@ -178,15 +176,6 @@ class Prediction(Result):
 def rank_words(judged: Verdict) -> str:
     """The rank in two words."""
     return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
-
-
-def quantity_row(quantity: Quantity) -> dict[str, Any]:
-    """A quantity as the row of a table, in its own unit."""
-    return {
-        "standard uncertainty of": quantity.description,
-        **picked(quantity, "maximum", "average", "unit", "count", "undetermined"),
-        "largest at": quantity.largest,
-    }
 
 
 def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:

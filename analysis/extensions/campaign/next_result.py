@@ -166,7 +166,7 @@ class NextStep(Result):
         doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
         return (*self.observed.told, *doubts)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         fit = self.fit
         lengths = None if fit is None else fit.quantities.get("U6")
         times = 1.0 if fit is None else self.sigma / fit.sigma

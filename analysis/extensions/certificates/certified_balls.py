@@ -165,7 +165,7 @@ class CertifiedBalls(Result):
         lengths = aligned(self.distance_table(), [False, False, True, True])
         return [*facts, "", *table, "", *lengths, "", *self.notes]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         u = self.standard_uncertainties.tolist()
         axes = "xyz"[: self.dimension]
         return {

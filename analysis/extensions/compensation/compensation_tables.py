@@ -89,7 +89,7 @@ class CompensationTable(Result):
             for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True)
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found: dict[str, Any] = {
             "title": self.title,
             "format": self.format.name,
@@ -194,9 +194,9 @@ class MadeCompensation(CompensationTable):
             NOT_LOADED,
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         made = self.made
-        return super().to_dict() | {
+        return super().data() | {
             **({"fit": self.verdict} if self.verdict else {}),
             "zero_at": made.zero.tolist(),
             "largest_differences": {

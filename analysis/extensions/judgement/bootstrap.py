@@ -179,7 +179,7 @@ class Bootstrap(Result):
         count = len(differing)
         return [*lines, f"{count} standard deviations are not {told}: {names}"]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             "trials": self.trials,
             "seed": self.seed,

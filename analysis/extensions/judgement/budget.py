@@ -111,7 +111,7 @@ class UncertaintyBudget(Result):
             )
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
             "title": self.title,

@@ -143,7 +143,7 @@ class VarianceComponents(Result):
             for one in self.groups
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         groups = self.rows()
         for row in groups:
             row |= {name: finite(one) for name, one in row.items() if isinstance(one, float)}

@@ -229,7 +229,7 @@ class Ladder(FitResult):
             f"{told}; lack of fit of {self.recommended}: chance {chance_words(self.lack_of_fit)}"
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
             "title": self.title,

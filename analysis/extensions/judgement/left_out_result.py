@@ -137,7 +137,7 @@ class Validation(FitResult):
             ),
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
             "title": self.title,

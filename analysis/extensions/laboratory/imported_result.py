@@ -43,7 +43,7 @@ class ReadReport(Result):
         columns = self.imported.columns()
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
             "coordinates": self.imported.coordinates,

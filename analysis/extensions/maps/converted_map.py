@@ -149,7 +149,7 @@ class ConvertedMap(Result):
             rows.append([row["parameter"], to_uncertainty(value, u), number(u, 3), unit])
         return [*lines, "", *aligned(rows, [False, True, True, False])]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found: dict[str, Any] = as_data(
             {
                 "map": self.label,

@@ -277,7 +277,7 @@ class Correction(Result):
         for name, row in zip(names, _cells(1e12 * self.covariance()), strict=True):
             yield [name, *row]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         fitted, u = self.fitted, self.standard_uncertainties
         return {
             **picked(fitted, "title", "sigma", "sigma_is_estimated", "degrees_of_freedom"),

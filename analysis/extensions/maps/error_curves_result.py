@@ -72,7 +72,7 @@ class ErrorCurves(Result):
             lines += ["", *_number_table(found.numbers, self.k)]
         return lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found = map_data(self.label, self.fitted)
         found["functions"] = [
             {

@@ -121,7 +121,7 @@ class FittedErrorMap(Result):
             lines += ["", *budget_lines(self.budget, fitted.coverage_factor)]
         return lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         fitted, k = self.fitted, self.fitted.coverage_factor
         found = map_data(self.label, fitted, self.probe)
         found["lengths"] = [

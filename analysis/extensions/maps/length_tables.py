@@ -112,7 +112,7 @@ class LengthMap(GroupedLengths, Result):
             ),
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The same as plain data in metres; what is undetermined is None."""
         settings, edges = self.settings, self.edges.tolist()
         classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]

@@ -131,7 +131,7 @@ class ErrorsAtPoints(MachineErrors):
         points = error_lines(self.errors)
         return [*machine_lines(self.machine), "", *diagonals, "", *points, *self.more_lines()]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             **machine_data(self.machine),
             "diagonals": diagonal_data(self.lengths),
@@ -185,7 +185,7 @@ class ErrorsOnLine(ErrorsAtPoints):
     def lines(self) -> list[str]:
         return [*error_lines(self.errors), length_line(self.lengths), *self.more_lines()]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             **machine_data(self.machine),
             "length": length_data(self.lengths)[0],
@@ -210,7 +210,7 @@ class ErrorAlongAxis(MachineErrors):
     def lines(self) -> list[str]:
         return along_lines(self.along)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return along_data(self.along)
 
     def rows(self) -> list[dict[str, Any]]:

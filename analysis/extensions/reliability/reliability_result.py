@@ -120,7 +120,7 @@ class Reliability(Result):
         """
         return _lines(self, with_all)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return _data(self)
 
     def rows(self) -> list[dict[str, Any]]:

@@ -86,7 +86,7 @@ class Reach(Result):
             notes += [f"{one.name}: {remark}" for remark in one.remarks]
         return lines + ["", *notes] if notes else lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The same as plain data, values in metres or as numbers."""
         goal = self.goal
         told: dict[str, Any] = {"kind": goal.kind}

@@ -99,7 +99,7 @@ class SweepResult(Result):
         table = self.table[shown].to_string(index=False).splitlines()
         return [f"{self.label}: {self.title}", self.headline(), *self.remarks, "", *table]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         one = self.summary
         counts = {"cells": one.cells, "done": one.done, "failed": one.failed, "left": one.left}
         return {
