@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number
+from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom
 from ballplate.results.fit import Fit
@@ -121,17 +121,15 @@ class UncertaintyBudget(Result):
             "figures": [
                 {
                     "figure": one.name,
-                    "description": one.description,
-                    "standard_uncertainty": finite(one.standard_uncertainty),
-                    "expanded_uncertainty": finite(self.coverage_factor * one.standard_uncertainty),
+                    **picked(one, "description", "standard_uncertainty"),
+                    "expanded_uncertainty": self.coverage_factor * one.standard_uncertainty,
                     "unit": "m",
-                    "count": one.count,
-                    "undetermined": one.undetermined,
+                    **picked(one, "count", "undetermined"),
                     "contributions": [
                         {
                             "source": source,
-                            "standard_uncertainty": finite(one.contributions[k]),
-                            "share_of_variance": finite(_ratio(one, k)),
+                            "standard_uncertainty": one.contributions[k],
+                            "share_of_variance": _ratio(one, k),
                         }
                         for k, source in enumerate(self.sources)
                     ],

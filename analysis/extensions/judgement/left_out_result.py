@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.formatting import aligned, as_data, number, picked
+from ballplate.presentation.columns import table_rows
+from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
@@ -149,23 +150,21 @@ class Validation(FitResult):
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each that was left out."""
-        return [
-            {
-                "kind": one.kind,
-                "left out": one.name,
-                "predicted": one.predicted,
-                "mean square error": one.mean_square,
-                "sigma": one.sigma,
-                "chance": one.chance,
-                "largest standardised error": None if one.worst is None else one.worst.standardised,
-                "length change": None if one.lengths is None else one.lengths.change,
-                "standard uncertainty": (
-                    None if one.lengths is None else one.lengths.standard_uncertainty
-                ),
-                "unit": "m",
-            }
-            for one in self.left_out
-        ]
+        return table_rows(COLUMNS, self.left_out)
+
+
+COLUMNS = {
+    "kind": "kind",
+    "left out": "name",
+    "predicted": "predicted",
+    "mean square error": "mean_square",
+    "sigma": "sigma",
+    "chance": "chance",
+    "largest standardised error": "worst.standardised",
+    "length change": "lengths.change",
+    "standard uncertainty": "lengths.standard_uncertainty",
+    "unit": lambda one: "m",
+}
 
 
 def _cells(one: PredictedGroup, k: float) -> list[str]:
@@ -188,18 +187,10 @@ def _cells(one: PredictedGroup, k: float) -> list[str]:
 
 
 def _data(one: PredictedGroup) -> dict[str, Any]:
-    found: dict[str, Any] = as_data(
-        {
-            **picked(one, "kind", "name", "converged", "predicted"),
-            "mean_square_error": one.mean_square,
-            "sigma": one.sigma,
-            "chance": one.chance,
-            "worst_reading": None if one.worst is None else vars(one.worst),
-            "largest_length_difference": (
-                None
-                if one.lengths is None
-                else {**vars(one.lengths), "between": list(one.lengths.between), "unit": "m"}
-            ),
-        }
-    )
-    return found
+    return {
+        **picked(one, "kind", "name", "converged", "predicted"),
+        "mean_square_error": one.mean_square,
+        **picked(one, "sigma", "chance"),
+        "worst_reading": one.worst and vars(one.worst),
+        "largest_length_difference": one.lengths and {**vars(one.lengths), "unit": "m"},
+    }

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN, aligned, as_data, ascii_units, number
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import SHOWN, aligned, ascii_units, number, picked
 from ballplate.presentation.result import Result
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
@@ -23,7 +24,7 @@ from .error_functions import (
     error_functions,
 )
 from .fitted_errors_result import map_cautions
-from .fitted_tables import UNDETERMINED, head_lines, map_data, with_uncertainty
+from .fitted_tables import UNDETERMINED, expanded, head_lines, map_data
 from .function_plots import draw_functions
 
 if TYPE_CHECKING:
@@ -77,8 +78,7 @@ class ErrorCurves(Result):
         found["functions"] = [
             {
                 "error": one.name,
-                "meaning": one.meaning,
-                "unit": one.unit,
+                **picked(one, "meaning", "unit"),
                 "line": one.line or None,
                 "axis": None if one.axis is None else AXIS_NAMES[one.axis],
                 "position": one.positions,
@@ -87,22 +87,17 @@ class ErrorCurves(Result):
             }
             for one in self.functions.curves
         ]
-        for key, numbers in (
-            ("squareness", self.functions.squareness),
-            ("numbers", self.functions.numbers),
-        ):
+        for key in ("squareness", "numbers"):
             found[key] = [
                 {
                     "error": one.name,
-                    "meaning": one.meaning,
-                    "unit": one.unit,
-                    "value": one.value,
+                    **picked(one, "meaning", "unit", "value"),
                     "expanded_uncertainty": self.k * one.standard_uncertainty,
                     "source": one.source,
                 }
-                for one in numbers
+                for one in getattr(self.functions, key)
             ]
-        return dict(as_data(found)) | {"warnings": list(map_cautions(self.fitted))}
+        return found | {"warnings": map_cautions(self.fitted)}
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each position of each curve, then one for each number; in metres, radians and
@@ -207,18 +202,24 @@ def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
 
 def _angle_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
     """Squareness errors as angles in two units."""
-    rows = [["squareness", "", "µrad", "U", "arcsec", "U", ""]]
-    for one in numbers:
-        angle = with_uncertainty(one.value, one.standard_uncertainty, k)
-        in_arcsec = 1e-6 / ARCSECOND
-        other = with_uncertainty(in_arcsec * one.value, in_arcsec * one.standard_uncertainty, k)
-        rows.append([one.name, one.meaning, *angle, *other, one.source])
-    return aligned(rows, [False, False, True, True, True, True, False])
+    columns = [
+        ("squareness", "name"),
+        ("", "meaning"),
+        ("µrad", ("value", "standard_uncertainty")),
+        ("U", (lambda one: k * one.standard_uncertainty, expanded)),
+        ("arcsec", ("value", "standard_uncertainty")),
+        ("U", (lambda one: k * one.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
+        ("", "source"),
+    ]
+    return table_lines(columns, numbers, unknown=UNDETERMINED)
 
 
 def _number_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
-    rows = [["error", "", "value", "U", "unit"]]
-    for one in numbers:
-        cells = with_uncertainty(one.value, one.standard_uncertainty, k)
-        rows.append([one.name, one.meaning, *cells, SHOWN[one.unit]])
-    return aligned(rows, [False, False, True, True, False])
+    columns = {
+        "error": "name",
+        "": "meaning",
+        "value": ("value", "standard_uncertainty"),
+        "U": (lambda one: k * one.standard_uncertainty, expanded),
+        "unit": "unit",
+    }
+    return table_lines(columns, numbers, unknown=UNDETERMINED)

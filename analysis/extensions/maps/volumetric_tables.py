@@ -8,6 +8,7 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
@@ -148,32 +149,15 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
 
 def diagonal_lines(errors: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
-    is_random = bool(errors.deviation.any())
-    rows = [
-        [
-            "body diagonal",
-            "from",
-            "to",
-            "length, mm",
-            "error, µm",
-            *(["random, µm"] if is_random else []),
-        ]
-    ]
-    for k in range(len(errors.error)):
-        ends = [
-            f"({', '.join(_millimetres(v) for v in point)})"
-            for point in (errors.starts[k], errors.ends[k])
-        ]
-        told = [float(errors.error[k]), *([float(errors.deviation[k])] if is_random else [])]
-        rows.append(
-            [
-                str(k + 1),
-                *ends,
-                f"{1e3 * errors.nominal[k]:.3f}",
-                *(number(1e6 * value) for value in told),
-            ]
-        )
-    return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
+    columns = {
+        "body diagonal": range(1, len(errors.error) + 1),
+        "from": list(map(_point, errors.starts)),
+        "to": list(map(_point, errors.ends)),
+        "length, mm": (errors.nominal, lambda value: f"{1e3 * value:.3f}"),
+        "error, µm": errors.error,
+        "random, µm": errors.deviation,
+    }
+    return table_lines(columns, without="" if errors.deviation.any() else "random, µm")
 
 
 def length_line(errors: LengthErrors) -> str:
@@ -233,14 +217,10 @@ def along_lines(along: AlongAxis) -> list[str]:
         else np.flatnonzero(np.isin(positions, along.measured.positions))
     )
     axis = AXES[along.error.axis]
-    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name in given)]]
-    for k in keep:
-        rows.append(
-            [
-                _millimetres(float(positions[k])),
-                *(fixed(1e6 * values[k], 3) for values in given.values()),
-            ]
-        )
+    columns = {
+        f"{axis}, mm": (positions[keep], _millimetres),
+        **{f"{name}, {unit}": (one[keep], _three_decimals) for name, one in given.items()},
+    }
     head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
     band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
     told = (
@@ -248,7 +228,11 @@ def along_lines(along: AlongAxis) -> list[str]:
         if along.values is None
         else [f"stated as {_stated_as(along)}; {_line_stated(along)}".rstrip("; ")]
     )
-    return [head + band, *told, *aligned(rows, [True] * len(rows[0]))]
+    return [head + band, *told, *table_lines(columns)]
+
+
+def _three_decimals(value: float) -> str:
+    return fixed(1e6 * value, 3)
 
 
 def _line_stated(along: AlongAxis) -> str:
@@ -383,3 +367,7 @@ def along_data(along: AlongAxis) -> dict[str, Any]:
 
 def _millimetres(value: float) -> str:
     return f"{1e3 * value + 0.0:.10g}"
+
+
+def _point(point: Array) -> str:
+    return f"({', '.join(map(_millimetres, point))})"
