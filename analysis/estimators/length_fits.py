@@ -26,7 +26,8 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.formatting import aligned, number, picked
+from ..presentation.columns import table_lines, table_rows
+from ..presentation.formatting import picked
 from ..presentation.result import FitResult
 from ..rank.verdict import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
@@ -96,11 +97,11 @@ class LengthFit(FitResult):
             f"{_status(self)} after {found.iterations} iterations",
             "",
         ]
-        rows = [
-            ["factor of the metric", *FACTORS],
-            ["1e-6", *(number(1e6 * value) for value in self.factors)],
-        ]
-        lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(self.adjustments)]
+        columns = {
+            "factor of the metric": ["1e-6"],
+            **{name: [1e6 * value] for name, value in zip(FACTORS, self.factors, strict=True)},
+        }
+        lines += [*table_lines(columns), "", *adjustment_lines(self.adjustments)]
         where = [
             f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm"
             for name, centre in self.pivots
@@ -133,17 +134,15 @@ class LengthFit(FitResult):
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each adjustment of the machine."""
-        return [
-            {
-                "adjustment": one.what,
-                "value": one.value,
-                "standard uncertainty": one.standard_uncertainty,
-                "expanded uncertainty": one.expanded_uncertainty,
-                "unit": one.unit,
-                "to do": one.words,
-            }
-            for one in self.adjustments
-        ]
+        columns = {
+            "adjustment": "what",
+            "value": "value",
+            "standard uncertainty": "standard_uncertainty",
+            "expanded uncertainty": "expanded_uncertainty",
+            "unit": "unit",
+            "to do": "words",
+        }
+        return table_rows(columns, self.adjustments)
 
 
 def has_all_errors(design: Design) -> bool:

@@ -8,7 +8,7 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.formatting import aligned
+from ..presentation.formatting import aligned, picked
 from .constraints import SLACK
 from .schedule import RunSheet, Step
 
@@ -38,13 +38,11 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
             {
                 "name": step.name,
                 "description": step.description or None,
-                "done": step.done,
-                "artefact": step.artefact,
+                **picked(step, "done", "artefact"),
                 "plane": step.plane or None,
                 "set_up": step.place,
                 "probes": list(step.probes),
-                "balls": step.balls,
-                "readings": step.readings,
+                **picked(step, "balls", "readings"),
                 "change": step.change or None,
                 "change_seconds": step.change_seconds if sheet.timed else None,
                 "seconds": step.seconds if sheet.timed else None,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,10 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.formatting import aligned, finite, number
+from ..presentation.columns import table_lines
+from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import Result
-from .choice import CurvePoint, Gain, Selection
+from .choice import Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
 from .done import base_name
@@ -145,37 +147,32 @@ class Campaign(Selection, Result):
         return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
     def data(self) -> dict[str, Any]:
-        """The campaign as data for JSON, in metres and seconds."""
+        """The campaign as data, in metres and seconds."""
         return {
             "experiment": self.prediction.label,
             "candidates": len(self.pool.candidates),
             "dropped": dict(self.pool.dropped),
-            "criterion": self.criterion,
-            "unit": self.unit,
-            "budget": asdict(self.budget),
-            "value": finite(self.value),
-            "bound": finite(self.bound),
-            "drawn": None if self.drawn is None else finite(self.drawn),
-            "drawn_spent": None if self.drawn_spent is None else asdict(self.drawn_spent),
-            "target": self.target,
-            "excluded": self.excluded,
-            "spent": asdict(self.spent),
-            "chosen": [candidate.name for candidate in self.chosen],
+            **picked(self, "criterion", "unit", "budget", "value", "bound", "drawn"),
+            **picked(self, "drawn_spent", "target", "excluded", "spent"),
+            "chosen": _names(self.chosen),
             "names": dict(self.names),
-            "done": [candidate.name for candidate in self.done],
-            "interrupted": [
-                {"name": one.name, "readings": one.readings} for one in self.interrupted
-            ],
-            "completed": None if self.completed is None else self.completed.whole.name,
+            "done": _names(self.done),
+            "interrupted": [picked(one, "name", "readings") for one in self.interrupted],
+            "completed": self.completed and self.completed.whole.name,
             "left_open": self.left_open,
-            "whole_pool": None if self.gap is None else self.gap.to_dict(),
-            "ignored": [candidate.name for candidate in self.ignored],
-            "gains": [_gain_data(gain) for gain in self.gains],
-            "left_out": [_gain_data(gain) for gain in self.left_out],
-            "curve": [_point_data(point) for point in self.curve],
-            "order": asdict(self.order),
-            "drift": asdict(self.drift),
-            "orders": [_order_data(one) for one in self.orders],
+            "whole_pool": self.gap and self.gap.to_dict(),
+            "ignored": _names(self.ignored),
+            "gains": list(map(_gain_data, self.gains)),
+            "left_out": list(map(_gain_data, self.left_out)),
+            "curve": [
+                {
+                    **picked(point, "budget", "spent"),
+                    "chosen": _names(point.chosen),
+                    **picked(point, "value", "bound"),
+                }
+                for point in self.curve
+            ],
+            **picked(self, "order", "drift", "orders"),
             "run_sheet": sheet_data(self.sheet),
             "plan": self.prediction.to_dict(),
         }
@@ -200,39 +197,30 @@ class Campaign(Selection, Result):
 def _order_table(campaign: Campaign) -> list[str]:
     """What a drift does in each order, and which one is chosen."""
     size = campaign.drift
-    rows = [
-        [
-            "order",
-            "hours",
-            "change-over, h",
-            f"{number(1e6 * size.point)} µm/h does",
-            f"{number(1e6 * size.scale)} ppm/h does",
-            "U6, no drift",
-            "drift estimated",
-            "",
-        ]
-    ]
     budget = campaign.budget.seconds
-    for one in campaign.orders:
+
+    def remarks(one: DriftEffect) -> str:
         is_over = budget is not None and one.seconds > budget * (1.0 + 1e-9)
         words = ["chosen"] if one.order == campaign.order.name else []
-        words += ["more hours than allowed"] if is_over else []
-        values = (one.of_point, one.of_scale, one.without, one.estimated)
-        rows.append(
-            [
-                ORDERS[one.order],
-                f"{one.seconds / HOUR:.2f}",
-                f"{one.change_seconds / HOUR:.2f}",
-                *(number(1e6 * value) for value in values),
-                ", ".join(words),
-            ]
-        )
+        return ", ".join(words + (["more hours than allowed"] if is_over else []))
+
+    columns = {
+        "order": lambda one: ORDERS[one.order],
+        "hours": ("seconds", _hours),
+        "change-over, h": ("change_seconds", _hours),
+        f"{number(1e6 * size.point)} µm/h does": ("of_point", _micrometres),
+        f"{number(1e6 * size.scale)} ppm/h does": ("of_scale", _micrometres),
+        "U6, no drift": ("without", _micrometres),
+        "drift estimated": ("estimated", _micrometres),
+        "": remarks,
+    }
+    table = table_lines(columns, campaign.orders)
     places = (step.candidate for step in campaign.sheet.steps)
     if not is_of_plates(campaign.experiment, places):
         why = "no figures of drift: that of length standards is not followed"
-        return [*aligned(rows, [False, *[True] * 6, False]), why]
+        return [*table, why]
     return [
-        *aligned(rows, [False, *[True] * 6, False]),
+        *table,
         "what a drift that nobody knows of changes a distance between corrected points by at"
         " most, and the mean uncertainty of these distances; µm",
         *_chosen_without_drift(campaign),
@@ -305,6 +293,14 @@ def _comparison(campaign: Campaign) -> list[str]:
     return aligned(rows, [False, True, False, True, True, True])
 
 
+def _hours(seconds: float) -> str:
+    return f"{seconds / HOUR:.2f}"
+
+
+def _micrometres(value: float) -> str:
+    return number(1e6 * value)
+
+
 def _value(campaign: Campaign, value: float) -> list[str]:
     if math.isinf(value):
         return ["-", "deficient"]
@@ -312,7 +308,7 @@ def _value(campaign: Campaign, value: float) -> list[str]:
 
 
 def _spent(spent: Spent) -> list[str]:
-    return [f"{spent.seconds / HOUR:.2f}", str(spent.readings), str(spent.positions)]
+    return [_hours(spent.seconds), str(spent.readings), str(spent.positions)]
 
 
 def _gain_table(campaign: Campaign) -> list[str]:
@@ -349,24 +345,11 @@ def _curve_table(campaign: Campaign) -> list[str]:
 def _gain_data(gain: Gain) -> dict[str, Any]:
     return {
         "name": gain.candidate.name,
-        "without": finite(gain.without),
-        "with": finite(gain.with_),
+        "without": gain.without,
+        "with": gain.with_,
         "seconds": gain.candidate.seconds,
     }
 
 
-def _order_data(effect: DriftEffect) -> dict[str, Any]:
-    return {
-        key: finite(value) if isinstance(value, float) else value
-        for key, value in asdict(effect).items()
-    }
-
-
-def _point_data(point: CurvePoint) -> dict[str, Any]:
-    return {
-        "budget": asdict(point.budget),
-        "spent": asdict(point.spent),
-        "chosen": [candidate.name for candidate in point.chosen],
-        "value": finite(point.value),
-        "bound": finite(point.bound),
-    }
+def _names(candidates: Iterable[Any]) -> list[str]:
+    return [candidate.name for candidate in candidates]

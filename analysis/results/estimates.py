@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -23,7 +23,6 @@ from ballplate.simulator.inputs.arguments import ensure_type
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from ..presentation.columns import Columns
 from ..uncertainty.quantities import task_distances
 
 ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]
@@ -273,7 +272,7 @@ def parameter_estimates(
     )
 
 
-ESTIMATE_COLUMNS: Columns = {
+ESTIMATE_COLUMNS: dict[str, Any] = {
     "parameter": "name",
     "kind": "kind",
     "value": ("value", "standard_uncertainty"),

@@ -197,9 +197,8 @@ class Fit(FitResult):
 
     def data(self) -> dict[str, Any]:
         estimates = zip(labels(self.estimates), self.estimates, strict=True)
-        components, curves = self.variance_components, ()
-        if self.converged:
-            curves = [one.to_dict() for one in self.error_functions]
+        components = self.variance_components
+        curves = self.error_functions if self.converged else ()
         return {
             "experiment": self.label,
             "title": self.title,
@@ -222,7 +221,7 @@ class Fit(FitResult):
                 for one in self.largest
             ],
             **given(
-                error_functions=curves,
+                error_functions=[one.to_dict() for one in curves],
                 residuals=self._residual_groups(),
                 suspected=diagnosis_data(self.diagnosis, self.observed.marks),
             ),

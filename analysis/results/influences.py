@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Unit
 
-from ..presentation.columns import Columns, table_lines
+from ..presentation.columns import table_lines
 
 # Lines of a table; displacements of single readings may be thousands.
 MOST_LINES = 30
@@ -39,7 +39,7 @@ def influence_uncertainties(at: Linearisation) -> tuple[InfluenceUncertainty, ..
     )
 
 
-COLUMNS: Columns = {
+COLUMNS: dict[str, Any] = {
     "influence quantity": "name",
     "stated uncertainty": (
         lambda one: one.stated if np.isfinite(one.stated) else "unknown",

@@ -11,7 +11,7 @@ from ballplate.simulator.computing.rounding import printable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.machines.protocol import Array
 
-from ..presentation.columns import Columns, table_lines
+from ..presentation.columns import table_lines
 from ..presentation.formatting import (
     by_name,
     given,
@@ -44,7 +44,7 @@ def _counted(quantity: Quantity) -> str:
     return f"{count} ({quantity.undetermined} undetermined)" if quantity.undetermined else count
 
 
-QUANTITY_COLUMNS: Columns = {
+QUANTITY_COLUMNS: dict[str, Any] = {
     "standard uncertainty of": "description",
     "maximum": "maximum",
     "average": "average",
@@ -314,7 +314,7 @@ def _turned(name: str) -> Callable[[Adjustment], float]:
     return lambda one: float(getattr(one, name) / (ARCSECOND if one.unit == "rad" else 1e-6))
 
 
-ADJUSTMENT_COLUMNS: Columns = {
+ADJUSTMENT_COLUMNS: dict[str, Any] = {
     "adjustment": "what",
     "is off by": _turned("value"),
     "standard uncertainty": _turned("standard_uncertainty"),

@@ -14,7 +14,7 @@ from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.columns import table_rows
-from ..presentation.formatting import given
+from ..presentation.formatting import given, picked
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
@@ -161,8 +161,7 @@ class Prediction(Result):
         return [
             {
                 "rank": rank_words(judged),
-                "parameters": judged.parameters,
-                "observations": judged.observations,
+                **picked(judged, "parameters", "observations"),
                 "rank deficiency": judged.deficiency,
                 "as expected": judged.as_expected,
                 "weakly determined": len(judged.weak),

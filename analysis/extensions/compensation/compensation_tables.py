@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data
+from ballplate.presentation.formatting import aligned, given, picked
 from ballplate.presentation.result import Result
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
@@ -74,8 +74,7 @@ class CompensationTable(Result):
         if isinstance(self.table, VolumeTable):
             places = np.stack(np.meshgrid(*self.table.nodes, indexing="ij"), axis=-1)
             return [
-                dict(zip(AXES, place, strict=False))
-                | {name: value for name, value in zip(_PARTS, values, strict=True)}
+                dict(zip((*AXES[: len(place)], *_PARTS), (*place, *values), strict=True))
                 for place, values in zip(
                     places.reshape(-1, self.table.dimension).tolist(),
                     self.table.values.reshape(-1, 6).tolist(),
@@ -83,8 +82,7 @@ class CompensationTable(Result):
                 )
             ]
         return [
-            {"axis": AXES[one.axis], "position": position}
-            | {name: value for name, value in zip(_PARTS, values, strict=True)}
+            {"axis": AXES[one.axis], "position": position, **dict(zip(_PARTS, values, strict=True))}
             for one in self.table.axes
             for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True)
         ]
@@ -102,7 +100,7 @@ class CompensationTable(Result):
                 "workpiece_side": list(self.table.arrangement.workpiece_side),
                 "levers_from": self.table.origin,
             }
-        return dict(as_data({**found, "corrections": self.rows(), "warnings": list(self.remarks)}))
+        return {**found, "corrections": self.rows(), "warnings": self.remarks}
 
     def table_lines(self) -> list[str]:
         """What the table is and how large its corrections are."""
@@ -197,15 +195,14 @@ class MadeCompensation(CompensationTable):
     def data(self) -> dict[str, Any]:
         made = self.made
         return super().data() | {
-            **({"fit": self.verdict} if self.verdict else {}),
-            "zero_at": made.zero.tolist(),
+            **given(fit=self.verdict),
+            "zero_at": made.zero,
             "largest_differences": {
-                "interpolation": made.interpolation,
-                "rounding": made.rounding,
+                **picked(made, "interpolation", "rounding"),
                 "rotations_left_out": made.left_out,
                 "all": made.written,
                 "places": made.places,
-                "probe_offsets": made.offsets.tolist(),
+                "probe_offsets": made.offsets,
             },
         }
 

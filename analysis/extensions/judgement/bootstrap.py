@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation.columns import table_lines, table_rows
+from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
 from ballplate.results.estimates import EstimatedFunctions, Function, estimated_functions
 from ballplate.simulator.computing.processes import in_processes
@@ -159,8 +160,7 @@ class Bootstrap(Result):
 
     def data(self) -> dict[str, Any]:
         return {
-            "trials": self.trials,
-            "seed": self.seed,
+            **picked(self, "trials", "seed"),
             "not_converged": {str(k): words for k, words in self.failed},
             "differing": self.differing,
             "estimates": self.rows(),

@@ -116,8 +116,7 @@ class UncertaintyBudget(Result):
             "experiment": self.label,
             "title": self.title,
             "of": "fit" if self.of_fit else "design",
-            "sigma": self.sigma,
-            "coverage_factor": self.coverage_factor,
+            **picked(self, "sigma", "coverage_factor"),
             "figures": [
                 {
                     "figure": one.name,

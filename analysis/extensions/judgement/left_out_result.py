@@ -141,8 +141,7 @@ class Validation(FitResult):
     def data(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
-            "title": self.title,
-            "sigma_is_given": self.sigma_is_given,
+            **picked(self, "title", "sigma_is_given"),
             "left_out": [_data(one) for one in self.left_out],
             "failed": [f"{one.kind} {one.name}" for one in self.failed],
             **self.said(),

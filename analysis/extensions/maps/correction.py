@@ -277,8 +277,7 @@ class Correction(Result):
             ),
             "lengths": [
                 {
-                    "name": one.name,
-                    "value": one.value,
+                    **picked(one, "name", "value"),
                     "correction": one.value - one.read,
                     "standard_uncertainty": one.standard_uncertainty,
                     "within_target": one.is_met,

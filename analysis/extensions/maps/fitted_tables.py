@@ -70,7 +70,8 @@ def expanded(uncertainty: float) -> str:
 
 def error_lines(found: FittedErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
     """Errors point by point with their uncertainties, and the largest; points may have names."""
-    u, columns = found.uncertainties, [("point", list(names))] if names else []
+    u, columns = found.uncertainties, list[tuple[str, Any]]()
+    columns += [("point", list(names))] if names else []
     columns += by_axis("{}, mm", found.points, _millimetres).items()
     for k, letter in enumerate("XYZ"[: found.points.shape[1]]):
         columns += [(f"{letter}, µm", (found.errors[:, k], u[:, k]))]

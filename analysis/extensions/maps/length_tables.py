@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.presentation.formatting import (
     aligned,
-    as_data,
     csv_lines,
     number,
     percent,
@@ -116,24 +115,20 @@ class LengthMap(GroupedLengths, Result):
         """The same as plain data in metres; what is undetermined is None."""
         settings, edges = self.settings, self.edges.tolist()
         classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
-        data: dict[str, Any] = as_data(
-            {
-                "experiment": self.label,
-                "title": self.title,
-                "rank_deficiency": self.deficiency,
-                **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
-                "target": picked(settings.target, "constant", "slope"),
-                "target_coverage_factor": settings.target_factor,
-                "all": _group_data([{}], self.whole)[0],
-                "worst": None if self.worst is None else [self.points[k] for k in self.worst],
-                "by_length": _group_data(classes, self.by_length),
-                "by_direction": _group_data(
-                    [{"direction": name} for name in self.directions], self.by_direction
-                ),
-                "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
-            }
-        )
-        return data
+        directions = [{"direction": name} for name in self.directions]
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "rank_deficiency": self.deficiency,
+            **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+            "target": picked(settings.target, "constant", "slope"),
+            "target_coverage_factor": settings.target_factor,
+            "all": _group_data([{}], self.whole)[0],
+            "worst": self.worst and [self.points[k] for k in self.worst],
+            "by_length": _group_data(classes, self.by_length),
+            "by_direction": _group_data(directions, self.by_direction),
+            "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each class of length, direction and point of the grid, lengths in metres."""

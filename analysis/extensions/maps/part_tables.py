@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation.columns import ROUNDING, table_lines
-from ballplate.presentation.formatting import aligned, number
+from ballplate.presentation.formatting import aligned, number, picked
 
 from .fitted_tables import UNDETERMINED
 from .part_budget import REST, PartBudget
@@ -77,8 +77,7 @@ def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict
     """The same in metres."""
     return [
         {
-            "figure": one.figure,
-            "is_length": one.is_length,
+            **picked(one, "figure", "is_length"),
             "error": one.total,
             "expanded_uncertainty": factor * one.uncertainty,
             "coverage_factor": factor,

@@ -18,7 +18,6 @@ from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
     ascii_units,
-    finite,
     number,
     picked,
 )
@@ -492,12 +491,12 @@ def _data(result: Reliability) -> dict[str, Any]:
         "observations": result.design.observation_count,
         "rank_deficiency": result.deficiency,
         **picked(result, "degrees_of_freedom", "sigma_is_estimated", "false_alarm", "power"),
-        "noncentrality": finite(result.noncentrality),
-        "fit_noncentrality": finite(result.fit_noncentrality),
+        "noncentrality": result.noncentrality,
+        "fit_noncentrality": result.fit_noncentrality,
         "redundancy": float(result.redundancy.sum()) + result.among_repeats,
         "redundancy_among_repeats": result.among_repeats,
         "observations_by_name": [
-            {**_pattern_data(result, k), "redundancy": float(result.left[k])}
+            {**_pattern_data(result, k), "redundancy": result.left[k]}
             for k in np.flatnonzero(is_single).tolist()
         ],
         "events": [_pattern_data(result, k) for k in np.flatnonzero(~is_single).tolist()],
@@ -510,8 +509,8 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
         "name": name(result.patterns, k),
         "kind": str(result.patterns.kind[k]),
         "unit": result.patterns.unit(k),
-        "minimal_detectable": finite(float(result.minimal_detectable[k])),
-        "found_by_fit": finite(float(result.found_by_fit[k])),
+        "minimal_detectable": result.minimal_detectable[k],
+        "found_by_fit": result.found_by_fit[k],
         **({"harmless": result.is_harmless(k)} if result.information[k] <= 0.0 else {}),
         "effects": {
             symbol: {
@@ -519,7 +518,7 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
                     result.effects[symbol].change[k]
                     * (1.0 if hidden else result.minimal_detectable[k])
                 ),
-                "standard_uncertainty": finite(float(result.effects[symbol].uncertainty[k])),
+                "standard_uncertainty": result.effects[symbol].uncertainty[k],
                 "at": _where(result, symbol, k),
             }
             for symbol in result.effects
