@@ -61,7 +61,7 @@ from .parts import (
     verdict_lines,
 )
 from .plates import PlateCoordinates
-from .prediction import length_headline, rank_words
+from .prediction import by_label, length_headline, rank_words
 from .residuals import Residual, reading_residuals, residual_groups
 
 if TYPE_CHECKING:
@@ -248,6 +248,18 @@ class Fit(FitResult):
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter."""
         return table_rows(ESTIMATE_COLUMNS, self.estimates)
+
+    def __getitem__(self, name: str) -> ParameterEstimate:
+        """The estimate of a parameter: its value, standard uncertainty and unit.
+
+        :raises KeyError: the fit has no parameter of that name.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit["EXX[1]"].unit
+        'm'
+        """
+        return by_label(dict(zip(labels(self.estimates), self.estimates, strict=True)), name)
 
     @property
     def sum_of_squares(self) -> float:

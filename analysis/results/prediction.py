@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import optional_service, service
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.settings import hint, number_of
 
 from ..presentation.columns import table_rows
 from ..presentation.formatting import given, picked
@@ -127,6 +127,17 @@ class Prediction(Result):
 
         return found | {"monte_carlo": trials_data(self.monte_carlo)}
 
+    def __getitem__(self, symbol: str) -> Quantity:
+        """A quantity by its symbol: its average and maximum, and their unit.
+
+        :raises KeyError: the prediction has no quantity of that symbol.
+
+        >>> import ballplate as bp
+        >>> bp.run(bp.quickstart())["U6"].unit
+        'm'
+        """
+        return by_label(self.quantities, symbol)
+
     def plot(self, path: str | Path | None = None) -> Figure:
         """The positions in the volume, by their names or, where there are many, by their numbers.
 
@@ -170,6 +181,19 @@ class Prediction(Result):
                 "unit": "m",
             }
         ]
+
+
+Named = TypeVar("Named")
+
+
+def by_label(items: Mapping[str, Named], name: str) -> Named:
+    """The item of a name.
+
+    :raises KeyError: there is none.
+    """
+    if name not in items:
+        raise KeyError(f"no {name!r}; {hint(str(name), items)}")
+    return items[name]
 
 
 def rank_words(judged: Verdict) -> str:
