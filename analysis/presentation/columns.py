@@ -50,11 +50,13 @@ def table_lines(
     return aligned(list(zip(*texts, strict=True)), right)
 
 
-def by_axis(heading: str, values: Array, form: Any = 4) -> dict[str, Any]:
+def by_axis(
+    heading: str, values: Array, form: Any = 4, letters: Sequence[str] = "xyz"
+) -> dict[str, Any]:
     """A column for each axis of vectors (n, d), whose letter `heading` has in braces."""
     forms = form.T if hasattr(form, "T") else repeat(form)
     # There are three letters and any number of forms.
-    columns = zip("xyz", values.T, forms, strict=False)
+    columns = zip(letters, values.T, forms, strict=False)
     return {heading.format(axis): (own, of_own) for axis, own, of_own in columns}
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import aligned, given, picked
 from ballplate.presentation.result import Result
 from ballplate.simulator.experiment.machine_file import load_machine
@@ -27,7 +28,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from .axis_tables import AxisTables, NotOfAxesError, names_of, tool_chain
+from .axis_tables import AxisTable, AxisTables, NotOfAxesError, names_of, tool_chain
 from .formats import FORMATS
 from .making import CannotMakeError, MadeTable, TabledMachine, correction, made_table
 from .reading import machine_files, read_table_files
@@ -123,19 +124,24 @@ _PARTS = (*(f"displacement {axis}" for axis in AXES), *(f"turn about {axis}" for
 
 
 def _axis_lines(table: AxisTables) -> list[str]:
-    rows = [["", "positions", "from", "to", "largest correction", ""]]
-    for one in table.axes:
-        largest = np.abs(one.values).max(axis=0)
-        names = names_of(one.axis)
-        parts = [
-            f"{name} {1e6 * value:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
-            for name, value in zip(names, largest.tolist(), strict=True)
-            if value > 0.0
-        ]
-        ends = [format_length(float(one.positions[k])) for k in (0, -1)]
-        count = str(len(one.positions))
-        rows.append([AXES[one.axis], count, *ends, ", ".join(parts) or "none", ""])
-    return aligned(rows, [False, True, True, True, False, False])
+    columns = {
+        "": lambda one: AXES[one.axis],
+        "positions": lambda one: len(one.positions),
+        "from": (lambda one: float(one.positions[0]), format_length),
+        "to": (lambda one: float(one.positions[-1]), format_length),
+        "largest correction": _largest,
+    }
+    return table_lines(columns, table.axes)
+
+
+def _largest(one: AxisTable) -> str:
+    """The largest correction of each error of an axis, in words."""
+    parts = [
+        f"{name} {1e6 * value:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
+        for name, value in zip(names_of(one.axis), np.abs(one.values).max(axis=0), strict=True)
+        if value > 0.0
+    ]
+    return ", ".join(parts) or "none"
 
 
 def _volume_lines(table: VolumeTable) -> list[str]:
