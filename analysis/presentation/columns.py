@@ -29,7 +29,7 @@ Columns = Mapping[str, Any] | Sequence[tuple[str, Any]]
 
 
 def table_lines(
-    columns: Columns, items: Sequence[Any] = (), without: str = "", unknown: str = "-"
+    columns: Columns, items: Sequence[Any] = (), without: str | None = None, unknown: str = "-"
 ) -> list[str]:
     """A table as aligned lines of text, numbers to the right, `without` one of its columns.
 

@@ -221,7 +221,7 @@ class Correction(Result):
             "k": (lambda one: k, "{:g}".format),
             "within target": "is_met",
         }
-        without = "" if any(one.target is not None for one in self.lengths) else "within target"
+        without = None if any(one.target is not None for one in self.lengths) else "within target"
         found = table_lines(columns, self.lengths[:SHOWN], without, "undetermined")
         more = len(self.lengths) - SHOWN
         return [*found, f"(and {more} more lengths, which --json has)"] if more > 0 else found

@@ -153,7 +153,7 @@ def diagonal_lines(errors: LengthErrors) -> list[str]:
         "error, µm": errors.error,
         "random, µm": errors.deviation,
     }
-    return table_lines(columns, without="" if errors.deviation.any() else "random, µm")
+    return table_lines(columns, without=None if errors.deviation.any() else "random, µm")
 
 
 def length_line(errors: LengthErrors) -> str:
