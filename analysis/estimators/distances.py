@@ -109,7 +109,7 @@ class AlternativeFit(FitResult):
         )
         used = _used(self.pairs, self.lengths)
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"estimator {self.solution.estimator}: {used}, {self.solution.observations} terms;"
                 f" {rank}"
@@ -127,8 +127,8 @@ class AlternativeFit(FitResult):
     def data(self) -> dict[str, Any]:
         """The fit as plain data in metres and radians; what is undetermined is None."""
         return {
-            "experiment": self.label,
-            **picked(self, "title", "pairs", "lengths"),
+            **self.named,
+            **picked(self, "pairs", "lengths"),
             **picked(self.solution, "estimator", "observations", "status"),
             "rank_deficiency": self.solution.deficiency,
             "iterations": [picked(it, "step", "sum_of_squares") for it in self.solution.iterations],
@@ -182,7 +182,7 @@ class EstimatorComparison(Result):
         used = f" ({_used(self.pairs, self.lengths)}{across})"
         used = "" if self.estimator == "reversal" else used
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"estimator {self.estimator}{used} against the full one: corrected"
                 f" distances of {self.points} random pairs of points in each of"
@@ -225,8 +225,8 @@ class EstimatorComparison(Result):
     def data(self) -> dict[str, Any]:
         """A comparison as plain data in metres."""
         data: dict[str, Any] = {
-            "experiment": self.label,
-            **picked(self, "title", "estimator", "trials", "pairs", "lengths"),
+            **self.named,
+            **picked(self, "estimator", "trials", "pairs", "lengths"),
             **picked(self, "across_probes", "points"),
             "not_converged": self.failed,
         }

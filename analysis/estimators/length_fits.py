@@ -89,7 +89,7 @@ class LengthFit(FitResult):
         found = self.solution
         rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
                 f" {rank}; {freedom_words(found.degrees_of_freedom)}"
@@ -119,8 +119,7 @@ class LengthFit(FitResult):
         """Solved length equations as plain data in metres and radians; what is open is None."""
         found = self.solution
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             **picked(found, "estimator", "equations", "degrees_of_freedom"),
             "status": _status(self),
             "rank_deficiency": found.deficiency,

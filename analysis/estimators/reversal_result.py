@@ -133,7 +133,7 @@ class ReversalFit(FitResult):
         count = "five parameters" if self.offsets else "three parameters, no offsets"
         scale = "none (fitted, but not applied)" if self.scale == "none" else self.scale
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             f"reversal, {count}, scale difference: {scale}",
             (
                 f'{len(self.both)} balls; "{self.second}" is turned by {turn} degrees, clockwise,'
@@ -163,8 +163,7 @@ class ReversalFit(FitResult):
         """
         found = self.found
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "estimator": "reversal",
             **picked(self, "scale", "offsets"),
             "positions": picked(self, "first", "second"),

@@ -155,7 +155,7 @@ class Fit(FitResult):
         record = self.solution.iterations
         lengths = self.quantities.get("U6")
         verdict = verdict_lines(self.verdict, True, lengths, self.unread)
-        lines = [f"{self.label}: {self.title}", *verdict]
+        lines = [self.heading, *verdict]
         how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
         if self.is_reweighted:
             how = "those of groups as estimated below"
@@ -200,8 +200,7 @@ class Fit(FitResult):
         components = self.variance_components
         curves = self.error_functions if self.converged else ()
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             **verdict_data(self.verdict),
             "status": self.solution.status,
             **picked(self, "sigma", "sigma_is_estimated", "degrees_of_freedom", "too_large"),

@@ -99,7 +99,7 @@ class Prediction(Result):
     def table_lines(self) -> list[str]:
         """The same without replicates: title, verdict and table."""
         rank, *others = verdict_lines(self.verdict, with_values=True, lengths=self.lengths)
-        lines = [f"{self.label}: {self.title}", rank, *scale_warnings(self.scale), *others]
+        lines = [self.heading, rank, *scale_warnings(self.scale), *others]
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
@@ -108,8 +108,7 @@ class Prediction(Result):
 
     def data(self) -> dict[str, Any]:
         found = {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             **verdict_data(self.verdict),
             "sigma": 1.0,
             "quantities": quantities_data(self.quantities),

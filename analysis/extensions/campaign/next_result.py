@@ -172,8 +172,7 @@ class NextStep(Result):
         lengths = None if fit is None else fit.quantities.get("U6")
         times = 1.0 if fit is None else self.sigma / fit.sigma
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "goal": str(self.goal),
             "read": self.read,
             "missing": dict(self.missing),

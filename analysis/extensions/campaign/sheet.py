@@ -42,7 +42,7 @@ class Sheet(Result):
         return summary(self.sheet)
 
     def lines(self) -> list[str]:
-        return [f"{self.label}: {self.title}", "", *sheet_lines(self.sheet)]
+        return [self.heading, "", *sheet_lines(self.sheet)]
 
     def data(self) -> dict[str, Any]:
         return {"experiment": self.label, **sheet_data(self.sheet)}

@@ -110,7 +110,7 @@ class CertifiedBalls(Result):
             known = f"uncertainties scaled by the residuals, {freedom_words(int(freedom))}"
         told = {
             "plate": self.artefact,
-            "experiment": f"{self.label}: {self.title}",
+            "experiment": self.heading,
             "identifier": self.identifier,
             "axes": self.datum,
             "scale": (

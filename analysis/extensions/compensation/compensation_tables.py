@@ -52,8 +52,8 @@ class CompensationTable(Result):
     remarks: tuple[str, ...]
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {remark}" for remark in self.remarks)
+    def warnings(self) -> tuple[str, ...]:
+        return self.remarks
 
     def headline(self) -> str:
         if isinstance(self.table, VolumeTable):

@@ -80,7 +80,7 @@ class UncertaintyBudget(Result):
         of = "the fit" if self.of_fit else "the design, at zero machine error"
         chosen = _ranking(self.figures)
         order = f"; sources by their part of {chosen.name}, the largest first" if chosen else ""
-        lines = [f"{self.label}: {self.title}", f"uncertainty budget of {of}{order}", ""]
+        lines = [self.heading, f"uncertainty budget of {of}{order}", ""]
         for start in range(0, len(self.figures), SIDE_BY_SIDE):
             lines += [*self._table(self.figures[start : start + SIDE_BY_SIDE]), ""]
         lines += [f"{one.name}: {_words(one)}" for one in self.figures]
@@ -113,8 +113,7 @@ class UncertaintyBudget(Result):
 
     def data(self) -> dict[str, Any]:
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "of": "fit" if self.of_fit else "design",
             **picked(self, "sigma", "coverage_factor"),
             "figures": [
@@ -135,12 +134,12 @@ class UncertaintyBudget(Result):
                 }
                 for one in self.figures
             ],
-            "warnings": [self.caution] if self.caution else [],
+            "warnings": self.warnings,
         }
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return (f"warning: {self.caution}",) if self.caution else ()
+    def warnings(self) -> tuple[str, ...]:
+        return (self.caution,) if self.caution else ()
 
 
 def _ratio(one: BudgetFigure, k: int) -> float:

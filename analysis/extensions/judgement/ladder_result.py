@@ -171,7 +171,7 @@ class Ladder(FitResult):
             " ": self._marks,
         }
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"error models on the same readings, sigma {how}; chance: that a richer model"
                 f" explains so much more by chance, all richer ones together; AIC and BIC above the"
@@ -227,8 +227,7 @@ class Ladder(FitResult):
 
     def data(self) -> dict[str, Any]:
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "recommended": None if self.is_none else self.recommended,
             "error_model": None if self.is_none else self.error_model,
             "unexplained": self.faults,

@@ -110,7 +110,7 @@ class Validation(FitResult):
         for one in self.left_out:
             rows.append([one.kind, one.name, *_cells(one, k), "<- failed" * (one in failed)])
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 "each left out in turn and predicted from all others; its pose, and balls read"
                 " nowhere else, come from its own readings; uncertainties of prediction errors"
@@ -140,8 +140,8 @@ class Validation(FitResult):
 
     def data(self) -> dict[str, Any]:
         return {
-            "experiment": self.label,
-            **picked(self, "title", "sigma_is_given"),
+            **self.named,
+            **picked(self, "sigma_is_given"),
             "left_out": [_data(one) for one in self.left_out],
             "failed": [f"{one.kind} {one.name}" for one in self.failed],
             **self.said(),

@@ -86,9 +86,9 @@ class ConvertedMap(Result):
         return float(np.abs(self.old.model.error(x, self.old.values, p) - p).max())
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         caution = self.old.known_lack_of_fit.caution
-        return (f"warning: {caution}",) if caution else ()
+        return (caution,) if caution else ()
 
     def headline(self) -> str:
         kind = self.map.settings["kind"]
@@ -102,7 +102,7 @@ class ConvertedMap(Result):
     def lines(self) -> list[str]:
         old, new, k = self.old, self.map, self.old.coverage_factor
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             verdict_line(old.lack_of_fit),
             (
                 f"from {old.settings['kind']}, {len(old.values)} parameters, to"

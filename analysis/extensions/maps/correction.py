@@ -140,10 +140,6 @@ class Correction(Result):
         return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {one}" for one in self.warnings)
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """What a user of the points has to know: extrapolation, few degrees of freedom, what is not
         applied.

@@ -97,7 +97,7 @@ class ErrorCurves(Result):
                 }
                 for one in getattr(self.functions, key)
             ]
-        return found | {"warnings": map_cautions(self.fitted)}
+        return found | {"warnings": self.warnings}
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each position of each curve, then one for each number; in metres, radians and
@@ -135,8 +135,8 @@ class ErrorCurves(Result):
         return any(one.axis is None for one in self.functions.curves if one.name == row["error"])
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {one}" for one in map_cautions(self.fitted))
+    def warnings(self) -> tuple[str, ...]:
+        return map_cautions(self.fitted)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """All curves side by side, each with its band, those in the same unit to the same scale.

@@ -185,10 +185,6 @@ class FittedErrorMap(Result):
         words = f"{outside} of {len(points)} points are outside the volume"
         return (*map_cautions(self.fitted), f"{words}, where errors are extrapolated")
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {one}" for one in self.warnings)
-
     def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
         """The errors as a picture: magnified at points, with the bands of their expanded
         uncertainty along a line. `magnification` is of a grid in three dimensions.

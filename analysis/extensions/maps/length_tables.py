@@ -61,7 +61,7 @@ class LengthMap(GroupedLengths, Result):
         scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
         count, n = int(whole.count[0]), len(self.points)
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"{rank}{count} lengths between {n} points of a grid, with the probe"
                 f" {settings.probe}{scatter}"
@@ -117,8 +117,7 @@ class LengthMap(GroupedLengths, Result):
         classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
         directions = [{"direction": name} for name in self.directions]
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "rank_deficiency": self.deficiency,
             **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
             "target": picked(settings.target, "constant", "slope"),

@@ -65,8 +65,8 @@ class MachineErrors(Result):
         return self.machine.machine.title
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {doubt}" for doubt in self.doubts)
+    def warnings(self) -> tuple[str, ...]:
+        return self.doubts
 
     def point_lines(self) -> Iterator[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""

@@ -67,7 +67,7 @@ class Reach(Result):
         """The goal, whether the design meets it, and a row for each unknown."""
         now = "met" if self.present.is_met else "not met"
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             f"goal: {self.goal}",
             f"as drawn: {now}; {self.present.words}",
         ]
@@ -98,8 +98,7 @@ class Reach(Result):
         if goal.kind == "quantity":
             told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "goal": told,
             "is_met": self.present.is_met,
             "as_drawn": self.present.words,
