@@ -8,20 +8,26 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.formatting import aligned, picked
+from ..presentation.columns import table_lines
+from ..presentation.formatting import picked
 from .constraints import SLACK
 from .schedule import RunSheet, Step
 
 
 def sheet_lines(sheet: RunSheet) -> list[str]:
     """The run sheet as lines of text: the order, and how each position is set up."""
-    heads = ["position", "probes", "balls", "readings"]
-    rows = [["", *(["start", "min"] if sheet.timed else []), *heads]]
-    for number, step in enumerate(sheet.steps, 1):
-        cells = [step.name, ", ".join(step.probes), step.balls, str(step.readings)]
-        rows.append([str(number), *(times(step) if sheet.timed else ()), *cells])
-    right = [True, *([True, True] if sheet.timed else []), False, False, False, True]
-    lines = aligned(rows, right) if sheet.steps else []
+    columns = {
+        "": range(1, len(sheet.steps) + 1),
+        "start": (range(len(sheet.steps)), lambda k: times(sheet.steps[k])[0]),
+        "min": (range(len(sheet.steps)), lambda k: times(sheet.steps[k])[1]),
+        "position": "name",
+        "probes": lambda step: ", ".join(step.probes),
+        "balls": "balls",
+        "readings": "readings",
+    }
+    if not sheet.timed:
+        del columns["start"], columns["min"]
+    lines = table_lines(columns, sheet.steps) if sheet.steps else []
     lines += [
         f"{number} {step.title}: {_words(step, sheet.timed)}"
         for number, step in enumerate(sheet.steps, 1)
