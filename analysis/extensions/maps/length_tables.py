@@ -225,8 +225,8 @@ def _table(
         "u within": (groups.share()[shown], percent),
         f"{k} u within": (groups.share(True)[shown], percent),
     }
-    without = () if targets else ("target",)
-    without += () if groups.undetermined.any() else ("undetermined",)
+    without = [] if targets else ["target"]
+    without += [] if groups.undetermined.any() else ["undetermined"]
     return table_lines({k: v for k, v in columns.items() if k not in without})
 
 
