@@ -37,9 +37,11 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
-from ..presentation.formatting import SHOWN, aligned, as_data, number, picked
+from ..presentation.columns import table_lines, table_rows
+from ..presentation.formatting import by_name, given, number, picked
 from ..presentation.result import FitResult, Result
-from ..results.estimates import ParameterEstimate, estimate_rows
+from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
+from ..results.parts import iteration_lines
 from ..uncertainty.summaries import uncertainties
 from .length_fits import has_all_errors
 from .reversal_fits import reversal_beside_full
@@ -107,7 +109,7 @@ class AlternativeFit(FitResult):
         )
         used = _used(self.pairs, self.lengths)
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"estimator {self.solution.estimator}: {used}, {self.solution.observations} terms;"
                 f" {rank}"
@@ -119,36 +121,24 @@ class AlternativeFit(FitResult):
             ),
             "",
         ]
-        rows = [["iteration", "step", "S^2"]]
-        rows += [
-            [str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"]
-            for k, it in enumerate(record)
-        ]
-        lines += [*aligned(rows, [True, True, True]), ""]
-        rows = [["parameter", "value", "unit"]]
-        rows += [[e.name, number(1e6 * e.value, 6), SHOWN[e.unit]] for e in self.estimates]
-        return lines + aligned(rows, [False, True, False])
+        columns = {"parameter": "name", "value": ("value", 6), "unit": "unit"}
+        return [*lines, *iteration_lines(record), "", *table_lines(columns, self.estimates)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The fit as plain data in metres and radians; what is undetermined is None."""
-        data: dict[str, Any] = as_data(
-            {
-                "experiment": self.label,
-                **picked(self, "title", "pairs", "lengths"),
-                **picked(self.solution, "estimator", "observations", "status"),
-                "rank_deficiency": self.solution.deficiency,
-                "iterations": [
-                    picked(it, "step", "sum_of_squares") for it in self.solution.iterations
-                ],
-                "estimates": {e.name: picked(e, "value", "unit") for e in self.estimates},
-                **self.said(),
-            }
-        )
-        return data
+        return {
+            **self.named,
+            **picked(self, "pairs", "lengths"),
+            **picked(self.solution, "estimator", "observations", "status"),
+            "rank_deficiency": self.solution.deficiency,
+            "iterations": [picked(it, "step", "sum_of_squares") for it in self.solution.iterations],
+            "estimates": by_name(self.estimates, "value", "unit"),
+            **self.said(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of the machine's parameters."""
-        return estimate_rows(self.estimates)
+        return table_rows(ESTIMATE_COLUMNS, self.estimates)
 
 
 @dataclass(frozen=True, repr=False)
@@ -192,7 +182,7 @@ class EstimatorComparison(Result):
         used = f" ({_used(self.pairs, self.lengths)}{across})"
         used = "" if self.estimator == "reversal" else used
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"estimator {self.estimator}{used} against the full one: corrected"
                 f" distances of {self.points} random pairs of points in each of"
@@ -206,57 +196,44 @@ class EstimatorComparison(Result):
             )
         if not len(self.rms):
             return lines
-        rows = [
-            [
-                "",
-                "least",
-                *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]),
-                "largest",
-                "published",
-                "below it",
+        quantiles = ["least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest"]
+        spreads = {"rms": self.rms, "maximum": self.maximum}
+        values = np.quantile(list(spreads.values()), QUANTILES, axis=1)
+        columns: dict[str, Any] = {"": ["root mean square", "largest"]}
+        columns |= dict(zip(quantiles, 1e6 * values, strict=True))
+        if any(value is not None for value in published.values()):
+            known = [published.get(key) for key in spreads]
+            below = [
+                None if value is None else share_below(one, value)
+                for value, one in zip(known, spreads.values(), strict=True)
             ]
-        ]
-        for words, key, values in (
-            ("root mean square", "rms", self.rms),
-            ("largest", "maximum", self.maximum),
-        ):
-            value = published.get(key)
-            placed = (
-                ["", ""]
-                if value is None
-                else [number(1e6 * value), f"{100 * share_below(values, value):.0f} %"]
-            )
-            rows.append(
-                [words, *(number(1e6 * q) for q in np.quantile(values, QUANTILES)), *placed]
-            )
-        if all(value is None for value in published.values()):
-            rows = [row[:-2] for row in rows]
-        lines += aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+            columns["published"] = (known, lambda value: number(1e6 * value))
+            columns["below it"] = (below, lambda share: f"{100 * share:.0f} %")
+        lines += table_lines(columns)
         if not self.of_truth:
             return lines
-        rows = [
-            ["distances against the true machine's, µm", "bias", "by chance", "scatter", "rms", ""]
-        ]
-        for name, one in self.of_truth.items():
-            figures = (one.bias, one.chance, one.scatter, one.rms)
-            cells = [number(1e6 * value, 3) for value in figures]
-            rows.append([name, *cells, "<- biased" if one.is_biased else ""])
-        return [*lines, "", *aligned(rows, [False, *[True] * 4, False])]
+        columns = {
+            "distances against the true machine's": list(self.of_truth),
+            "bias, µm": ("bias", 3),
+            "by chance, µm": ("chance", 3),
+            "scatter, µm": ("scatter", 3),
+            "rms, µm": ("rms", 3),
+            "": lambda one: "<- biased" if one.is_biased else "",
+        }
+        return [*lines, "", *table_lines(columns, list(self.of_truth.values()))]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """A comparison as plain data in metres."""
         data: dict[str, Any] = {
-            "experiment": self.label,
-            **picked(self, "title", "estimator", "trials", "pairs", "lengths"),
+            **self.named,
+            **picked(self, "estimator", "trials", "pairs", "lengths"),
             **picked(self, "across_probes", "points"),
             "not_converged": self.failed,
         }
         for key, values in (("rms", self.rms), ("maximum", self.maximum)):
             quantiles = np.quantile(values, QUANTILES) if len(values) else ()
             data[key] = {
-                "quantiles": {
-                    str(q): value for q, value in zip(QUANTILES, quantiles, strict=False)
-                },
+                "quantiles": dict(zip(map(str, QUANTILES), quantiles, strict=False)),
                 "values": values,
             }
             value = self.published.get(key)
@@ -265,20 +242,19 @@ class EstimatorComparison(Result):
                     "published": value,
                     "share_below_published": share_below(values, value),
                 }
-        if self.of_truth:
-            data["against_truth"] = {
-                name: {**vars(one), "unit": "m"} for name, one in self.of_truth.items()
-            }
-        return dict(as_data(data))
+        against = {name: {**vars(one), "unit": "m"} for name, one in self.of_truth.items()}
+        return data | given(against_truth=against)
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each data set on which both estimators converged."""
         kept = [k for k in range(self.trials) if k not in self.failed]
-        columns = zip(kept, self.rms.tolist(), self.maximum.tolist(), strict=True)
-        return [
-            {"data set": k, "root mean square": rms, "maximum": maximum, "unit": "m"}
-            for k, rms, maximum in columns
-        ]
+        columns = {
+            "data set": kept,
+            "root mean square": self.rms,
+            "maximum": self.maximum,
+            "unit": ["m"] * len(kept),
+        }
+        return table_rows(columns)
 
 
 def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:

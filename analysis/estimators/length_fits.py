@@ -26,7 +26,8 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.formatting import aligned, as_data, number, picked
+from ..presentation.columns import table_lines, table_rows
+from ..presentation.formatting import picked
 from ..presentation.result import FitResult
 from ..rank.verdict import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
@@ -88,7 +89,7 @@ class LengthFit(FitResult):
         found = self.solution
         rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
                 f" {rank}; {freedom_words(found.degrees_of_freedom)}"
@@ -96,11 +97,11 @@ class LengthFit(FitResult):
             f"{_status(self)} after {found.iterations} iterations",
             "",
         ]
-        rows = [
-            ["factor of the metric", *FACTORS],
-            ["1e-6", *(number(1e6 * value) for value in self.factors)],
-        ]
-        lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(self.adjustments)]
+        columns = {
+            "factor of the metric": ["1e-6"],
+            **{name: [1e6 * value] for name, value in zip(FACTORS, self.factors, strict=True)},
+        }
+        lines += [*table_lines(columns), "", *adjustment_lines(self.adjustments)]
         where = [
             f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm"
             for name, centre in self.pivots
@@ -114,39 +115,33 @@ class LengthFit(FitResult):
         )
         return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in self.lengths]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """Solved length equations as plain data in metres and radians; what is open is None."""
         found = self.solution
-        data: dict[str, Any] = as_data(
-            {
-                "experiment": self.label,
-                "title": self.title,
-                **picked(found, "estimator", "equations", "degrees_of_freedom"),
-                "status": _status(self),
-                "rank_deficiency": found.deficiency,
-                "factors": dict(zip(FACTORS, self.factors, strict=True)),
-                "adjustments": adjustment_data(self.adjustments),
-                "pivots": dict(self.pivots),
-                "spheres": dict(self.spheres),
-                "lengths": dict(self.lengths),
-                **self.said(),
-            }
-        )
-        return data
+        return {
+            **self.named,
+            **picked(found, "estimator", "equations", "degrees_of_freedom"),
+            "status": _status(self),
+            "rank_deficiency": found.deficiency,
+            "factors": dict(zip(FACTORS, self.factors, strict=True)),
+            "adjustments": adjustment_data(self.adjustments),
+            "pivots": dict(self.pivots),
+            "spheres": dict(self.spheres),
+            "lengths": dict(self.lengths),
+            **self.said(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each adjustment of the machine."""
-        return [
-            {
-                "adjustment": one.what,
-                "value": one.value,
-                "standard uncertainty": one.standard_uncertainty,
-                "expanded uncertainty": one.expanded_uncertainty,
-                "unit": one.unit,
-                "to do": one.words,
-            }
-            for one in self.adjustments
-        ]
+        columns = {
+            "adjustment": "what",
+            "value": "value",
+            "standard uncertainty": "standard_uncertainty",
+            "expanded uncertainty": "expanded_uncertainty",
+            "unit": "unit",
+            "to do": "words",
+        }
+        return table_rows(columns, self.adjustments)
 
 
 def has_all_errors(design: Design) -> bool:

@@ -14,20 +14,18 @@ from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
+from ..presentation.columns import table_lines, table_rows
 from ..presentation.formatting import (
     SHOWN,
-    aligned,
-    as_data,
-    finite,
+    by_name,
     number,
     picked,
-    to_uncertainty,
 )
 from ..presentation.result import FitResult
 from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fit import Fit
-from ..results.parts import MOST_BALLS
+from ..results.parts import MOST_BALLS, coordinates_data
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -135,7 +133,7 @@ class ReversalFit(FitResult):
         count = "five parameters" if self.offsets else "three parameters, no offsets"
         scale = "none (fitted, but not applied)" if self.scale == "none" else self.scale
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             f"reversal, {count}, scale difference: {scale}",
             (
                 f'{len(self.both)} balls; "{self.second}" is turned by {turn} degrees, clockwise,'
@@ -157,29 +155,15 @@ class ReversalFit(FitResult):
             ),
             "",
         ]
-        redundant = {e.name: e for e in self.redundant}
-        rows = [["parameter", "reversal", "u", "multiple redundancy", "its u", "unit"]]
-        for one in self.estimates:
-            other, own = redundant.get(one.name), 1e6 * one.standard_uncertainty
-            u = np.nan if other is None else 1e6 * other.standard_uncertainty
-            beside = (
-                ["-", "-"]
-                if other is None
-                else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
-            )
-            value = to_uncertainty(1e6 * one.value, own)
-            rows.append([one.name, value, number(own, 3), *beside, SHOWN[one.unit]])
-        lines += aligned(rows, [False, True, True, True, True, False])
-        return [*lines, "", *_ball_lines(self)]
+        return [*lines, *table_lines(COLUMNS, self.rows()), "", *_ball_lines(self)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The reversal as plain data in metres and radians; `multiple_redundancy` has the full
         fit.
         """
         found = self.found
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "estimator": "reversal",
             **picked(self, "scale", "offsets"),
             "positions": picked(self, "first", "second"),
@@ -188,21 +172,15 @@ class ReversalFit(FitResult):
             "neglected_standard_uncertainties": found.bias,
             "neglected_coordinates": self.distortion,
             "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
-            "estimates": {
-                e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
-                for e in self.estimates
-            },
+            "estimates": by_name(self.estimates, *FIGURES),
             "axes": {
                 "origin": self.names[self.axes.origin],
                 "xy"[self.axes.axis]: self.names[self.axes.ball],
             },
-            "balls": _by_ball(self.names, self.coordinates),
-            "residuals": _by_ball(self.names_of_both, found.residuals),
+            "balls": coordinates_data(self.names, self.coordinates),
+            "residuals": coordinates_data(self.names_of_both, found.residuals),
             "multiple_redundancy": {
-                "relation": {
-                    e.name: as_data(picked(e, "value", "standard_uncertainty", "unit"))
-                    for e in self.redundant
-                },
+                "relation": by_name(self.redundant, *FIGURES),
                 **self.full.to_dict(),
             },
             **self.said(),
@@ -211,22 +189,18 @@ class ReversalFit(FitResult):
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter, that of multiple redundancy beside it."""
         redundant = {one.name: one for one in self.redundant}
-        rows = []
-        for one in self.estimates:
-            other = redundant.get(one.name)
-            rows.append(
-                {
-                    "parameter": one.name,
-                    "reversal": one.value,
-                    "standard uncertainty": one.standard_uncertainty,
-                    "multiple redundancy": np.nan if other is None else other.value,
-                    "its standard uncertainty": (
-                        np.nan if other is None else other.standard_uncertainty
-                    ),
-                    "unit": one.unit,
-                }
-            )
-        return rows
+        others = [redundant.get(one.name) for one in self.estimates]
+        columns = {
+            "parameter": "name",
+            "reversal": "value",
+            "standard uncertainty": "standard_uncertainty",
+            "multiple redundancy": [np.nan if one is None else one.value for one in others],
+            "its standard uncertainty": [
+                np.nan if one is None else one.standard_uncertainty for one in others
+            ],
+            "unit": "unit",
+        }
+        return table_rows(columns, self.estimates)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         return draw_vectors(self.residual_vectors(), self.title, path)
@@ -274,46 +248,38 @@ class ReversalFit(FitResult):
 
 
 def _ball_lines(fit: ReversalFit) -> list[str]:
-    rows = [
-        [
-            "ball",
-            "x, mm",
-            "y, mm",
-            "multiple redundancy: x, mm",
-            "y, mm",
-            "standard uncertainty of x, µm",
-            "of y, µm",
-        ]
-    ]
     plate = fit.full.plates[0] if fit.full.plates else None
     nothing = np.full_like(fit.coordinates, np.nan)
     others, us = (plate.coordinates, plate.standard_uncertainties) if plate else (nothing, nothing)
-    for name, here, there, u in zip(fit.names, fit.coordinates, others, us, strict=True):
-        cells = [
-            to_uncertainty(1e3 * value, 1e3 * size)
-            for values in (here, there)
-            for value, size in zip(values, u, strict=True)
-        ]
-        rows.append([name, *cells, *(number(1e6 * size, 3) for size in u)])
-    lines = [
-        f"co-ordinates of the balls in the plate's own axes ({axes_words(fit.axes, fit.names)})"
-    ]
-    lines += aligned(rows[: MOST_BALLS + 1], [False] + [True] * 6)
-    return lines + (
-        [f"({len(rows) - 1 - MOST_BALLS} balls more in --json)"]
-        if len(rows) - 1 > MOST_BALLS
-        else []
+    (x, y), (their_x, their_y), (u, v) = (
+        own[:MOST_BALLS].T for own in (fit.coordinates, others, us)
     )
+    columns = [
+        ("ball", list(fit.names[:MOST_BALLS])),
+        ("x, mm", (x, u)),
+        ("y, mm", (y, v)),
+        ("multiple redundancy: x, mm", (their_x, u)),
+        ("y, mm", (their_y, v)),
+        ("standard uncertainty of x, µm", (u, 3)),
+        ("of y, µm", (v, 3)),
+    ]
+    left = len(fit.names) - MOST_BALLS
+    return [
+        f"co-ordinates of the balls in the plate's own axes ({axes_words(fit.axes, fit.names)})",
+        *table_lines(columns),
+        *([f"({left} balls more in --json)"] if left > 0 else []),
+    ]
 
 
-def _by_ball(names: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:
-    return {
-        name: {
-            axis: {"value": finite(value), "unit": "m"}
-            for axis, value in zip("xy", row, strict=True)
-        }
-        for name, row in zip(names, values.tolist(), strict=True)
-    }
+FIGURES = ("value", "standard_uncertainty", "unit")
+COLUMNS = {
+    "parameter": "parameter",
+    "reversal": ("reversal", "standard uncertainty"),
+    "u": ("standard uncertainty", 3),
+    "multiple redundancy": ("multiple redundancy", "its standard uncertainty"),
+    "its u": ("its standard uncertainty", 3),
+    "unit": "unit",
+}
 
 
 def _length(value: float) -> str:

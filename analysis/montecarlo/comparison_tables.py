@@ -7,7 +7,7 @@ from typing import Any
 
 from ballplate.simulator.inputs.settings import listing
 
-from ..presentation.formatting import aligned, number, shown_unit
+from ..presentation.formatting import aligned, number, picked, shown_unit
 from ..uncertainty.quantities import QUANTITIES
 from .experiments import Trials
 from .figures import BEYOND, MonteCarloComparison, MonteCarloEstimate, MonteCarloOutcome
@@ -155,8 +155,7 @@ def trials_data(done: Trials) -> dict[str, Any]:
         "trials": outcome.trials,
         "seed": done.seed,
         "not_converged": list(outcome.failed),
-        "passes": outcome.passes,
-        "interrupted": outcome.interrupted,
+        **picked(outcome, "passes", "interrupted"),
         "quantities": {
             symbol: _comparison_data(one) for symbol, one in outcome.comparisons.items()
         },
@@ -182,9 +181,7 @@ def trials_data(done: Trials) -> dict[str, Any]:
 
 def _comparison_data(comparison: MonteCarloComparison) -> dict[str, Any]:
     return {
-        "unit": comparison.unit,
-        "count": comparison.count,
-        "sampled": comparison.sampled,
+        **picked(comparison, "unit", "count", "sampled"),
         "linear": {"maximum": comparison.linear_maximum, "average": comparison.linear_average},
         "actual": {"maximum": comparison.actual_maximum, "average": comparison.actual_average},
         "spread_ratio": _figure(comparison.spread),

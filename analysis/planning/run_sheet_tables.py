@@ -8,20 +8,26 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.formatting import aligned
+from ..presentation.columns import table_lines
+from ..presentation.formatting import picked
 from .constraints import SLACK
 from .schedule import RunSheet, Step
 
 
 def sheet_lines(sheet: RunSheet) -> list[str]:
     """The run sheet as lines of text: the order, and how each position is set up."""
-    heads = ["position", "probes", "balls", "readings"]
-    rows = [["", *(["start", "min"] if sheet.timed else []), *heads]]
-    for number, step in enumerate(sheet.steps, 1):
-        cells = [step.name, ", ".join(step.probes), step.balls, str(step.readings)]
-        rows.append([str(number), *(times(step) if sheet.timed else ()), *cells])
-    right = [True, *([True, True] if sheet.timed else []), False, False, False, True]
-    lines = aligned(rows, right) if sheet.steps else []
+    columns = {
+        "": range(1, len(sheet.steps) + 1),
+        "start": (range(len(sheet.steps)), lambda k: times(sheet.steps[k])[0]),
+        "min": (range(len(sheet.steps)), lambda k: times(sheet.steps[k])[1]),
+        "position": "name",
+        "probes": lambda step: ", ".join(step.probes),
+        "balls": "balls",
+        "readings": "readings",
+    }
+    if not sheet.timed:
+        del columns["start"], columns["min"]
+    lines = table_lines(columns, sheet.steps) if sheet.steps else []
     lines += [
         f"{number} {step.title}: {_words(step, sheet.timed)}"
         for number, step in enumerate(sheet.steps, 1)
@@ -38,13 +44,11 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
             {
                 "name": step.name,
                 "description": step.description or None,
-                "done": step.done,
-                "artefact": step.artefact,
+                **picked(step, "done", "artefact"),
                 "plane": step.plane or None,
                 "set_up": step.place,
                 "probes": list(step.probes),
-                "balls": step.balls,
-                "readings": step.readings,
+                **picked(step, "balls", "readings"),
                 "change": step.change or None,
                 "change_seconds": step.change_seconds if sheet.timed else None,
                 "seconds": step.seconds if sheet.timed else None,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,9 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.formatting import aligned, finite, number
+from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import Result
-from .choice import CurvePoint, Gain, Selection
+from .choice import Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
 from .drift_times import in_order_settings, in_time
@@ -147,36 +147,33 @@ class Campaign(Selection, Result):
         lines += ["", *orders] if orders else []
         return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The campaign as data for JSON, in metres and seconds."""
+    def data(self) -> dict[str, Any]:
+        """The campaign as data, in metres and seconds."""
         return {
             "experiment": self.prediction.label,
             "candidates": len(self.pool.candidates),
             "dropped": dict(self.pool.dropped),
-            "criterion": self.criterion,
-            "unit": self.unit,
-            "budget": asdict(self.budget),
-            "value": finite(self.value),
-            "bound": finite(self.bound),
-            "drawn": None if self.drawn is None else finite(self.drawn),
-            "drawn_spent": None if self.drawn_spent is None else asdict(self.drawn_spent),
-            "target": self.target,
-            "excluded": self.excluded,
-            "spent": asdict(self.spent),
-            "chosen": [candidate.name for candidate in self.chosen],
+            **picked(self, "criterion", "unit", "budget", "value", "bound", "drawn"),
+            **picked(self, "drawn_spent", "target", "excluded", "spent"),
+            "chosen": _names(self.chosen),
             "names": dict(self.names),
-            "done": [candidate.name for candidate in self.done],
-            "interrupted": [
-                {"name": one.name, "readings": one.readings} for one in self.interrupted
-            ],
-            "completed": None if self.completed is None else self.completed.whole.name,
+            "done": _names(self.done),
+            "interrupted": [picked(one, "name", "readings") for one in self.interrupted],
+            "completed": self.completed and self.completed.whole.name,
             "left_open": self.left_open,
-            "whole_pool": None if self.gap is None else self.gap.to_dict(),
-            "ignored": [candidate.name for candidate in self.ignored],
-            "gains": [_gain_data(gain) for gain in self.gains],
-            "left_out": [_gain_data(gain) for gain in self.left_out],
-            "curve": [_point_data(point) for point in self.curve],
-            "order": asdict(self.order),
+            "whole_pool": self.gap and self.gap.to_dict(),
+            "ignored": _names(self.ignored),
+            "gains": list(map(_gain_data, self.gains)),
+            "left_out": list(map(_gain_data, self.left_out)),
+            "curve": [
+                {
+                    **picked(point, "budget", "spent"),
+                    "chosen": _names(point.chosen),
+                    **picked(point, "value", "bound"),
+                }
+                for point in self.curve
+            ],
+            **picked(self, "order"),
             **(WITHOUT_DRIFT if self.orders is None else self.orders.data()),
             "run_sheet": sheet_data(self.sheet),
             "plan": self.prediction.to_dict(),
@@ -254,6 +251,14 @@ def _comparison(campaign: Campaign) -> list[str]:
     return aligned(rows, [False, True, False, True, True, True])
 
 
+def _hours(seconds: float) -> str:
+    return f"{seconds / HOUR:.2f}"
+
+
+def _micrometres(value: float) -> str:
+    return number(1e6 * value)
+
+
 def _value(campaign: Campaign, value: float) -> list[str]:
     if math.isinf(value):
         return ["-", "deficient"]
@@ -261,7 +266,7 @@ def _value(campaign: Campaign, value: float) -> list[str]:
 
 
 def _spent(spent: Spent) -> list[str]:
-    return [f"{spent.seconds / HOUR:.2f}", str(spent.readings), str(spent.positions)]
+    return [_hours(spent.seconds), str(spent.readings), str(spent.positions)]
 
 
 def _gain_table(campaign: Campaign) -> list[str]:
@@ -298,17 +303,11 @@ def _curve_table(campaign: Campaign) -> list[str]:
 def _gain_data(gain: Gain) -> dict[str, Any]:
     return {
         "name": gain.candidate.name,
-        "without": finite(gain.without),
-        "with": finite(gain.with_),
+        "without": gain.without,
+        "with": gain.with_,
         "seconds": gain.candidate.seconds,
     }
 
 
-def _point_data(point: CurvePoint) -> dict[str, Any]:
-    return {
-        "budget": asdict(point.budget),
-        "spent": asdict(point.spent),
-        "chosen": [candidate.name for candidate in point.chosen],
-        "value": finite(point.value),
-        "bound": finite(point.bound),
-    }
+def _names(candidates: Iterable[Any]) -> list[str]:
+    return [candidate.name for candidate in candidates]

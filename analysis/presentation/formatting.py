@@ -32,6 +32,15 @@ def amount_of(value: float, unit: str) -> tuple[float, str]:
     return (1e3 * value, "mK") if unit == "K" else (1e6 * value, SHOWN[unit])
 
 
+def unit_of(unit: str) -> str:
+    """The unit in which `amount_of` shows values of a unit.
+
+    >>> unit_of("m"), unit_of("K")
+    ('µm', 'mK')
+    """
+    return amount_of(0.0, unit)[1]
+
+
 def shown_unit(unit: str) -> str:
     """Unit in which tables show values of a unit.
 
@@ -177,6 +186,20 @@ def csv_lines(heads: Iterable[str], *columns: np.ndarray) -> Iterator[str]:
     yield ",".join(heads)
     for row in np.column_stack(columns).tolist():
         yield ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
+
+
+def by_name(items: Iterable[Any], *names: str) -> dict[str, dict[str, Any]]:
+    """Some attributes of objects, by the names of these."""
+    return {one.name: picked(one, *names) for one in items}
+
+
+def given(**values: Any) -> dict[str, Any]:
+    """Values that are neither empty nor missing.
+
+    >>> given(tasks=[], title="plate")
+    {'title': 'plate'}
+    """
+    return {name: value for name, value in values.items() if value}
 
 
 def picked(source: object, *names: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from ballplate.simulator.inputs.settings import number_of
 
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
+from .formatting import as_data
 from .table import Block, Entry, Row, Table
 
 if TYPE_CHECKING:
@@ -43,16 +44,35 @@ class Result:
         """The result as lines of text, as the command prints it."""
         raise NotImplementedError
 
+    def data(self) -> dict[str, Any]:
+        """The content of `to_dict`, of any objects; what is undetermined may be NaN."""
+        raise NotImplementedError
+
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, as the command's --json prints it; what is undetermined is
         None.
         """
-        raise NotImplementedError
+        return dict(as_data(self.data()))
+
+    @property
+    def heading(self) -> str:
+        """Label and title."""
+        return f"{self.label}: {self.title}"
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """Label and title as plain data."""
+        return {"experiment": self.label, "title": self.title}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user of the result has to know."""
+        return ()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What is to be said beside tables: remarks, warnings, why it is not as expected."""
-        return ()
+        return tuple(f"warning: {warning}" for warning in self.warnings)
 
     def rows(self) -> list[dict[str, Any]]:
         """The rows of its main table, by the names of the columns; units have a column of their
@@ -104,7 +124,7 @@ class Result:
         """Title and main table in a form, with four digits, `most` rows of it and how many more
         there are; without any row, the result in a few words.
         """
-        every, title = self.rows(), f"{self.label}: {self.title}"
+        every, title = self.rows(), self.heading
         rows = every[:most]
         if not rows:
             return form("; ".join([f"{title}: {self.headline()}", *self.notes]), [])
@@ -159,8 +179,7 @@ class FitResult(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        warnings = (f"warning: {warning}" for warning in self.warnings)
-        return (*self.remarks, *warnings, *filter(None, [self.complaint]))
+        return (*self.remarks, *super().notes, *filter(None, [self.complaint]))
 
     def said(self) -> dict[str, Any]:
         """What is to be said beside the figures, as plain data."""

@@ -272,18 +272,13 @@ def parameter_estimates(
     )
 
 
-def estimate_rows(estimates: Sequence[ParameterEstimate]) -> list[dict[str, Any]]:
-    """One row of a table for each estimate."""
-    return [
-        {
-            "parameter": one.name,
-            "kind": one.kind,
-            "value": one.value,
-            "standard uncertainty": one.standard_uncertainty,
-            "unit": one.unit,
-        }
-        for one in estimates
-    ]
+ESTIMATE_COLUMNS: dict[str, Any] = {
+    "parameter": "name",
+    "kind": "kind",
+    "value": ("value", "standard_uncertainty"),
+    "standard uncertainty": ("standard_uncertainty", 3),
+    "unit": "unit",
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -20,9 +20,10 @@ from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
+from ..presentation.columns import table_lines, table_rows
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
-from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
+from ..presentation.formatting import given, picked
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
@@ -41,11 +42,11 @@ from .asked import (
 from .diagnosis import Suspicion, has_exact_values, lack_of_fit
 from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
+    ESTIMATE_COLUMNS,
     CorrectedPoints,
     EstimatedFunctions,
     ParameterEstimate,
     correct,
-    estimate_rows,
     labels,
 )
 from .groupings import GROUPINGS, Grouping
@@ -53,6 +54,7 @@ from .map_of_fit import counted_twice, map_of
 from .parts import (
     adjustment_data,
     adjustment_lines,
+    iteration_lines,
     map_lines,
     not_read,
     plate_data,
@@ -65,7 +67,7 @@ from .parts import (
     verdict_lines,
 )
 from .plates import PlateCoordinates
-from .prediction import length_headline, rank_words
+from .prediction import by_label, length_headline, rank_words
 from .residuals import Residual, reading_residuals, residual_groups
 
 if TYPE_CHECKING:
@@ -154,7 +156,7 @@ class Fit(FitResult):
         record = self.solution.iterations
         lengths = self.quantities.get("U6")
         verdict = verdict_lines(self.verdict, True, lengths, self.unread)
-        lines = [f"{self.label}: {self.title}", *verdict]
+        lines = [self.heading, *verdict]
         how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
         if self.is_reweighted:
             how = "those of groups as estimated below"
@@ -168,14 +170,9 @@ class Fit(FitResult):
                 " the stated "
             )
             summary += f"uncertainties ({how})"
-        rows = [["iteration", "step", "S^2"]]
-        rows += [
-            [str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"]
-            for k, it in enumerate(record)
-        ]
         maps = map_lines(self.experiment)
         lines += [summary, *(maps if self.campaigns is None else self.campaigns.lines())]
-        lines += ["", *aligned(rows, [True, True, True])]
+        lines += ["", *iteration_lines(record, _step)]
         if not self.converged:
             return lines
         lines += ["", *self._residual_table()]
@@ -186,19 +183,8 @@ class Fit(FitResult):
             lines += [REWEIGHTED] if self.is_reweighted else []
         lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
         lines += [*task_table(self.tasks, self.lack_of_fit.caveat), ""] if self.tasks else []
-        rows = [["parameter", "value", "standard uncertainty", "unit"]]
-        for estimate in (one for one in self.estimates if one.kind not in ("origin", "ball")):
-            value, unit = amount_of(estimate.value, estimate.unit)
-            u, _ = amount_of(estimate.standard_uncertainty, estimate.unit)
-            rows.append(
-                [
-                    estimate.name,
-                    to_uncertainty(value, u),
-                    number(u, 3),
-                    unit,
-                ]
-            )
-        lines += aligned(rows, [False, True, True, False])
+        shown = [one for one in self.estimates if one.kind not in ("origin", "ball")]
+        lines += table_lines(ESTIMATE_COLUMNS, shown, "kind")
         lines.append(
             "(origins of positions and co-ordinates of balls are among the estimates of --json)"
         )
@@ -210,56 +196,70 @@ class Fit(FitResult):
             lines += ["", *self.bootstrap.lines()]
         return lines
 
-    def to_dict(self) -> dict[str, Any]:
-        suspected: dict[str, Any] = {}
-        if self.diagnosis:
-            suspected = {"suspected": self.diagnosis.data(self.observed.marks)}
+    def data(self) -> dict[str, Any]:
+        estimates = zip(labels(self.estimates), self.estimates, strict=True)
+        components = self.variance_components
+        curves = self.error_functions if self.converged else ()
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             **verdict_data(self.verdict),
             "status": self.solution.status,
             **picked(self, "sigma", "sigma_is_estimated", "degrees_of_freedom", "too_large"),
-            "sum_of_squares": finite(self.sum_of_squares),
-            **({} if self.campaigns is None else {"campaigns": self.campaigns.to_dict()}),
+            "sum_of_squares": self.sum_of_squares,
+            **given(campaigns=self.campaigns and self.campaigns.to_dict()),
             "iterations": [
-                {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)}
-                for it in self.solution.iterations
+                picked(one, "step", "sum_of_squares") for one in self.solution.iterations
             ],
             "quantities": quantities_data(self.quantities),
-            **({"tasks": task_data(self.tasks)} if self.tasks else {}),
+            **given(tasks=task_data(self.tasks)),
             "largest_residuals": [
                 {
                     **picked(one, "position", "ball", "probe", "axis", "value"),
                     "unit": "m",
-                    "standard_uncertainties": finite(self._standardised(one)),
+                    "standard_uncertainties": self._standardised(one),
                 }
                 for one in self.largest
             ],
-            **self._pictured(),
-            **suspected,
+            **given(
+                error_functions=[one.to_dict() for one in curves],
+                residuals=self._residual_groups(),
+                suspected=self.diagnosis and self.diagnosis.data(self.observed.marks),
+            ),
             **(
                 {}
-                if self.variance_components is None
+                if components is None
                 else {
-                    "variance_components": self.variance_components.to_dict(),
+                    "variance_components": components.to_dict(),
                     "reweighted": self.is_reweighted,
                 }
             ),
-            "estimates": self._estimates_data(),
-            **(
-                {"plates": {plate.artefact: plate_data(plate) for plate in self.plates}}
-                if self.plates
-                else {}
+            "estimates": {
+                name: picked(one, "value", "standard_uncertainty", "unit")
+                for name, one in estimates
+            },
+            **given(
+                plates={plate.artefact: plate_data(plate) for plate in self.plates},
+                adjustments=adjustment_data(self.adjustments),
+                bootstrap=self.bootstrap and self.bootstrap.to_dict(),
             ),
-            **({"adjustments": adjustment_data(self.adjustments)} if self.adjustments else {}),
-            **({} if self.bootstrap is None else {"bootstrap": self.bootstrap.to_dict()}),
             **self.said(),
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter."""
-        return estimate_rows(self.estimates)
+        return table_rows(ESTIMATE_COLUMNS, self.estimates)
+
+    def __getitem__(self, name: str) -> ParameterEstimate:
+        """The estimate of a parameter: its value, standard uncertainty and unit.
+
+        :raises KeyError: the fit has no parameter of that name.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit["EXX[1]"].unit
+        'm'
+        """
+        return by_label(dict(zip(labels(self.estimates), self.estimates, strict=True)), name)
 
     @property
     def sum_of_squares(self) -> float:
@@ -583,19 +583,12 @@ class Fit(FitResult):
         """Whether sigma is estimated from residuals that are zero but for rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
 
-    def _pictured(self) -> dict[str, Any]:
-        """Error functions along lines, and residuals by group, as plain data; none without
-        results.
-        """
-        if not self.converged:
+    def _residual_groups(self) -> dict[str, list[dict[str, Any]]]:
+        """Residuals by group as plain data; none without results."""
+        if not self.converged or not len(self.design.plate_readings):
             return {}
         sigma = float("nan") if self.without_scatter else self.sigma
-        curves = [one.to_dict() for one in self.error_functions]
-        found: dict[str, Any] = {"error_functions": curves} if curves else {}
-        if len(self.design.plate_readings):
-            groups = residual_groups(self.design, self.solution, self.observed.x, sigma)
-            found["residuals"] = groups
-        return found
+        return residual_groups(self.design, self.solution, self.observed.x, sigma)
 
     def _standardised(self, one: Residual) -> float:
         """A residual in its standard uncertainties; NaN where there is nothing but rounding."""
@@ -603,32 +596,15 @@ class Fit(FitResult):
 
     def _residual_table(self) -> list[str]:
         """The largest residuals as lines of text."""
-        rows = [["largest residuals", "", "", "", "µm", "standard uncertainties"]]
-        for one in self.largest[:SHOWN_RESIDUALS]:
-            rows.append(
-                [
-                    one.position,
-                    one.ball,
-                    one.probe,
-                    one.axis,
-                    number(1e6 * one.value),
-                    "-" if self.without_scatter else number(self._standardised(one)),
-                ]
-            )
-        return aligned(rows, [False, False, False, False, True, True])
-
-    def _estimates_data(self) -> dict[str, Any]:
-        """Estimates by name; by kind and name where a model gives a parameter the name that another
-        kind has.
-        """
-        return {
-            name: {
-                "value": finite(one.value),
-                "standard_uncertainty": finite(one.standard_uncertainty),
-                "unit": one.unit,
-            }
-            for name, one in zip(labels(self.estimates), self.estimates, strict=True)
+        columns = {
+            "largest residuals": "position",
+            "ball": "ball",
+            "probe": "probe",
+            "axis": "axis",
+            "µm": "value",
+            "standard uncertainties": self._standardised,
         }
+        return table_lines(columns, self.largest[:SHOWN_RESIDUALS])
 
 
 def _step(step: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Unit
 
-from ..presentation.formatting import aligned, amount_of, finite, number
+from ..presentation.columns import table_lines
 
 # Lines of a table; displacements of single readings may be thousands.
 MOST_LINES = 30
@@ -39,25 +39,30 @@ def influence_uncertainties(at: Linearisation) -> tuple[InfluenceUncertainty, ..
     )
 
 
+COLUMNS: dict[str, Any] = {
+    "influence quantity": "name",
+    "stated uncertainty": (
+        lambda one: one.stated if np.isfinite(one.stated) else "unknown",
+        3,
+    ),
+    "with the readings": ("predicted", 3),
+    "unit": "unit",
+}
+
+
 def influence_table(found: Sequence[InfluenceUncertainty]) -> list[str]:
     """Lines of text, the first of them where there are many."""
-    rows = [["influence quantity", "stated uncertainty", "with the readings", "unit"]]
-    for one in found[:MOST_LINES]:
-        stated, unit = amount_of(one.stated, one.unit)
-        u, _ = amount_of(one.predicted, one.unit)
-        known = number(stated, 3) if np.isfinite(stated) else "unknown"
-        rows.append([one.name, known, number(u, 3), unit])
     left = len(found) - MOST_LINES
     more = [f"({left} more are in --json)"] if left > 0 else []
-    return [*aligned(rows, [False, True, True, False]), *more]
+    return [*table_lines(COLUMNS, found[:MOST_LINES]), *more]
 
 
 def influence_data(found: Sequence[InfluenceUncertainty]) -> dict[str, Any]:
     """The same as plain data, by name."""
     return {
         one.name: {
-            "stated_standard_uncertainty": finite(one.stated),
-            "standard_uncertainty": finite(one.predicted),
+            "stated_standard_uncertainty": one.stated,
+            "standard_uncertainty": one.predicted,
             "unit": one.unit,
         }
         for one in found

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from ballplate.simulator.computing.rounding import printable
 from ballplate.simulator.inputs.settings import listing, number_of
+from ballplate.simulator.machines.protocol import Array
 
+from ..presentation.columns import table_lines
 from ..presentation.formatting import (
-    aligned,
-    finite,
+    by_name,
+    given,
     number,
     percent,
+    picked,
     shown_unit,
-    to_uncertainty,
     uncertainty_words,
 )
 from ..rank.verdict import GREAT, Verdict
@@ -26,37 +29,39 @@ from .adjustments import ARCSECOND, Adjustment
 from .plates import PlateCoordinates
 
 if TYPE_CHECKING:
+    from ballplate.simulator.estimation.gauss_newton import Iteration
     from ballplate.simulator.experiment.model import Experiment
+
+# Of sums of squares.
+FIVE = "{:.5e}".format
 
 # Balls of a plate that a table has room for.
 MOST_BALLS = 100
 
 
+def _counted(quantity: Quantity) -> str:
+    count = str(quantity.count)
+    return f"{count} ({quantity.undetermined} undetermined)" if quantity.undetermined else count
+
+
+QUANTITY_COLUMNS: dict[str, Any] = {
+    "standard uncertainty of": "description",
+    "maximum": "maximum",
+    "average": "average",
+    "unit": "unit",
+    "count": "count",
+    "undetermined": "undetermined",
+    "largest at": "largest",
+}
+
+
 def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list[str]:
     """U1 to U6 as lines of text; a `caveat` is added to what is said of the target."""
-    rows = [["", "standard uncertainty of", "maximum", "average", "unit", "count", "largest at"]]
-    told: set[str] = set()
-    for symbol, quantity in quantities.items():
-        if ", " in quantity.unit:
-            # Lengths and angles have no common unit; each has a row of its own.
-            continue
-        name = symbol.partition(" ")[0]
-        count = str(quantity.count)
-        if quantity.undetermined:
-            count += f" ({quantity.undetermined} undetermined)"
-        rows.append(
-            [
-                "" if name in told else name,
-                quantity.description,
-                number(1e6 * quantity.maximum),
-                number(1e6 * quantity.average),
-                shown_unit(quantity.unit),
-                count,
-                quantity.largest,
-            ]
-        )
-        told.add(name)
-    lines = aligned(rows, [False, False, True, True, False, False, False])
+    shown = {symbol: one for symbol, one in quantities.items() if ", " not in one.unit}
+    names = [symbol.partition(" ")[0] for symbol in shown]
+    firsts = ["" if name in names[:k] else name for k, name in enumerate(names)]
+    columns = {"": firsts, **QUANTITY_COLUMNS, "count": _counted}
+    lines = table_lines(columns, list(shown.values()), "undetermined")
     places = list(
         dict.fromkeys(place for quantity in quantities.values() for place in quantity.places)
     )
@@ -80,26 +85,20 @@ def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list
 
 def task_table(tasks: Sequence[TaskUncertainty], caveat: str = "") -> list[str]:
     """Measuring tasks as lines of text; a `caveat` is added to what is said of the target."""
-    expanded = f"expanded (k = {tasks[0].expansion:g}), µm"
-    rows = [
-        ["task", "length, mm", "standard uncertainty, µm", expanded, "target, µm", "within target"]
-    ]
-    for task in tasks:
-        rows.append(
-            [
-                task.name,
-                number(1e3 * task.length, 6),
-                *(number(1e6 * u) for u in (task.standard_uncertainty, task.expanded_uncertainty)),
-                "" if task.target is None else number(1e6 * task.target),
-                _judged(task),
-            ]
-        )
+    columns = {
+        "task": "name",
+        "length, mm": ("length", 6),
+        "standard uncertainty, µm": "standard_uncertainty",
+        f"expanded (k = {tasks[0].expansion:g}), µm": "expanded_uncertainty",
+        "target, µm": "target",
+        "within target": _judged,
+    }
     with_target = any(task.target is not None for task in tasks)
     by = next(
         (uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), ""
     )
     note = [f"(the target is compared with the {by}{caveat})"] if with_target else []
-    return [*aligned(rows, [False, True, True, True, True, False]), *note]
+    return [*table_lines(columns, tasks), *note]
 
 
 def _judged(task: TaskUncertainty) -> str:
@@ -109,12 +108,10 @@ def _judged(task: TaskUncertainty) -> str:
 
 
 def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
-    """Measuring tasks as plain data in metres; what is undetermined is None."""
+    """Measuring tasks as plain data in metres."""
     return {
         task.name: {
-            "length": task.length,
-            "standard_uncertainty": finite(task.standard_uncertainty),
-            "expanded_uncertainty": finite(task.expanded_uncertainty),
+            **picked(task, "length", "standard_uncertainty", "expanded_uncertainty"),
             "coverage_factor": task.expansion,
             "target": task.target,
             **({} if task.target is None else {"target_coverage_factor": task.coverage_factor}),
@@ -167,6 +164,16 @@ def verdict_lines(
         lines.append(f"all directions together: {_lengths_words(lengths)}")
     lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
+
+
+def iteration_lines(record: Sequence[Iteration], shown: Callable[[float], str] = FIVE) -> list[str]:
+    """The record of iterations as lines of text, with steps as `shown`."""
+    columns = {
+        "iteration": range(len(record)),
+        "step": ([None, *(one.step for one in record[1:])], shown),
+        "S^2": ("sum_of_squares", FIVE),
+    }
+    return table_lines(columns, record)
 
 
 def map_lines(experiment: Experiment | None) -> list[str]:
@@ -260,20 +267,14 @@ def scale_data(scale: Scale | None) -> dict[str, Any] | None:
     loose = scale.loosened
     return {
         "standard_uncertainty": scale.uncertainty,
-        "carried_by": [
-            {"text": one.words, "without": None if one.without is None else finite(one.without)}
-            for one in scale.carriers
-        ],
+        "carried_by": [{"text": one.words, "without": one.without} for one in scale.carriers],
         "rests_on_exact_offsets": scale.rests_on_offsets,
-        "with_uncertain_offsets": (
-            None
-            if loose is None
-            else {
-                "standard_uncertainty": loose.offset_uncertainty,
-                "U6_average": loose.average,
-                "U6_maximum": loose.maximum,
-            }
-        ),
+        "with_uncertain_offsets": loose
+        and {
+            "standard_uncertainty": loose.offset_uncertainty,
+            "U6_average": loose.average,
+            "U6_maximum": loose.maximum,
+        },
     }
 
 
@@ -295,78 +296,67 @@ def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_B
     """
     title = "co-ordinates of the balls in the plate's own axes"
     lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
-    rows = [["ball", "x, mm", "y, mm", "standard uncertainty of x, µm", "of y, µm"]]
-    for name, values, uncertainties in zip(
-        plate.names, plate.coordinates, plate.standard_uncertainties, strict=True
-    ):
-        x, y = (
-            to_uncertainty(1e3 * v, 1e3 * u) for v, u in zip(values, uncertainties, strict=True)
-        )
-        rows.append([name, x, y, *(number(1e6 * u, 3) for u in uncertainties)])
-    lines += aligned(rows[: most + 1], [False, True, True, True, True])
-    return lines + (
-        [f"({len(rows) - 1 - most} balls more in --json)"] if len(rows) - 1 > most else []
-    )
+    (x, y), (u, v) = plate.coordinates[:most].T, plate.standard_uncertainties[:most].T
+    columns = {
+        "ball": list(plate.names[:most]),
+        "x, mm": (x, u),
+        "y, mm": (y, v),
+        "standard uncertainty of x, µm": (u, 3),
+        "of y, µm": (v, 3),
+    }
+    left = len(plate.names) - most
+    more = [f"({left} balls more in --json)"] if left > 0 else []
+    return [*lines, *table_lines(columns), *more]
+
+
+def _turned(name: str) -> Callable[[Adjustment], float]:
+    """A figure of an adjustment in the unit that mechanics read."""
+    return lambda one: float(getattr(one, name) / (ARCSECOND if one.unit == "rad" else 1e-6))
+
+
+ADJUSTMENT_COLUMNS: dict[str, Any] = {
+    "adjustment": "what",
+    "is off by": _turned("value"),
+    "standard uncertainty": _turned("standard_uncertainty"),
+    "expanded, 95 %": _turned("expanded_uncertainty"),
+    "unit": lambda one: "arcsec" if one.unit == "rad" else "µm/m",
+    "what to do": "words",
+}
 
 
 def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
     """Adjustments as a table of text."""
-    rows = [
-        ["adjustment", "is off by", "standard uncertainty", "expanded, 95 %", "unit", "what to do"]
-    ]
-    for one in adjustments:
-        shown = ARCSECOND if one.unit == "rad" else 1e-6
-        value, u, expanded = (
-            number(v / shown)
-            for v in (one.value, one.standard_uncertainty, one.expanded_uncertainty)
-        )
-        rows.append(
-            [one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "µm/m", one.words]
-        )
     return [
-        *aligned(rows, [False, True, True, True, False, False]),
-        ("(errors of scales: true length less reading; errors of angles: excess over 90 deg)"),
+        *table_lines(ADJUSTMENT_COLUMNS, adjustments),
+        "(errors of scales: true length less reading; errors of angles: excess over 90 deg)",
     ]
 
 
 def adjustment_data(adjustments: Sequence[Adjustment]) -> dict[str, Any]:
-    """Adjustments as plain data; what is open is None."""
-    return {
-        one.name: {
-            "what": one.what,
-            "value": finite(one.value),
-            "standard_uncertainty": finite(one.standard_uncertainty),
-            "expanded_uncertainty": finite(one.expanded_uncertainty),
-            "unit": one.unit,
-            "words": one.words,
-        }
-        for one in adjustments
-    }
+    """Adjustments as plain data."""
+    names = "what", "value", "standard_uncertainty", "expanded_uncertainty", "unit", "words"
+    return by_name(adjustments, *names)
 
 
 def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
-    """A plate's co-ordinates in its own axes as plain data in metres; what is undetermined is
-    None.
-    """
+    """A plate's co-ordinates in its own axes as plain data in metres."""
     axes = plate.axes
     return {
         "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
-        "balls": {
-            name: {
-                axis: {
-                    "value": finite(value),
-                    "standard_uncertainty": finite(uncertainty),
-                    "unit": "m",
-                }
-                for axis, value, uncertainty in zip("xy", values, uncertainties, strict=True)
-            }
-            for name, values, uncertainties in zip(
-                plate.names,
-                plate.coordinates.tolist(),
-                plate.standard_uncertainties.tolist(),
-                strict=True,
-            )
-        },
+        "balls": coordinates_data(plate.names, plate.coordinates, plate.standard_uncertainties),
+    }
+
+
+def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None) -> dict[str, Any]:
+    """Co-ordinates (n, 2) by balls and axes, with their standard uncertainties."""
+    keys = ("value",) if u is None else ("value", "standard_uncertainty")
+    rows = np.stack([one for one in (values, u) if one is not None], axis=2)
+    return {
+        name: {
+            axis: {**dict(zip(keys, cell, strict=True)), "unit": "m"}
+            for axis, cell in zip("xy", row, strict=True)
+        }
+        for name, row in zip(names, rows.tolist(), strict=True)
     }
 
 
@@ -379,35 +369,27 @@ def quantity_data(q: Quantity) -> dict[str, Any]:
     if q.within_target is not None:
         compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
     return {
-        "maximum": finite(q.maximum),
-        "average": finite(q.average),
-        "unit": q.unit,
-        "count": q.count,
-        "undetermined": q.undetermined,
+        **picked(q, "maximum", "average", "unit", "count", "undetermined"),
         "largest_at": q.largest,
-        **({"largest_places": list(q.places)} if q.places else {}),
+        **given(largest_places=q.places),
         **compared,
-        **({"parameters": {name: finite(u) for name, u in q.parameters}} if q.parameters else {}),
+        **given(parameters=dict(q.parameters)),
         "description": q.description,
     }
 
 
 def verdict_data(judged: Verdict) -> dict[str, Any]:
     return {
-        "parameters": judged.parameters,
-        "observations": judged.observations,
+        **picked(judged, "parameters", "observations"),
         "rank_deficiency": judged.deficiency,
         "expected_rank_deficiency": judged.expected,
-        "as_expected": judged.as_expected,
-        "singular_values": [float(v) for v in judged.singular_values],
-        "gap": finite(judged.gap),
-        "undetermined": [str(direction) for direction in judged.null],
-        "reasons": list(judged.reasons),
+        **picked(judged, "as_expected", "singular_values", "gap"),
+        "undetermined": list(map(str, judged.null)),
+        "reasons": judged.reasons,
         "weakly_determined": [
             {
                 "text": str(direction),
-                "standard_deviation": direction.standard_deviation,
-                "points": direction.points,
+                **picked(direction, "standard_deviation", "points"),
                 "points_beyond_limit": direction.beyond,
                 "limit": direction.limit,
             }

@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.settings import hint, number_of
 
-from ..presentation.formatting import picked
+from ..presentation.columns import table_rows
+from ..presentation.formatting import given, picked
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
@@ -21,6 +22,7 @@ from ..uncertainty.tasks import TaskUncertainty
 from .asked import SpaceView, picture_in_space, shown_in_space
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .parts import (
+    QUANTITY_COLUMNS,
     map_lines,
     quantities_data,
     quantity_data,
@@ -97,27 +99,24 @@ class Prediction(Result):
     def table_lines(self) -> list[str]:
         """The same without replicates: title, verdict and table."""
         rank, *others = verdict_lines(self.verdict, with_values=True, lengths=self.lengths)
-        lines = [f"{self.label}: {self.title}", rank, *scale_warnings(self.scale), *others]
+        lines = [self.heading, rank, *scale_warnings(self.scale), *others]
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
         lines += ["", *influence_table(self.influences)] if self.influences else []
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found = {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             **verdict_data(self.verdict),
             "sigma": 1.0,
             "quantities": quantities_data(self.quantities),
-            **(
-                {}
-                if self.quantities or self.lengths is None
-                else {"lengths": quantity_data(self.lengths)}
+            **given(
+                lengths=None if self.quantities else self.lengths and quantity_data(self.lengths),
+                tasks=task_data(self.tasks),
+                influences=influence_data(self.influences),
             ),
-            **({"tasks": task_data(self.tasks)} if self.tasks else {}),
-            **({"influences": influence_data(self.influences)} if self.influences else {}),
             "scale": scale_data(self.scale),
             **({} if self.advice is None else self.advice.data),
         }
@@ -126,6 +125,17 @@ class Prediction(Result):
         from ..montecarlo.comparison_tables import trials_data
 
         return found | {"monte_carlo": trials_data(self.monte_carlo)}
+
+    def __getitem__(self, symbol: str) -> Quantity:
+        """A quantity by its symbol: its average and maximum, and their unit.
+
+        :raises KeyError: the prediction has no quantity of that symbol.
+
+        >>> import ballplate as bp
+        >>> bp.run(bp.quickstart())["U6"].unit
+        'm'
+        """
+        return by_label(self.quantities, symbol)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The positions in the volume, by their names or, where there are many, by their numbers.
@@ -154,16 +164,13 @@ class Prediction(Result):
         U6.
         """
         if self.quantities:
-            return [
-                {"symbol": symbol, **quantity_row(quantity)}
-                for symbol, quantity in self.quantities.items()
-            ]
+            columns = {"symbol": list(self.quantities), **QUANTITY_COLUMNS}
+            return table_rows(columns, list(self.quantities.values()))
         judged, lengths = self.verdict, self.lengths
         return [
             {
                 "rank": rank_words(judged),
-                "parameters": judged.parameters,
-                "observations": judged.observations,
+                **picked(judged, "parameters", "observations"),
                 "rank deficiency": judged.deficiency,
                 "as expected": judged.as_expected,
                 "weakly determined": len(judged.weak),
@@ -174,18 +181,22 @@ class Prediction(Result):
         ]
 
 
+Named = TypeVar("Named")
+
+
+def by_label(items: Mapping[str, Named], name: str) -> Named:
+    """The item of a name.
+
+    :raises KeyError: there is none.
+    """
+    if name not in items:
+        raise KeyError(f"no {name!r}; {hint(str(name), items)}")
+    return items[name]
+
+
 def rank_words(judged: Verdict) -> str:
     """The rank in two words."""
     return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
-
-
-def quantity_row(quantity: Quantity) -> dict[str, Any]:
-    """A quantity as the row of a table, in its own unit."""
-    return {
-        "standard uncertainty of": quantity.description,
-        **picked(quantity, "maximum", "average", "unit", "count", "undetermined"),
-        "largest at": quantity.largest,
-    }
 
 
 def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:

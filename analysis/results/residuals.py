@@ -15,8 +15,6 @@ from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..presentation.formatting import finite
-
 # Residuals that a fit names.
 LARGEST = 10
 
@@ -85,8 +83,7 @@ def residual_groups(
     design: Design, solution: Solution, x: Array, sigma: float
 ) -> dict[str, list[dict[str, Any]]]:
     """Root mean squares of the readings' residuals by position, by probe and by axis, as plain
-    data in metres and in standard uncertainties, which `sigma` multiplies; NaN makes the latter
-    None.
+    data in metres and in standard uncertainties, which `sigma` multiplies.
     """
     readings, values, standardised = reading_residuals(design, solution, x)
     is_read = measured(design, readings)
@@ -103,7 +100,7 @@ def residual_groups(
                 "name": names[k],
                 "count": int(own.sum()),
                 "root_mean_square": float(np.sqrt((values[own] ** 2).mean())),
-                "standardised": finite(float(np.sqrt((standardised[own] ** 2).mean())) / sigma),
+                "standardised": float(np.sqrt((standardised[own] ** 2).mean())) / sigma,
             }
             for k in np.unique(of_group).tolist()
             for own in [(of_group == k) & is_read]

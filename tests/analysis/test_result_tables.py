@@ -141,3 +141,20 @@ def test_names_mean_nothing_but_themselves() -> None:
         "a &lt; b &amp; c" in bp.run(named).to_html()
         and r"a \< b & c \| d" in bp.run(named).to_markdown()
     )
+
+
+def test_quantities_and_parameters_are_found_by_their_names(results: list[Result]) -> None:
+    prediction, fit = results[0], results[2]
+    assert isinstance(prediction, Prediction) and isinstance(fit, Fit)
+    assert prediction["U6"] is prediction.quantities["U6"]
+    data = fit.to_dict()["estimates"]
+    for name in ("EXX[1]", "x low: origin x", "r1c2: x"):
+        found = fit[name]
+        assert data[name] == {
+            "value": found.value,
+            "standard_uncertainty": found.standard_uncertainty,
+            "unit": found.unit,
+        }
+    for result, name, hint in ((prediction, "U7", "U1"), (fit, "EXX[11]", "EXX[1]")):
+        with pytest.raises(KeyError, match=re.escape(hint)):
+            result[name]

@@ -11,7 +11,8 @@ from ballplate.planning.constraints import HOUR
 from ballplate.planning.orders import LEAST_CHANGE_OVER, ORDERS, ReadingOrder
 from ballplate.planning.schedule import run_sheet
 from ballplate.planning.selection import Campaign
-from ballplate.presentation.formatting import aligned, finite, number
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import finite, number
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool, Position
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 
@@ -118,43 +119,42 @@ def _impossible(experiment: Experiment, text: str) -> ExperimentError:
 
 def _order_table(size: DriftSize, effects: Sequence[DriftEffect], campaign: Campaign) -> list[str]:
     """What a drift does in each order, and which one is chosen."""
-    rows = [
-        [
-            "order",
-            "hours",
-            "change-over, h",
-            f"{number(1e6 * size.point)} µm/h does",
-            f"{number(1e6 * size.scale)} ppm/h does",
-            "U6, no drift",
-            "drift estimated",
-            "",
-        ]
-    ]
     budget = campaign.budget.seconds
-    for one in effects:
-        is_over = budget is not None and one.seconds > budget * (1.0 + 1e-9)
-        words = ["chosen"] if one.order == campaign.order.name else []
-        words += ["more hours than allowed"] if is_over else []
-        values = (one.of_point, one.of_scale, one.without, one.estimated)
-        rows.append(
-            [
-                ORDERS[one.order],
-                f"{one.seconds / HOUR:.2f}",
-                f"{one.change_seconds / HOUR:.2f}",
-                *(number(1e6 * value) for value in values),
-                ", ".join(words),
-            ]
-        )
+
+    def remarks(effect: DriftEffect) -> str:
+        is_over = budget is not None and effect.seconds > budget * (1.0 + 1e-9)
+        words = ["chosen"] if effect.order == campaign.order.name else []
+        return ", ".join(words + (["more hours than allowed"] if is_over else []))
+
+    columns = {
+        "order": lambda effect: ORDERS[effect.order],
+        "hours": ("seconds", _hours),
+        "change-over, h": ("change_seconds", _hours),
+        f"{number(1e6 * size.point)} µm/h does": ("of_point", _micrometres),
+        f"{number(1e6 * size.scale)} ppm/h does": ("of_scale", _micrometres),
+        "U6, no drift": ("without", _micrometres),
+        "drift estimated": ("estimated", _micrometres),
+        "": remarks,
+    }
+    table = table_lines(columns, effects)
     places = (step.candidate for step in campaign.sheet.steps)
     if not is_of_plates(campaign.experiment, places):
         why = "no figures of drift: that of length standards is not followed"
-        return [*aligned(rows, [False, *[True] * 6, False]), why]
+        return [*table, why]
     return [
-        *aligned(rows, [False, *[True] * 6, False]),
+        *table,
         "what a drift that nobody knows of changes a distance between corrected points by at"
         " most, and the mean uncertainty of these distances; µm",
         *_chosen_without_drift(campaign),
     ]
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / HOUR:.2f}"
+
+
+def _micrometres(value: float) -> str:
+    return number(1e6 * value)
 
 
 def _chosen_without_drift(campaign: Campaign) -> list[str]:

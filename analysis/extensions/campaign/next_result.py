@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
-from ballplate.presentation.formatting import finite, number
+from ballplate.presentation.columns import table_rows
+from ballplate.presentation.formatting import number
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import freedom_words
 from ballplate.results.fit import Fit
@@ -166,45 +167,39 @@ class NextStep(Result):
         doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
         return (*self.observed.told, *doubts)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         fit = self.fit
         lengths = None if fit is None else fit.quantities.get("U6")
         times = 1.0 if fit is None else self.sigma / fit.sigma
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "goal": str(self.goal),
-            "read": list(self.read),
+            "read": self.read,
             "missing": dict(self.missing),
-            "redone": list(self.observed.redone),
+            "redone": self.observed.redone,
             "target_met": self.is_met,
             "verdict": self._verdict(),
             "why_no_estimate": self.why or None,
-            "sigma": None if fit is None else self.sigma,
-            "sigma_bound": finite(self.bound),
-            "degrees_of_freedom": None if fit is None else fit.sum_freedom,
-            "suspected": list(self.suspected),
-            "U6_average": None if lengths is None else finite(times * lengths.average),
-            "U6_maximum": None if lengths is None else finite(times * lengths.maximum),
+            "sigma": fit and self.sigma,
+            "sigma_bound": self.bound,
+            "degrees_of_freedom": fit and fit.sum_freedom,
+            "suspected": self.suspected,
+            "U6_average": lengths and times * lengths.average,
+            "U6_maximum": lengths and times * lengths.maximum,
             "goal_met": self.now is not None and self.now.is_met,
             "goal_met_at_bound": self.is_sure,
-            "next": None if self.next is None else self.next.name,
-            "offered": [
-                {name: finite(one) if isinstance(one, float) else one for name, one in row.items()}
-                for row in self.rows()
-            ],
-            "remarks": list(self.notes),
+            "next": self.next and self.next.name,
+            "offered": self.rows(),
+            "remarks": self.notes,
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each position that can be read next, the best first; U6 in metres."""
-        return [
-            {
-                "position": one.name,
-                "readings": one.readings,
-                "U6 average": one.average,
-                "undetermined": one.then.undetermined,
-                "target met": one.then.is_met,
-            }
-            for one in self.offered
-        ]
+        columns = {
+            "position": "name",
+            "readings": "readings",
+            "U6 average": "average",
+            "undetermined": "then.undetermined",
+            "target met": "then.is_met",
+        }
+        return table_rows(columns, self.offered)

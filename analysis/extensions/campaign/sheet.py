@@ -42,9 +42,9 @@ class Sheet(Result):
         return summary(self.sheet)
 
     def lines(self) -> list[str]:
-        return [f"{self.label}: {self.title}", "", *sheet_lines(self.sheet)]
+        return [self.heading, "", *sheet_lines(self.sheet)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {"experiment": self.label, **sheet_data(self.sheet)}
 
     def rows(self) -> list[dict[str, Any]]:

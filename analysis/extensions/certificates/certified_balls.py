@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number, to_uncertainty
+from ballplate.presentation.formatting import aligned, number, picked, to_uncertainty
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import freedom_words
 from ballplate.simulator.inputs.settings import listing
@@ -110,7 +110,7 @@ class CertifiedBalls(Result):
             known = f"uncertainties scaled by the residuals, {freedom_words(int(freedom))}"
         told = {
             "plate": self.artefact,
-            "experiment": f"{self.label}: {self.title}",
+            "experiment": self.heading,
             "identifier": self.identifier,
             "axes": self.datum,
             "scale": (
@@ -165,16 +165,14 @@ class CertifiedBalls(Result):
         lengths = aligned(self.distance_table(), [False, False, True, True])
         return [*facts, "", *table, "", *lengths, "", *self.notes]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         u = self.standard_uncertainties.tolist()
         axes = "xyz"[: self.dimension]
         return {
             **{key.replace(" ", "_"): text for key, text in self.facts.items()},
-            "coverage_factor": self.coverage_factor,
-            "coverage_probability": self.coverage_probability,
-            "degrees_of_freedom": finite(self.degrees_of_freedom),
-            "reference_temperature": self.reference_temperature,
-            "scale_uncertainty": self.scale_uncertainty,
+            **picked(self, "coverage_factor", "coverage_probability"),
+            "degrees_of_freedom": self.degrees_of_freedom,
+            **picked(self, "reference_temperature", "scale_uncertainty"),
             "left_out": list(self.left_out),
             "balls": {
                 name: {

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import aligned, given, picked
 from ballplate.presentation.result import Result
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
@@ -27,7 +28,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
 
-from .axis_tables import AxisTables, NotOfAxesError, names_of, tool_chain
+from .axis_tables import AxisTable, AxisTables, NotOfAxesError, names_of, tool_chain
 from .formats import FORMATS
 from .making import CannotMakeError, MadeTable, TabledMachine, correction, made_table
 from .reading import machine_files, read_table_files
@@ -51,8 +52,8 @@ class CompensationTable(Result):
     remarks: tuple[str, ...]
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {remark}" for remark in self.remarks)
+    def warnings(self) -> tuple[str, ...]:
+        return self.remarks
 
     def headline(self) -> str:
         if isinstance(self.table, VolumeTable):
@@ -74,8 +75,7 @@ class CompensationTable(Result):
         if isinstance(self.table, VolumeTable):
             places = np.stack(np.meshgrid(*self.table.nodes, indexing="ij"), axis=-1)
             return [
-                dict(zip(AXES, place, strict=False))
-                | {name: value for name, value in zip(_PARTS, values, strict=True)}
+                dict(zip((*AXES[: len(place)], *_PARTS), (*place, *values), strict=True))
                 for place, values in zip(
                     places.reshape(-1, self.table.dimension).tolist(),
                     self.table.values.reshape(-1, 6).tolist(),
@@ -83,13 +83,12 @@ class CompensationTable(Result):
                 )
             ]
         return [
-            {"axis": AXES[one.axis], "position": position}
-            | {name: value for name, value in zip(_PARTS, values, strict=True)}
+            {"axis": AXES[one.axis], "position": position, **dict(zip(_PARTS, values, strict=True))}
             for one in self.table.axes
             for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True)
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found: dict[str, Any] = {
             "title": self.title,
             "format": self.format.name,
@@ -102,7 +101,7 @@ class CompensationTable(Result):
                 "workpiece_side": list(self.table.arrangement.workpiece_side),
                 "levers_from": self.table.origin,
             }
-        return dict(as_data({**found, "corrections": self.rows(), "warnings": list(self.remarks)}))
+        return {**found, "corrections": self.rows(), "warnings": self.remarks}
 
     def table_lines(self) -> list[str]:
         """What the table is and how large its corrections are."""
@@ -125,19 +124,24 @@ _PARTS = (*(f"displacement {axis}" for axis in AXES), *(f"turn about {axis}" for
 
 
 def _axis_lines(table: AxisTables) -> list[str]:
-    rows = [["", "positions", "from", "to", "largest correction", ""]]
-    for one in table.axes:
-        largest = np.abs(one.values).max(axis=0)
-        names = names_of(one.axis)
-        parts = [
-            f"{name} {1e6 * value:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
-            for name, value in zip(names, largest.tolist(), strict=True)
-            if value > 0.0
-        ]
-        ends = [format_length(float(one.positions[k])) for k in (0, -1)]
-        count = str(len(one.positions))
-        rows.append([AXES[one.axis], count, *ends, ", ".join(parts) or "none", ""])
-    return aligned(rows, [False, True, True, True, False, False])
+    columns = {
+        "": lambda one: AXES[one.axis],
+        "positions": lambda one: len(one.positions),
+        "from": (lambda one: float(one.positions[0]), format_length),
+        "to": (lambda one: float(one.positions[-1]), format_length),
+        "largest correction": _largest,
+    }
+    return table_lines(columns, table.axes)
+
+
+def _largest(one: AxisTable) -> str:
+    """The largest correction of each error of an axis, in words."""
+    parts = [
+        f"{name} {1e6 * value:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
+        for name, value in zip(names_of(one.axis), np.abs(one.values).max(axis=0), strict=True)
+        if value > 0.0
+    ]
+    return ", ".join(parts) or "none"
 
 
 def _volume_lines(table: VolumeTable) -> list[str]:
@@ -194,18 +198,17 @@ class MadeCompensation(CompensationTable):
             NOT_LOADED,
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         made = self.made
-        return super().to_dict() | {
-            **({"fit": self.verdict} if self.verdict else {}),
-            "zero_at": made.zero.tolist(),
+        return super().data() | {
+            **given(fit=self.verdict),
+            "zero_at": made.zero,
             "largest_differences": {
-                "interpolation": made.interpolation,
-                "rounding": made.rounding,
+                **picked(made, "interpolation", "rounding"),
                 "rotations_left_out": made.left_out,
                 "all": made.written,
                 "places": made.places,
-                "probe_offsets": made.offsets.tolist(),
+                "probe_offsets": made.offsets,
             },
         }
 

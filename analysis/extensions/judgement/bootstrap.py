@@ -6,13 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
-    aligned,
-    amount_of,
-    as_data,
-    number,
-    to_uncertainty,
-)
+from ballplate.presentation.columns import table_lines, table_rows
+from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
 from ballplate.results.estimates import EstimatedFunctions, Function, estimated_functions
 from ballplate.simulator.computing.processes import in_processes
@@ -144,28 +139,12 @@ class Bootstrap(Result):
             )
         if len(self.deviations) < 2:
             return [*lines, "too few converged to tell anything"]
-        rows = [["parameter", "value", "u", "standard deviation", "bias", "95 %", "", "unit"]]
-        columns = (self.values, self.uncertainties, self.standard_deviations, self.biases)
-        for k, one in enumerate(self.functions):
-            if one.kind in ("origin", "ball") or not np.isfinite(self.uncertainties[k]):
-                continue
-            value, u, deviation, bias = (
-                amount_of(float(column[k]), one.unit)[0] for column in columns
-            )
-            low, high = (amount_of(float(end), one.unit)[0] for end in self.intervals[k])
-            rows.append(
-                [
-                    one.name,
-                    to_uncertainty(value, u),
-                    number(u, 3),
-                    number(deviation, 3),
-                    to_uncertainty(bias, u),
-                    to_uncertainty(low, u),
-                    to_uncertainty(high, u),
-                    amount_of(1.0, one.unit)[1],
-                ]
-            )
-        lines += aligned(rows, [False, *[True] * 6, False])
+        shown = [
+            row
+            for row in self.rows()
+            if row["kind"] not in ("origin", "ball") and np.isfinite(row["standard uncertainty"])
+        ]
+        lines += table_lines(COLUMNS, shown)
         open_ = int(np.isnan(self.uncertainties).sum())
         if open_:
             lines.append(f"{open_} estimates are undetermined, and are left out")
@@ -179,40 +158,41 @@ class Bootstrap(Result):
         count = len(differing)
         return [*lines, f"{count} standard deviations are not {told}: {names}"]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
-            "trials": self.trials,
-            "seed": self.seed,
+            **picked(self, "trials", "seed"),
             "not_converged": {str(k): words for k, words in self.failed},
-            "differing": list(self.differing),
-            "estimates": as_data(self.rows()),
+            "differing": self.differing,
+            "estimates": self.rows(),
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each estimate; what is undetermined is NaN."""
-        columns = zip(
-            self.functions,
-            self.values.tolist(),
-            self.uncertainties.tolist(),
-            self.standard_deviations.tolist(),
-            self.biases.tolist(),
-            self.intervals.tolist(),
-            strict=True,
-        )
-        return [
-            {
-                "parameter": one.name,
-                "kind": one.kind,
-                "value": value,
-                "standard uncertainty": u,
-                "standard deviation": deviation,
-                "bias": bias,
-                "95 % from": low,
-                "95 % to": high,
-                "unit": one.unit,
-            }
-            for one, value, u, deviation, bias, (low, high) in columns
-        ]
+        columns = {
+            "parameter": "name",
+            "kind": "kind",
+            "value": self.values,
+            "standard uncertainty": self.uncertainties,
+            "standard deviation": self.standard_deviations,
+            "bias": self.biases,
+            "95 % from": self.intervals[:, 0],
+            "95 % to": self.intervals[:, 1],
+            "unit": "unit",
+        }
+        return table_rows(columns, self.functions)
+
+
+U = "standard uncertainty"
+COLUMNS = {
+    "parameter": "parameter",
+    "value": ("value", U),
+    "u": (U, 3),
+    "standard deviation": ("standard deviation", 3),
+    "bias": ("bias", U),
+    "95 %": ("95 % from", U),
+    "": ("95 % to", U),
+    "unit": "unit",
+}
 
 
 @single_threaded

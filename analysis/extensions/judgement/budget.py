@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number
+from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom
 from ballplate.results.fit import Fit
@@ -80,7 +80,7 @@ class UncertaintyBudget(Result):
         of = "the fit" if self.of_fit else "the design, at zero machine error"
         chosen = _ranking(self.figures)
         order = f"; sources by their part of {chosen.name}, the largest first" if chosen else ""
-        lines = [f"{self.label}: {self.title}", f"uncertainty budget of {of}{order}", ""]
+        lines = [self.heading, f"uncertainty budget of {of}{order}", ""]
         for start in range(0, len(self.figures), SIDE_BY_SIDE):
             lines += [*self._table(self.figures[start : start + SIDE_BY_SIDE]), ""]
         lines += [f"{one.name}: {_words(one)}" for one in self.figures]
@@ -111,39 +111,35 @@ class UncertaintyBudget(Result):
             )
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "of": "fit" if self.of_fit else "design",
-            "sigma": self.sigma,
-            "coverage_factor": self.coverage_factor,
+            **picked(self, "sigma", "coverage_factor"),
             "figures": [
                 {
                     "figure": one.name,
-                    "description": one.description,
-                    "standard_uncertainty": finite(one.standard_uncertainty),
-                    "expanded_uncertainty": finite(self.coverage_factor * one.standard_uncertainty),
+                    **picked(one, "description", "standard_uncertainty"),
+                    "expanded_uncertainty": self.coverage_factor * one.standard_uncertainty,
                     "unit": "m",
-                    "count": one.count,
-                    "undetermined": one.undetermined,
+                    **picked(one, "count", "undetermined"),
                     "contributions": [
                         {
                             "source": source,
-                            "standard_uncertainty": finite(one.contributions[k]),
-                            "share_of_variance": finite(_ratio(one, k)),
+                            "standard_uncertainty": one.contributions[k],
+                            "share_of_variance": _ratio(one, k),
                         }
                         for k, source in enumerate(self.sources)
                     ],
                 }
                 for one in self.figures
             ],
-            "warnings": [self.caution] if self.caution else [],
+            "warnings": self.warnings,
         }
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return (f"warning: {self.caution}",) if self.caution else ()
+    def warnings(self) -> tuple[str, ...]:
+        return (self.caution,) if self.caution else ()
 
 
 def _ratio(one: BudgetFigure, k: int) -> float:

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import aligned, finite, number, picked
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.results.adjustments import freedom_words
 from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -17,7 +18,7 @@ from .rung_choice import FALSE_STEP, Beaten, Criteria
 from .rungs import FILE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    pass
 
 # Criteria closer than this are the same but for rounding.
 SAME_CRITERION = 1e-2
@@ -156,42 +157,28 @@ class ComparedModels(FitResult):
     def lines(self) -> list[str]:
         how = "given" if self.sigma_is_given else "estimated"
         test = "chi-squared" if self.sigma_is_given else "F"
-        heads = ["", "parameters", "freedom", "sigma", f"{test}: chance", "AIC", "BIC"]
-        rows = [[*heads, "largest change", "rms, µm", ""]]
         least = [min(getattr(one.criteria, key) for one in self.rungs) for key in ("aic", "bic")]
-        for one in self.rungs:
-            marks = [
-                words
-                for words, is_so in (
-                    ("recommended", one.is_recommended and not self.is_none),
-                    ("the file's", one.is_of_file and not one.model.startswith(FILE)),
-                    (f"{one.undetermined} undetermined", one.undetermined > 0),
-                )
-                if is_so
-            ]
-            rows.append(
-                [
-                    one.model,
-                    str(one.parameters),
-                    str(one.degrees_of_freedom),
-                    f"{one.sigma:.4g}",
-                    chance_words(one.beaten.chance) if one.beaten.count else "-",
-                    f"{one.criteria.aic - least[0]:.1f}",
-                    f"{one.criteria.bic - least[1]:.1f}",
-                    self._length(one.change.largest),
-                    self._length(one.change.rms),
-                    f"<- {', '.join(marks)}" if marks else "",
-                ]
-            )
+        columns = {
+            "": "model",
+            "parameters": "parameters",
+            "freedom": "degrees_of_freedom",
+            "sigma": ("sigma", "{:.4g}".format),
+            f"{test}: chance": (_chance, lambda one: "-" if math.isnan(one) else chance_words(one)),
+            "AIC": (lambda one: one.criteria.aic - least[0], "{:.1f}".format),
+            "BIC": (lambda one: one.criteria.bic - least[1], "{:.1f}".format),
+            "largest change": ("change.largest", self._length),
+            "rms, µm": ("change.rms", self._length),
+            " ": self._marks,
+        }
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"error models on the same readings, sigma {how}; chance: that a richer model"
                 f" explains so much more by chance, all richer ones together; AIC and BIC above the"
                 f" least; changes of lengths from {self.recommended}"
             ),
             "",
-            *aligned(rows, [False, *[True] * 8, False]),
+            *table_lines(columns, self.rungs),
             self._of_lengths(),
             "",
             *self._of_repeats(),
@@ -199,6 +186,15 @@ class ComparedModels(FitResult):
         if self.beyond:
             lines.append(f"not determined by this design, and no candidates: {self._beyond()}")
         return [*lines, *self.verdict()]
+
+    def _marks(self, one: Rung) -> str:
+        marks = {
+            "recommended": one.is_recommended and not self.is_none,
+            "the file's": one.is_of_file and not one.model.startswith(FILE),
+            f"{one.undetermined} undetermined": one.undetermined > 0,
+        }
+        words = ", ".join(word for word, is_so in marks.items() if is_so)
+        return f"<- {words}" if words else ""
 
     def _beyond(self) -> str:
         return "; ".join(self.beyond)
@@ -229,35 +225,42 @@ class ComparedModels(FitResult):
             f"{told}; lack of fit of {self.recommended}: chance {chance_words(self.lack_of_fit)}"
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "recommended": None if self.is_none else self.recommended,
             "error_model": None if self.is_none else self.error_model,
-            "unexplained": list(self.faults),
-            "sigma_is_given": self.sigma_is_given,
-            "sigma": self.sigma,
-            "repeats": {
-                "sum_of_squares": self.repeats.sum_of_squares,
-                "degrees_of_freedom": self.repeats.degrees_of_freedom,
-            },
-            "lack_of_fit": finite(self.lack_of_fit),
-            "undetermined_models": list(self.beyond),
-            "lengths": {
-                "maximum": finite(self.lengths.maximum),
-                "average": finite(self.lengths.average),
-                "undetermined": self.lengths.undetermined,
-                "unit": "m",
-            },
+            "unexplained": self.faults,
+            **picked(self, "sigma_is_given", "sigma"),
+            "repeats": picked(self.repeats, "sum_of_squares", "degrees_of_freedom"),
+            "lack_of_fit": self.lack_of_fit,
+            "undetermined_models": self.beyond,
+            "lengths": {**picked(self.lengths, "maximum", "average", "undetermined"), "unit": "m"},
             "compared_with": self.recommended,
-            "rungs": [_rung_data(one, self.lengths.undetermined > 0) for one in self.rungs],
+            "rungs": self.rows(),
             **self.said(),
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each error model."""
-        return [_rung_data(one, self.lengths.undetermined > 0) for one in self.rungs]
+        lengths_are_open = self.lengths.undetermined > 0
+        names = ("model", "parameters", "degrees_of_freedom", "sum_of_squares")
+        return [
+            {
+                **picked(one, *names),
+                **vars(one.criteria),
+                "chance": one.beaten.chance if one.beaten.count else None,
+                "richer_models": one.beaten.count,
+                "best_richer_model": one.beaten.by or None,
+                "largest_change": None if lengths_are_open else one.change.largest,
+                "rms_change": None if lengths_are_open else one.change.rms,
+                "unit": "m",
+                "recommended": one.is_recommended,
+                "of_the_file": one.is_of_file,
+                "undetermined": one.undetermined,
+            }
+            for one in self.rungs
+        ]
 
     @property
     def complaint(self) -> str:
@@ -266,20 +269,5 @@ class ComparedModels(FitResult):
         return "none of the error models explains the readings" if self.is_none else ""
 
 
-def _rung_data(one: Rung, lengths_are_open: bool) -> dict[str, Any]:
-    change: Sequence[float] = (one.change.largest, one.change.rms)
-    largest, rms = (None if lengths_are_open else value for value in change)
-    return {
-        **picked(one, "model", "parameters", "degrees_of_freedom", "sum_of_squares"),
-        "aic": one.criteria.aic,
-        "bic": one.criteria.bic,
-        "chance": one.beaten.chance if one.beaten.count else None,
-        "richer_models": one.beaten.count,
-        "best_richer_model": one.beaten.by or None,
-        "largest_change": largest,
-        "rms_change": rms,
-        "unit": "m",
-        "recommended": one.is_recommended,
-        "of_the_file": one.is_of_file,
-        "undetermined": one.undetermined,
-    }
+def _chance(one: Rung) -> float:
+    return one.beaten.chance if one.beaten.count else math.nan

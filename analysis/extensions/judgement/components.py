@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.leftover import leftover, too_many_entries
-from ballplate.presentation.formatting import aligned, finite, number, picked
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
 from ballplate.results.groupings import Grouping
 from ballplate.results.observation_groups import ObservationGroup, groups_of
@@ -99,55 +100,27 @@ class VarianceComponents(Result):
         return f"{words}; {LARGER}: {', '.join(larger)}" if larger else words
 
     def lines(self) -> list[str]:
-        rows = [
-            [
-                f"variance by {self.by}",
-                "observations",
-                "redundancy",
-                "ratio to stated",
-                "standard uncertainty",
-                "95 % from",
-                "to",
-                "",
-            ]
-        ]
-        for one in self.groups:
-            numbers = (one.ratio, one.standard_uncertainty, one.lower, one.upper)
-            rows.append(
-                [
-                    one.name,
-                    str(one.observations),
-                    f"{one.redundancy:.2f}",
-                    *(number(value, 3) for value in numbers),
-                    one.verdict,
-                ]
-            )
-        return aligned(rows, [False, True, True, True, True, True, True, False])
+        columns = {f"variance by {self.by}": "name", **COLUMNS, "": "verdict"}
+        return table_lines(columns, self.groups)
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each group."""
-        return [
-            {
-                "group": one.name,
-                **picked(
-                    one,
-                    "observations",
-                    "redundancy",
-                    "ratio",
-                    "standard_uncertainty",
-                    "lower",
-                    "upper",
-                    "verdict",
-                ),
-            }
-            for one in self.groups
-        ]
+        names = ("observations", "redundancy", *RATIO, "verdict")
+        return [{"group": one.name, **picked(one, *names)} for one in self.groups]
 
-    def to_dict(self) -> dict[str, Any]:
-        groups = self.rows()
-        for row in groups:
-            row |= {name: finite(one) for name, one in row.items() if isinstance(one, float)}
-        return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": groups}
+    def data(self) -> dict[str, Any]:
+        return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": self.rows()}
+
+
+RATIO = ("ratio", "standard_uncertainty", "lower", "upper")
+COLUMNS = {
+    "observations": "observations",
+    "redundancy": ("redundancy", "{:.2f}".format),
+    "ratio to stated": ("ratio", 3),
+    "standard uncertainty": ("standard_uncertainty", 3),
+    "95 % from": ("lower", 3),
+    "to": ("upper", 3),
+}
 
 
 def too_many_groups(design: Design, groups: Sequence[ObservationGroup]) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.formatting import aligned, as_data, number, picked
+from ballplate.presentation.columns import table_rows
+from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
@@ -109,7 +110,7 @@ class Validation(FitResult):
         for one in self.left_out:
             rows.append([one.kind, one.name, *_cells(one, k), "<- failed" * (one in failed)])
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 "each left out in turn and predicted from all others; its pose, and balls read"
                 " nowhere else, come from its own readings; uncertainties of prediction errors"
@@ -137,11 +138,10 @@ class Validation(FitResult):
             ),
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
-            "experiment": self.label,
-            "title": self.title,
-            "sigma_is_given": self.sigma_is_given,
+            **self.named,
+            **picked(self, "sigma_is_given"),
             "left_out": [_data(one) for one in self.left_out],
             "failed": [f"{one.kind} {one.name}" for one in self.failed],
             **self.said(),
@@ -149,23 +149,21 @@ class Validation(FitResult):
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each that was left out."""
-        return [
-            {
-                "kind": one.kind,
-                "left out": one.name,
-                "predicted": one.predicted,
-                "mean square error": one.mean_square,
-                "sigma": one.sigma,
-                "chance": one.chance,
-                "largest standardised error": None if one.worst is None else one.worst.standardised,
-                "length change": None if one.lengths is None else one.lengths.change,
-                "standard uncertainty": (
-                    None if one.lengths is None else one.lengths.standard_uncertainty
-                ),
-                "unit": "m",
-            }
-            for one in self.left_out
-        ]
+        return table_rows(COLUMNS, self.left_out)
+
+
+COLUMNS = {
+    "kind": "kind",
+    "left out": "name",
+    "predicted": "predicted",
+    "mean square error": "mean_square",
+    "sigma": "sigma",
+    "chance": "chance",
+    "largest standardised error": "worst.standardised",
+    "length change": "lengths.change",
+    "standard uncertainty": "lengths.standard_uncertainty",
+    "unit": lambda one: "m",
+}
 
 
 def _cells(one: PredictedGroup, k: float) -> list[str]:
@@ -188,18 +186,10 @@ def _cells(one: PredictedGroup, k: float) -> list[str]:
 
 
 def _data(one: PredictedGroup) -> dict[str, Any]:
-    found: dict[str, Any] = as_data(
-        {
-            **picked(one, "kind", "name", "converged", "predicted"),
-            "mean_square_error": one.mean_square,
-            "sigma": one.sigma,
-            "chance": one.chance,
-            "worst_reading": None if one.worst is None else vars(one.worst),
-            "largest_length_difference": (
-                None
-                if one.lengths is None
-                else {**vars(one.lengths), "between": list(one.lengths.between), "unit": "m"}
-            ),
-        }
-    )
-    return found
+    return {
+        **picked(one, "kind", "name", "converged", "predicted"),
+        "mean_square_error": one.mean_square,
+        **picked(one, "sigma", "chance"),
+        "worst_reading": one.worst and vars(one.worst),
+        "largest_length_difference": one.lengths and {**vars(one.lengths), "unit": "m"},
+    }

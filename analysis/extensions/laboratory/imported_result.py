@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
 
 from .imported import ImportedReadings
@@ -43,7 +44,7 @@ class ReadReport(Result):
         columns = self.imported.columns()
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             "experiment": self.label,
             "coordinates": self.imported.coordinates,
@@ -51,8 +52,7 @@ class ReadReport(Result):
             "remarks": list(self.remarks),
             "readings": [
                 {
-                    "position": one.position,
-                    "ball": one.ball,
+                    **picked(one, "position", "ball"),
                     "probe": one.probe or None,
                     "centre": list(one.centre[: self.imported.dimension]),
                     "uncertainty": one.uncertainty,

@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.columns import table_lines, table_rows
 from ballplate.presentation.formatting import (
-    aligned,
-    amount_of,
-    as_data,
     number,
-    to_uncertainty,
 )
 from ballplate.presentation.result import Result
+from ballplate.results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
 from ballplate.results.map_of_fit import FRAMES
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
@@ -88,9 +86,9 @@ class ConvertedMap(Result):
         return float(np.abs(self.old.model.error(x, self.old.values, p) - p).max())
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         caution = self.old.known_lack_of_fit.caution
-        return (f"warning: {caution}",) if caution else ()
+        return (caution,) if caution else ()
 
     def headline(self) -> str:
         kind = self.map.settings["kind"]
@@ -104,7 +102,7 @@ class ConvertedMap(Result):
     def lines(self) -> list[str]:
         old, new, k = self.old, self.map, self.old.coverage_factor
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             verdict_line(old.lack_of_fit),
             (
                 f"from {old.settings['kind']}, {len(old.values)} parameters, to"
@@ -142,48 +140,40 @@ class ConvertedMap(Result):
                 f" a shift of {number(1e6 * float(shift), 3)} µm and a turn of"
                 f" {number(1e6 * float(turn), 3)} µrad about one axis at most"
             )
-        rows = [["parameter", "value", "standard uncertainty", "unit"]]
-        for row in self.rows():
-            value, unit = amount_of(row["value"], row["unit"])
-            u, _ = amount_of(row["standard uncertainty"], row["unit"])
-            rows.append([row["parameter"], to_uncertainty(value, u), number(u, 3), unit])
-        return [*lines, "", *aligned(rows, [False, True, True, False])]
+        return [*lines, "", *table_lines(COLUMNS, self._parameters)]
 
-    def to_dict(self) -> dict[str, Any]:
-        found: dict[str, Any] = as_data(
-            {
-                "map": self.label,
-                "title": self.title,
-                "error_model": dict(self.map.settings),
-                "lack_of_fit": verdict_data(self.old.lack_of_fit),
-                "exact": self.is_exact,
-                "residual": {**vars(self.points_searched), "unit": "m"},
-                "lengths": {
-                    **vars(self.lengths_searched),
-                    "standard_uncertainty": self.length_uncertainty,
-                    "unit": "m",
-                },
-                "motion": self.conversion.motion,
-                "parameters": self.rows(),
-            }
-        )
-        return found
+    def data(self) -> dict[str, Any]:
+        return {
+            "map": self.label,
+            "title": self.title,
+            "error_model": self.map.settings,
+            "lack_of_fit": verdict_data(self.old.lack_of_fit),
+            "exact": self.is_exact,
+            "residual": {**vars(self.points_searched), "unit": "m"},
+            "lengths": {
+                **vars(self.lengths_searched),
+                "standard_uncertainty": self.length_uncertainty,
+                "unit": "m",
+            },
+            "motion": self.conversion.motion,
+            "parameters": self.rows(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter of the new map."""
-        uncertainties = self.map.standard_uncertainties()
-        told = zip(
-            self.map.parameters, self.map.estimates.tolist(), uncertainties.tolist(), strict=True
-        )
+        return table_rows(COLUMNS, self._parameters)
+
+    @property
+    def _parameters(self) -> list[ParameterEstimate]:
+        new, u = self.map, self.map.standard_uncertainties()
+        values = np.where(np.isnan(u), np.nan, new.estimates).tolist()
         return [
-            {
-                "parameter": one.name,
-                "value": float("nan") if np.isnan(u) else value,
-                "standard uncertainty": u,
-                "unit": one.unit,
-            }
-            for one, value, u in told
+            ParameterEstimate(one.name, value, uncertainty, one.unit)
+            for one, value, uncertainty in zip(new.parameters, values, u.tolist(), strict=True)
         ]
+
+
+COLUMNS = {name: column for name, column in ESTIMATE_COLUMNS.items() if name != "kind"}
 
 
 def _corrections(fitted: FittedMap) -> Differences:

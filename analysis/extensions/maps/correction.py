@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number, picked, to_uncertainty
+from ballplate.presentation.columns import by_axis, table_lines, table_rows
+from ballplate.presentation.formatting import (
+    number,
+    picked,
+    records,
+)
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom, freedom_words
 from ballplate.results.map_of_fit import left_out_words
@@ -135,10 +140,6 @@ class Correction(Result):
         return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {one}" for one in self.warnings)
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """What a user of the points has to know: extrapolation, few degrees of freedom, what is not
         applied.
@@ -191,51 +192,35 @@ class Correction(Result):
         told = ", ".join(f"{word} {value:.4g} °C" for word, value in stated.items())
         return [f"temperatures of the campaign: {told}; corrected for none of the points"]
 
+    def _columns(self) -> dict[str, Any]:
+        u = self.standard_uncertainties
+        return {
+            "point": [self.given.name(i) for i in range(len(self.points))],
+            "probe": [self.fitted.probes.names[probe] for probe in self.given.probes],
+            **by_axis("{}, mm", self.points, u),
+            **by_axis("correction {}, µm", self.corrections, u),
+        }
+
     def _point_table(self) -> list[str]:
-        axes, u = AXIS_NAMES[: self.fitted.dimension], self.expanded_uncertainties
-        rows = [
-            [
-                "point",
-                "probe",
-                *(f"{axis}, mm" for axis in axes),
-                *(f"correction {axis}, µm" for axis in axes),
-                *(f"U {axis}, µm" for axis in axes),
-            ]
-        ]
-        for i in range(min(len(self.points), SHOWN)):
-            standard = u[i] / self.coverage_factor
-            millimetres = zip(1e3 * self.points[i], 1e3 * standard, strict=True)
-            micrometres = zip(1e6 * self.corrections[i], 1e6 * standard, strict=True)
-            rows.append(
-                [
-                    self.given.name(i),
-                    self._probe(i),
-                    *(_value(*both) for both in millimetres),
-                    *(_value(*both) for both in micrometres),
-                    *(_uncertainty(value) for value in u[i].tolist()),
-                ]
-            )
-        found = aligned(rows, [False, False, *[True] * (3 * len(axes))])
+        columns = self._columns() | by_axis("U {}, µm", self.expanded_uncertainties, 3)
+        found = table_lines(columns, unknown="undetermined")[: SHOWN + 1]
         more = len(self.points) - SHOWN
         return [*found, f"(and {more} more points, which -o writes)"] if more > 0 else found
 
     def _length_table(self) -> list[str]:
-        k = self.coverage_factor
-        with_target = any(one.target is not None for one in self.lengths)
-        rows = [["length", "corrected, mm", "correction, µm", "U, µm", "k"]]
-        rows[0] += ["within target"] if with_target else []
-        for one in self.lengths[:SHOWN]:
-            u = one.standard_uncertainty
-            row = [one.name, _value(1e3 * one.value, 1e3 * u)]
-            row += [_value(1e6 * (one.value - one.read), 1e6 * u), _uncertainty(k * u), f"{k:g}"]
-            met = {None: "", True: "yes", False: "no"}[one.is_met]
-            rows.append(row + [met] if with_target else row)
-        found = aligned(rows, [False, True, True, True, True, False][: len(rows[0])])
+        k, u = self.coverage_factor, "standard_uncertainty"
+        columns = {
+            "length": "name",
+            "corrected, mm": ("value", u),
+            "correction, µm": (lambda one: one.value - one.read, u),
+            "U, µm": (lambda one: k * one.standard_uncertainty, 3),
+            "k": (lambda one: k, "{:g}".format),
+            "within target": "is_met",
+        }
+        without = None if any(one.target is not None for one in self.lengths) else "within target"
+        found = table_lines(columns, self.lengths[:SHOWN], without, "undetermined")
         more = len(self.lengths) - SHOWN
         return [*found, f"(and {more} more lengths, which --json has)"] if more > 0 else found
-
-    def _probe(self, i: int) -> str:
-        return self.fitted.probes.names[self.given.probes[i]]
 
     def write_points(self, stream: TextIO) -> None:
         """Write the points as a CSV file, in units that its columns name; what is undetermined is
@@ -254,21 +239,15 @@ class Correction(Result):
     def _point_cells(self) -> Iterator[list[str | float]]:
         axes = AXIS_NAMES[: self.fitted.dimension]
         heads = ("{}_mm", "correction_{}_um", "U_{}_um")
-        yield [
-            "name",
-            "probe",
-            *(head.format(axis) for head in heads for axis in axes),
-            "k",
-            "outside",
-        ]
         numbers = np.concatenate(
             [1e3 * self.points, 1e6 * self.corrections, 1e6 * self.expanded_uncertainties], axis=1
         )
-        outside = self.outside.tolist()
-        for i, row in enumerate(_cells(numbers)):
-            probe = self._probe(i)
-            said = "yes" if outside[i] else "no"
-            yield [self.given.name(i), probe, *row, self.coverage_factor, said]
+        names = self._columns()
+        yield ["name", "probe", *(one.format(a) for one in heads for a in axes), "k", "outside"]
+        for name, probe, row, is_outside in zip(
+            names["point"], names["probe"], _cells(numbers), self.outside, strict=True
+        ):
+            yield [name, probe, *row, self.coverage_factor, "yes" if is_outside else "no"]
 
     def _covariance_cells(self) -> Iterator[list[str | float]]:
         axes = AXIS_NAMES[: self.fitted.dimension]
@@ -277,32 +256,26 @@ class Correction(Result):
         for name, row in zip(names, _cells(1e12 * self.covariance()), strict=True):
             yield [name, *row]
 
-    def to_dict(self) -> dict[str, Any]:
-        fitted, u = self.fitted, self.standard_uncertainties
+    def data(self) -> dict[str, Any]:
+        fitted, names = self.fitted, self._columns()
         return {
             **picked(fitted, "title", "sigma", "sigma_is_estimated", "degrees_of_freedom"),
             "lack_of_fit": verdict_data(fitted.lack_of_fit),
             "coverage_factor": self.coverage_factor,
             "with_repeatability": bool(self.scatter),
-            "points": [
-                {
-                    "name": self.given.name(i),
-                    "probe": self._probe(i),
-                    "point": [finite(one) for one in self.points[i].tolist()],
-                    "correction": [finite(one) for one in correction],
-                    "standard_uncertainty": [finite(one) for one in u[i].tolist()],
-                    "outside": is_outside,
-                }
-                for i, (correction, is_outside) in enumerate(
-                    zip(self.corrections.tolist(), self.outside.tolist(), strict=True)
-                )
-            ],
+            "points": records(
+                name=names["point"],
+                probe=names["probe"],
+                point=self.points,
+                correction=self.corrections,
+                standard_uncertainty=self.standard_uncertainties,
+                outside=self.outside,
+            ),
             "lengths": [
                 {
-                    "name": one.name,
-                    "value": finite(one.value),
-                    "correction": finite(one.value - one.read),
-                    "standard_uncertainty": finite(one.standard_uncertainty),
+                    **picked(one, "name", "value"),
+                    "correction": one.value - one.read,
+                    "standard_uncertainty": one.standard_uncertainty,
                     "within_target": one.is_met,
                 }
                 for one in self.lengths
@@ -312,19 +285,8 @@ class Correction(Result):
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each point, in metres."""
-        axes, corrections = AXIS_NAMES[: self.fitted.dimension], self.corrections
-        u = self.standard_uncertainties
-        return [
-            {
-                "point": self.given.name(i),
-                "probe": self._probe(i),
-                **{axis: float(self.points[i, k]) for k, axis in enumerate(axes)},
-                **{f"correction {axis}": float(corrections[i, k]) for k, axis in enumerate(axes)},
-                **{f"u {axis}": float(u[i, k]) for k, axis in enumerate(axes)},
-                "unit": "m",
-            }
-            for i in range(len(self.points))
-        ]
+        u = by_axis("u {}", self.standard_uncertainties)
+        return table_rows({**self._columns(), **u, "unit": ["m"] * len(self.points)})
 
 
 OWN_SCALES = (
@@ -335,16 +297,6 @@ OWN_SCALES = (
 
 def _cells(rows: Array) -> list[list[str | float]]:
     return [["" if value != value else value for value in row] for row in rows.tolist()]
-
-
-def _value(value: float, uncertainty: float) -> str:
-    if np.isnan(uncertainty):
-        return "undetermined"
-    return to_uncertainty(value, uncertainty)
-
-
-def _uncertainty(value: float) -> str:
-    return "undetermined" if np.isnan(value) else number(1e6 * value, 3)
 
 
 @single_threaded

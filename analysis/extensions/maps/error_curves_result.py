@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN, aligned, as_data, ascii_units, number
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import SHOWN, aligned, ascii_units, number, picked
 from ballplate.presentation.result import Result
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
@@ -23,7 +24,7 @@ from .error_functions import (
     error_functions,
 )
 from .fitted_errors_result import map_cautions
-from .fitted_tables import UNDETERMINED, head_lines, map_data, with_uncertainty
+from .fitted_tables import UNDETERMINED, expanded, head_lines, map_data
 from .function_plots import draw_functions
 
 if TYPE_CHECKING:
@@ -72,13 +73,12 @@ class ErrorCurves(Result):
             lines += ["", *_number_table(found.numbers, self.k)]
         return lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         found = map_data(self.label, self.fitted)
         found["functions"] = [
             {
                 "error": one.name,
-                "meaning": one.meaning,
-                "unit": one.unit,
+                **picked(one, "meaning", "unit"),
                 "line": one.line or None,
                 "axis": None if one.axis is None else AXIS_NAMES[one.axis],
                 "position": one.positions,
@@ -87,22 +87,17 @@ class ErrorCurves(Result):
             }
             for one in self.functions.curves
         ]
-        for key, numbers in (
-            ("squareness", self.functions.squareness),
-            ("numbers", self.functions.numbers),
-        ):
+        for key in ("squareness", "numbers"):
             found[key] = [
                 {
                     "error": one.name,
-                    "meaning": one.meaning,
-                    "unit": one.unit,
-                    "value": one.value,
+                    **picked(one, "meaning", "unit", "value"),
                     "expanded_uncertainty": self.k * one.standard_uncertainty,
                     "source": one.source,
                 }
-                for one in numbers
+                for one in getattr(self.functions, key)
             ]
-        return dict(as_data(found)) | {"warnings": list(map_cautions(self.fitted))}
+        return found | {"warnings": self.warnings}
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each position of each curve, then one for each number; in metres, radians and
@@ -140,8 +135,8 @@ class ErrorCurves(Result):
         return any(one.axis is None for one in self.functions.curves if one.name == row["error"])
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {one}" for one in map_cautions(self.fitted))
+    def warnings(self) -> tuple[str, ...]:
+        return map_cautions(self.fitted)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """All curves side by side, each with its band, those in the same unit to the same scale.
@@ -207,18 +202,24 @@ def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
 
 def _angle_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
     """Squareness errors as angles in two units."""
-    rows = [["squareness", "", "µrad", "U", "arcsec", "U", ""]]
-    for one in numbers:
-        angle = with_uncertainty(one.value, one.standard_uncertainty, k)
-        in_arcsec = 1e-6 / ARCSECOND
-        other = with_uncertainty(in_arcsec * one.value, in_arcsec * one.standard_uncertainty, k)
-        rows.append([one.name, one.meaning, *angle, *other, one.source])
-    return aligned(rows, [False, False, True, True, True, True, False])
+    columns = [
+        ("squareness", "name"),
+        ("", "meaning"),
+        ("µrad", ("value", "standard_uncertainty")),
+        ("U", (lambda one: k * one.standard_uncertainty, expanded)),
+        ("arcsec", ("value", "standard_uncertainty")),
+        ("U", (lambda one: k * one.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
+        ("", "source"),
+    ]
+    return table_lines(columns, numbers, unknown=UNDETERMINED)
 
 
 def _number_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
-    rows = [["error", "", "value", "U", "unit"]]
-    for one in numbers:
-        cells = with_uncertainty(one.value, one.standard_uncertainty, k)
-        rows.append([one.name, one.meaning, *cells, SHOWN[one.unit]])
-    return aligned(rows, [False, False, True, True, False])
+    columns = {
+        "error": "name",
+        "": "meaning",
+        "value": ("value", "standard_uncertainty"),
+        "U": (lambda one: k * one.standard_uncertainty, expanded),
+        "unit": "unit",
+    }
+    return table_lines(columns, numbers, unknown=UNDETERMINED)

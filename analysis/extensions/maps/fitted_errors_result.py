@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import as_data
+from ballplate.presentation.columns import by_axis, table_rows
+from ballplate.presentation.formatting import given, records
 from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
 from ballplate.presentation.vectors import Vectors, draw_vectors
@@ -19,7 +20,7 @@ from ballplate.results.adjustments import few_degrees_of_freedom
 from ballplate.results.map_of_fit import left_out_words
 from ballplate.simulator.design.objects import Tasks
 from ballplate.simulator.inputs.settings import hint, number_of
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.protocol import Integers
 from ballplate.simulator.maps.fitted_map import FittedMap
 
 from .fitted_errors import (
@@ -121,61 +122,49 @@ class FittedErrorMap(Result):
             lines += ["", *budget_lines(self.budget, fitted.coverage_factor)]
         return lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         fitted, k = self.fitted, self.fitted.coverage_factor
         found = map_data(self.label, fitted, self.probe)
-        found["lengths"] = [
-            {
-                "name": name,
-                "from": self.lengths.starts[i],
-                "to": self.lengths.ends[i],
-                "length": self.lengths.nominal[i],
-                "error": self.lengths.errors[i],
-                "expanded_uncertainty": k * self.lengths.uncertainties[i],
-            }
-            for i, name in enumerate(self.places.names)
-        ]
-        one = self.errors
-        found[self.places.kind] = [
-            {
-                **told,
-                "position": one.points[i],
-                "error": one.errors[i],
-                "expanded_uncertainty": k * one.uncertainties[i],
-                "resultant": one.resultant[i],
-            }
-            for i, told in enumerate(self._of_table())
-        ]
+        ends, found_errors = self.lengths, self.errors
+        found["lengths"] = records(
+            name=self.places.names,
+            **{"from": ends.starts, "to": ends.ends},
+            length=ends.nominal,
+            error=ends.errors,
+            expanded_uncertainty=k * ends.uncertainties,
+        )
+        found[self.places.kind] = records(
+            **self._of_table(),
+            position=found_errors.points,
+            error=found_errors.errors,
+            expanded_uncertainty=k * found_errors.uncertainties,
+            resultant=found_errors.resultant,
+        )
         if self.realisations is not None:
             found["realisations"] = self.realisations.to_dict()
         if self.with_budget:
             found["budget"] = budget_data(self.budget, k)
-        return dict(as_data(found)) | {"warnings": list(self.warnings)}
+        return found | {"warnings": self.warnings}
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each point, in metres."""
         found, k = self.errors, self.fitted.coverage_factor
-        letters = "xyz"[: self.fitted.dimension]
-        columns: dict[str, Array] = {
-            **{letter: found.points[:, i] for i, letter in enumerate(letters)},
-            **{f"error {letter}": found.errors[:, i] for i, letter in enumerate(letters)},
-            **{f"U {letter}": k * found.uncertainties[:, i] for i, letter in enumerate(letters)},
+        columns = {
+            **self._of_table(),
+            **by_axis("{}", found.points),
+            **by_axis("error {}", found.errors),
+            **by_axis("U {}", k * found.uncertainties),
             "resultant": found.resultant,
+            "k": [k] * len(found.points),
+            "unit": ["m"] * len(found.points),
         }
-        values = zip(*(column.tolist() for column in columns.values()), strict=True)
-        return [
-            told | dict(zip(columns, row, strict=True)) | {"k": k, "unit": "m"}
-            for told, row in zip(self._of_table(), values, strict=True)
-        ]
+        return table_rows(columns)
 
-    def _of_table(self) -> list[dict[str, Any]]:
+    def _of_table(self) -> dict[str, list[str]]:
         """What a table of points says of each: its name and probe."""
-        names, probes = self.places.names_of_points, self.fitted.probes.names
-        found: list[dict[str, Any]] = [{} for _ in self.errors.points]
-        for i, told in enumerate(found):
-            told |= {"point": names[i]} if names else {}
-            told |= {} if self.places.probes is None else {"probe": probes[self.probes[i]]}
-        return found
+        probes = self.fitted.probes.names
+        of_points = [] if self.places.probes is None else [probes[k] for k in self.probes]
+        return given(point=list(self.places.names_of_points), probe=of_points)
 
     def point_lines(self) -> Iterator[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""
@@ -195,10 +184,6 @@ class FittedErrorMap(Result):
             return map_cautions(self.fitted)
         words = f"{outside} of {len(points)} points are outside the volume"
         return (*map_cautions(self.fitted), f"{words}, where errors are extrapolated")
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {one}" for one in self.warnings)
 
     def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
         """The errors as a picture: magnified at points, with the bands of their expanded

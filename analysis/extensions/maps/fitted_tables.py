@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, number, picked, to_uncertainty
+from ballplate.presentation.columns import ROUNDING, by_axis, table_lines
+from ballplate.presentation.formatting import number, picked
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
@@ -17,9 +18,6 @@ from .realisations import Realisations
 from .volumetric_tables import CONVENTION, tables_csv, with_drawn
 
 UNDETERMINED = "undetermined"
-
-# Errors and uncertainties below this, in metres and radians, are rounding.
-ROUNDING = 1e-15
 
 
 def head_lines(label: str, fitted: FittedMap, probe: int | None = None) -> list[str]:
@@ -52,41 +50,38 @@ def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[st
     return found
 
 
-def with_uncertainty(value: float, uncertainty: float, factor: float) -> list[str]:
-    """A value and its expanded uncertainty in millionths of their unit, as two cells."""
-    if np.isnan(value) or np.isnan(uncertainty):
-        return [UNDETERMINED, "-"]
-    value, uncertainty = (0.0 if abs(one) < ROUNDING else one for one in (value, uncertainty))
-    shown = to_uncertainty(1e6 * value, 1e6 * uncertainty)
-    return [shown, number(1e6 * factor * uncertainty, 3)]
-
-
 def length_lines(lengths: FittedLengths, names: Sequence[str], factor: float) -> list[str]:
     """Errors of lengths, with their uncertainties."""
-    rows = [["length error of", "from", "to", "length, mm", "error, µm", "U, µm"]]
-    for k, name in enumerate(names):
-        ends = [_point(lengths.starts[k]), _point(lengths.ends[k])]
-        cells = with_uncertainty(float(lengths.errors[k]), float(lengths.uncertainties[k]), factor)
-        rows.append([name, *ends, f"{1e3 * lengths.nominal[k]:.3f}", *cells])
-    return aligned(rows, [False, False, False, True, True, True])
+    columns = {
+        "length error of": list(names),
+        "from": list(map(_point, lengths.starts)),
+        "to": list(map(_point, lengths.ends)),
+        "length, mm": (lengths.nominal, lambda value: f"{1e3 * value:.3f}"),
+        "error, µm": (lengths.errors, lengths.uncertainties),
+        "U, µm": (factor * lengths.uncertainties, expanded),
+    }
+    return table_lines(columns, unknown=UNDETERMINED)
+
+
+def expanded(uncertainty: float) -> str:
+    """An expanded uncertainty in millionths of its unit."""
+    return number(0.0 if uncertainty < ROUNDING else 1e6 * uncertainty, 3)
 
 
 def error_lines(found: FittedErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
     """Errors point by point with their uncertainties, and the largest; points may have names."""
-    letters = "xyz"[: found.points.shape[1]]
-    heads = [f"{letter}, mm" for letter in letters]
-    heads += [cell for letter in letters.upper() for cell in (f"{letter}, µm", "U")]
-    rows = [[*(["point"] if names else []), *heads, "resultant"]]
-    for i, (point, error, u, resultant) in enumerate(
-        zip(found.points, found.errors, found.uncertainties, found.resultant, strict=True)
-    ):
-        cells = [*([names[i]] if names else []), *(_millimetres(value) for value in point)]
-        for value, own in zip(error.tolist(), u.tolist(), strict=True):
-            cells += with_uncertainty(value, own, factor)
-        is_open = bool(np.isnan(resultant))
-        rows.append([*cells, UNDETERMINED if is_open else number(1e6 * float(resultant))])
-    right = [not (names and k == 0) for k in range(len(rows[0]))]
-    return [*aligned(rows, right), *_largest(found, factor)]
+    u, columns = found.uncertainties, list[tuple[str, Any]]()
+    columns += [("point", list(names))] if names else []
+    columns += by_axis("{}, mm", found.points, _millimetres).items()
+    for k, letter in enumerate("XYZ"[: found.points.shape[1]]):
+        columns += [(f"{letter}, µm", (found.errors[:, k], u[:, k]))]
+        columns += [("U", (factor * u[:, k], expanded))]
+    columns.append(("resultant", (found.resultant, _resultant)))
+    return [*table_lines(columns, unknown=UNDETERMINED), *_largest(found, factor)]
+
+
+def _resultant(value: float) -> str:
+    return UNDETERMINED if np.isnan(value) else number(1e6 * value)
 
 
 def _largest(found: FittedErrors, factor: float) -> list[str]:
@@ -106,13 +101,13 @@ def _largest(found: FittedErrors, factor: float) -> list[str]:
 
 def realisation_lines(found: Realisations, names: Sequence[str]) -> list[str]:
     """What each realisation has at most, and its length errors; all points are in CSV and JSON."""
-    rows = [["realisation", "largest resultant, µm", *(f"{name}, µm" for name in names)]]
     largest = np.linalg.norm(found.errors, axis=2).max(axis=1)
-    for k, (resultant, lengths) in enumerate(zip(largest, found.lengths, strict=True)):
-        values = [float(resultant), *lengths.tolist()]
-        shown = [UNDETERMINED if np.isnan(v) else number(1e6 * v) for v in values]
-        rows.append([str(k + 1), *shown])
-    table = aligned(rows, [True] * len(rows[0]))
+    columns = [
+        ("realisation", range(1, len(largest) + 1)),
+        ("largest resultant, µm", largest),
+        *((f"{name}, µm", own) for name, own in zip(names, found.lengths.T, strict=True)),
+    ]
+    table = table_lines(columns, unknown=UNDETERMINED)
     return [*table, f"drawn from seed {found.draws.seed}; --format csv and --json have all points"]
 
 

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
-    aligned,
-    as_data,
     csv_lines,
     number,
     percent,
@@ -62,7 +61,7 @@ class LengthMap(GroupedLengths, Result):
         scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
         count, n = int(whole.count[0]), len(self.points)
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             (
                 f"{rank}{count} lengths between {n} points of a grid, with the probe"
                 f" {settings.probe}{scatter}"
@@ -112,28 +111,23 @@ class LengthMap(GroupedLengths, Result):
             ),
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The same as plain data in metres; what is undetermined is None."""
         settings, edges = self.settings, self.edges.tolist()
         classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
-        data: dict[str, Any] = as_data(
-            {
-                "experiment": self.label,
-                "title": self.title,
-                "rank_deficiency": self.deficiency,
-                **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
-                "target": picked(settings.target, "constant", "slope"),
-                "target_coverage_factor": settings.target_factor,
-                "all": _group_data([{}], self.whole)[0],
-                "worst": None if self.worst is None else [self.points[k] for k in self.worst],
-                "by_length": _group_data(classes, self.by_length),
-                "by_direction": _group_data(
-                    [{"direction": name} for name in self.directions], self.by_direction
-                ),
-                "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
-            }
-        )
-        return data
+        directions = [{"direction": name} for name in self.directions]
+        return {
+            **self.named,
+            "rank_deficiency": self.deficiency,
+            **picked(settings, "grid", "probe", "coverage_factor", "with_repeatability"),
+            "target": picked(settings.target, "constant", "slope"),
+            "target_coverage_factor": settings.target_factor,
+            "all": _group_data([{}], self.whole)[0],
+            "worst": self.worst and [self.points[k] for k in self.worst],
+            "by_length": _group_data(classes, self.by_length),
+            "by_direction": _group_data(directions, self.by_direction),
+            "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each class of length, direction and point of the grid, lengths in metres."""
@@ -216,35 +210,24 @@ def _table(
 ) -> list[str]:
     factor = lengths.settings.coverage_factor
     k = f"{factor:g}"
-    heads = [
-        head,
-        "lengths",
-        "undetermined",
-        "u average, µm",
-        "maximum",
-        f"{k} u maximum",
-        "target",
-    ]
-    heads += [f"{_compared(lengths)} / target, maximum", "u within", f"{k} u within"]
-    rows = [heads]
-    for i, name in enumerate(names):
-        if not groups.count[i]:
-            continue
-        row = [name, str(groups.count[i]), str(groups.undetermined[i])]
-        row += [
-            number(1e6 * float(v[i]))
-            for v in (groups.average, groups.maximum, factor * groups.maximum)
-        ]
-        row += [
-            targets[i] if targets else "",
-            number(lengths.settings.target_factor * float(groups.maximum_ratio[i])),
-        ]
-        row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
-        rows.append(row)
-    unused = {6} if not targets else set[int]()
-    unused |= {2} if not groups.undetermined.any() else set()
-    kept = [j for j in range(len(heads)) if j not in unused]
-    return aligned([[row[j] for j in kept] for row in rows], [j > 0 for j in kept])
+    shown = np.flatnonzero(groups.count)
+    maximum = groups.maximum[shown]
+    ratios = lengths.settings.target_factor * groups.maximum_ratio[shown]
+    columns = {
+        head: [names[i] for i in shown],
+        "lengths": groups.count[shown],
+        "undetermined": groups.undetermined[shown],
+        "u average, µm": groups.average[shown],
+        "maximum": 1e6 * maximum,
+        f"{k} u maximum": 1e6 * factor * maximum,
+        "target": (shown, lambda i: targets[i] if targets else ""),
+        f"{_compared(lengths)} / target, maximum": ratios,
+        "u within": (groups.share()[shown], percent),
+        f"{k} u within": (groups.share(True)[shown], percent),
+    }
+    without = [] if targets else ["target"]
+    without += [] if groups.undetermined.any() else ["undetermined"]
+    return table_lines({k: v for k, v in columns.items() if k not in without})
 
 
 def point_csv(lengths: LengthMap) -> Iterator[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from ballplate.presentation.formatting import picked
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.experiment.error_tables import parse_line, parse_point
 from ballplate.simulator.geometry.grids import even_grid
@@ -110,8 +111,7 @@ def map_places(
     """
     given = {
         "grid": asked.grid if asked.plane is None else None,
-        "line": asked.line,
-        "plane": asked.plane,
+        **picked(asked, "line", "plane"),
         "points of a file": asked.at,
     }
     several = [name for name, value in given.items() if value is not None]

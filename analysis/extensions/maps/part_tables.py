@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, number
+from ballplate.presentation.columns import ROUNDING, table_lines
+from ballplate.presentation.formatting import aligned, number, picked
 
-from .fitted_tables import ROUNDING, UNDETERMINED
+from .fitted_tables import UNDETERMINED
 from .part_budget import REST, PartBudget
 
 # A part that contributes less to all figures, in metres, is left out of tables.
@@ -36,23 +37,23 @@ def budget_lines(
     shown = [k for k in range(len(figures[0].parts)) if any(_is_shown(one, k) for one in figures)]
     word = f"U alone, k = {factor:g}" if correlated else "random"
     lines, lengths = [], [one for one in figures if one.is_length]
+    names = [figures[0].parts[k][0] for k in shown]
+    meanings = [figures[0].parts[k][1] for k in shown]
     for one in (one for one in figures if not one.is_length):
-        heads = ["error alone, µm", "share", f"{word}, µm", "share of variance"]
-        rows = [[f"budget: {one.figure}", "", *heads]]
-        for k in shown:
-            cells = [_shown(one.errors[k]), _percent(one.shares[k])]
-            cells += [_shown(factor * one.uncertainties[k]), _percent(one.variance_shares[k])]
-            rows.append([*one.parts[k], *cells])
-        rows.append(["whole", "", _shown(one.total), "", _shown(factor * one.uncertainty), ""])
-        lines += [*aligned(rows, [False, False, True, True, True, True]), ""]
-    names = [one.figure for one in lengths]
+        columns = {
+            f"budget: {one.figure}": [*names, "whole"],
+            "": [*meanings, ""],
+            "error alone, µm": ([*one.errors[shown], one.total], _shown),
+            "share": ([*one.shares[shown], None], _percent),
+            f"{word}, µm": (factor * np.append(one.uncertainties[shown], one.uncertainty), _shown),
+            "share of variance": ([*one.variance_shares[shown], None], _percent),
+        }
+        lines += [*table_lines(columns), ""]
     whole = f"U, k = {factor:g}, µm" if correlated else "random, µm"
-    right = [False, *[True] * len(names)]
-    rows = [["error of length, µm", *names]]
-    rows += [[figures[0].parts[k][0], *(_shown(one.errors[k]) for one in lengths)] for k in shown]
-    rows.append(["whole", *(_shown(one.total) for one in lengths)])
-    lines += [*aligned(rows, right), ""]
-    rows = [["share of variance", *names]]
+    errors = [(one.figure, ([*one.errors[shown], one.total], _shown)) for one in lengths]
+    lines += [*table_lines([("error of length, µm", [*names, "whole"]), *errors]), ""]
+    right = [False, *[True] * len(lengths)]
+    rows = [["share of variance", *(one.figure for one in lengths)]]
     if not any(one.uncertainty for one in figures):
         shown = []
     for k in shown:
@@ -76,8 +77,7 @@ def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict
     """The same in metres."""
     return [
         {
-            "figure": one.figure,
-            "is_length": one.is_length,
+            **picked(one, "figure", "is_length"),
             "error": one.total,
             "expanded_uncertainty": factor * one.uncertainty,
             "coverage_factor": factor,
@@ -85,10 +85,10 @@ def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict
                 {
                     "part": name,
                     "meaning": meaning,
-                    "error": float(one.errors[k]),
-                    "share": float(one.shares[k]),
-                    "expanded_uncertainty": factor * float(one.uncertainties[k]),
-                    "share_of_variance": float(one.variance_shares[k]),
+                    "error": one.errors[k],
+                    "share": one.shares[k],
+                    "expanded_uncertainty": factor * one.uncertainties[k],
+                    "share_of_variance": one.variance_shares[k],
                 }
                 for k, (name, meaning) in enumerate(one.parts)
             ],

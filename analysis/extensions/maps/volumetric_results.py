@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import as_data
+from ballplate.presentation.columns import by_axis, table_rows
 from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
 from ballplate.presentation.vectors import Vectors, draw_vectors
@@ -65,8 +65,8 @@ class MachineErrors(Result):
         return self.machine.machine.title
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(f"warning: {doubt}" for doubt in self.doubts)
+    def warnings(self) -> tuple[str, ...]:
+        return self.doubts
 
     def point_lines(self) -> Iterator[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""
@@ -123,7 +123,7 @@ class ErrorsAtPoints(MachineErrors):
         if self.realisations is not None:
             found["realisations"] = self.realisations.to_dict()
         if self.with_budget:
-            found["budget"] = as_data(budget_data(self.budget))
+            found["budget"] = budget_data(self.budget)
         return found
 
     def lines(self) -> list[str]:
@@ -131,7 +131,7 @@ class ErrorsAtPoints(MachineErrors):
         points = error_lines(self.errors)
         return [*machine_lines(self.machine), "", *diagonals, "", *points, *self.more_lines()]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             **machine_data(self.machine),
             "diagonals": diagonal_data(self.lengths),
@@ -143,13 +143,13 @@ class ErrorsAtPoints(MachineErrors):
         """One row for each point, in metres."""
         found = self.errors
         columns = {
-            **{axis: found.points[:, k] for k, axis in enumerate("xyz")},
-            **{f"error {axis}": found.systematic[:, k] for k, axis in enumerate("xyz")},
+            **by_axis("{}", found.points),
+            **by_axis("error {}", found.systematic),
             "resultant": found.resultant,
-            **{f"random {axis}": found.deviation[:, k] for k, axis in enumerate("xyz")},
+            **by_axis("random {}", found.deviation),
+            "unit": ["m"] * len(found.points),
         }
-        values = zip(*(column.tolist() for column in columns.values()), strict=True)
-        return [dict(zip(columns, row, strict=True)) | {"unit": "m"} for row in values]
+        return table_rows(columns)
 
     def point_lines(self) -> Iterator[str]:
         return error_csv(self.errors, self.realisations, self.places.names_of_points)
@@ -185,7 +185,7 @@ class ErrorsOnLine(ErrorsAtPoints):
     def lines(self) -> list[str]:
         return [*error_lines(self.errors), length_line(self.lengths), *self.more_lines()]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return {
             **machine_data(self.machine),
             "length": length_data(self.lengths)[0],
@@ -210,7 +210,7 @@ class ErrorAlongAxis(MachineErrors):
     def lines(self) -> list[str]:
         return along_lines(self.along)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return along_data(self.along)
 
     def rows(self) -> list[dict[str, Any]]:

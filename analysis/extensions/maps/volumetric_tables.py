@@ -8,14 +8,15 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.columns import by_axis, table_lines
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
-    as_data,
     ascii_units,
     csv_lines,
     fixed,
     number,
+    picked,
     records,
 )
 from ballplate.simulator.computing.rounding import comparable
@@ -117,20 +118,16 @@ def why_not_along(name: str, built: Volumetric, file: str) -> str:
 
 def _others(built: Volumetric) -> list[list[str]]:
     """Squareness, expansion and droop at the reference point."""
-    rows = []
-    for parameter, value in _numbers(built):
-        square = parameter.name in SQUARENESS
-        unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
-        rows.append(
-            [
-                parameter.name,
-                symbol(parameter.name) if square else "",
-                _told(parameter),
-                number(1e6 * value),
-                unit,
-            ]
-        )
-    return rows
+    return [
+        [
+            parameter.name,
+            symbol(parameter.name) if parameter.name in SQUARENESS else "",
+            _told(parameter),
+            number(1e6 * value),
+            "ppm" if parameter.unit == "1" else SHOWN[parameter.unit],
+        ]
+        for parameter, value in _numbers(built)
+    ]
 
 
 def _told(parameter: Parameter) -> str:
@@ -148,32 +145,15 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
 
 def diagonal_lines(errors: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
-    is_random = bool(errors.deviation.any())
-    rows = [
-        [
-            "body diagonal",
-            "from",
-            "to",
-            "length, mm",
-            "error, µm",
-            *(["random, µm"] if is_random else []),
-        ]
-    ]
-    for k in range(len(errors.error)):
-        ends = [
-            f"({', '.join(_millimetres(v) for v in point)})"
-            for point in (errors.starts[k], errors.ends[k])
-        ]
-        told = [float(errors.error[k]), *([float(errors.deviation[k])] if is_random else [])]
-        rows.append(
-            [
-                str(k + 1),
-                *ends,
-                f"{1e3 * errors.nominal[k]:.3f}",
-                *(number(1e6 * value) for value in told),
-            ]
-        )
-    return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
+    columns = {
+        "body diagonal": range(1, len(errors.error) + 1),
+        "from": list(map(_point, errors.starts)),
+        "to": list(map(_point, errors.ends)),
+        "length, mm": (errors.nominal, lambda value: f"{1e3 * value:.3f}"),
+        "error, µm": errors.error,
+        "random, µm": errors.deviation,
+    }
+    return table_lines(columns, without=None if errors.deviation.any() else "random, µm")
 
 
 def length_line(errors: LengthErrors) -> str:
@@ -189,18 +169,15 @@ def length_line(errors: LengthErrors) -> str:
 
 def error_lines(errors: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
-    heads = ["x, mm", "y, mm", "z, mm", "X, µm", "Y, µm", "Z, µm", "resultant"]
-    is_random = bool(errors.deviation.any())
-    rows = [[*heads, *(["random X", "Y", "Z"] if is_random else [])]]
-    for point, error, resultant, random in zip(
-        errors.points, errors.systematic, errors.resultant, errors.deviation, strict=True
-    ):
-        cells = [_millimetres(value) for value in point]
-        cells += [
-            fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
-        ]
-        rows.append(cells)
-    return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(errors)]
+    columns = [
+        *by_axis("{}, mm", errors.points, _millimetres).items(),
+        *by_axis("{}, µm", errors.systematic, _two_decimals, "XYZ").items(),
+        ("resultant", (errors.resultant, _two_decimals)),
+    ]
+    if errors.deviation.any():
+        random = by_axis("{}", errors.deviation, _two_decimals, ("random X", "Y", "Z"))
+        columns += random.items()
+    return [*table_lines(columns), *extreme_lines(errors)]
 
 
 def extreme_lines(errors: VolumetricErrors) -> list[str]:
@@ -233,14 +210,10 @@ def along_lines(along: AlongAxis) -> list[str]:
         else np.flatnonzero(np.isin(positions, along.measured.positions))
     )
     axis = AXES[along.error.axis]
-    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name in given)]]
-    for k in keep:
-        rows.append(
-            [
-                _millimetres(float(positions[k])),
-                *(fixed(1e6 * values[k], 3) for values in given.values()),
-            ]
-        )
+    columns = {
+        f"{axis}, mm": (positions[keep], _millimetres),
+        **{f"{name}, {unit}": (one[keep], _three_decimals) for name, one in given.items()},
+    }
     head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
     band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
     told = (
@@ -248,7 +221,15 @@ def along_lines(along: AlongAxis) -> list[str]:
         if along.values is None
         else [f"stated as {_stated_as(along)}; {_line_stated(along)}".rstrip("; ")]
     )
-    return [head + band, *told, *aligned(rows, [True] * len(rows[0]))]
+    return [head + band, *told, *table_lines(columns)]
+
+
+def _two_decimals(value: float) -> str:
+    return fixed(1e6 * value, 2)
+
+
+def _three_decimals(value: float) -> str:
+    return fixed(1e6 * value, 3)
 
 
 def _line_stated(along: AlongAxis) -> str:
@@ -322,19 +303,19 @@ def _unit(one: AlongAxis) -> str:
 def machine_data(built: Volumetric) -> dict[str, Any]:
     """What the machine is and its parametric errors, in metres and radians."""
     machine = built.machine
-    functions = {}
-    for one in along_axes(machine):
-        functions[one.error.name] = {
+    functions = {
+        one.error.name: {
             "symbol": symbol(one.error.name),
             "unit": one.unit,
             "range": None if one.values is None else one.range,
-            "random": None if one.deviation is None else float(one.deviation.max()),
+            "random": None if one.deviation is None else one.deviation.max(),
         }
+        for one in along_axes(machine)
+    }
     return {
         "machine": machine.title,
         "arrangement": machine.arrangement_name or None,
-        "probe_side": list(machine.arrangement.probe_side),
-        "workpiece_side": list(machine.arrangement.workpiece_side),
+        **picked(machine.arrangement, "probe_side", "workpiece_side"),
         "convention": CONVENTION,
         "parametric_errors": functions,
         "other_errors": {
@@ -352,24 +333,22 @@ def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
 def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
     """Length errors, in metres."""
     ends = {"from": errors.starts, "to": errors.ends}
-    rows = records(**ends, length=errors.nominal, error=errors.error, random=errors.deviation)
-    return list(as_data(rows))
+    return records(**ends, length=errors.nominal, error=errors.error, random=errors.deviation)
 
 
 def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
     """Errors point by point, in metres."""
-    rows = records(
+    return records(
         position=errors.points,
         error=errors.systematic,
         resultant=errors.resultant,
         random=errors.deviation,
     )
-    return list(as_data(rows))
 
 
 def along_data(along: AlongAxis) -> dict[str, Any]:
     """A parametric error along its axis, in metres and radians."""
-    data = {
+    return {
         "error": along.error.name,
         "symbol": symbol(along.error.name),
         "unit": along.unit,
@@ -378,8 +357,11 @@ def along_data(along: AlongAxis) -> dict[str, Any]:
         "value": along.values,
         "random": along.deviation,
     }
-    return dict(as_data(data))
 
 
 def _millimetres(value: float) -> str:
     return f"{1e3 * value + 0.0:.10g}"
+
+
+def _point(point: Array) -> str:
+    return f"({', '.join(map(_millimetres, point))})"

@@ -5,18 +5,18 @@ spreadsheets.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
+from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
     ascii_units,
-    finite,
     number,
     picked,
 )
@@ -120,7 +120,7 @@ class Reliability(Result):
         """
         return _lines(self, with_all)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return _data(self)
 
     def rows(self) -> list[dict[str, Any]]:
@@ -311,40 +311,26 @@ def _positions(result: Reliability) -> list[str]:
 def _table(
     result: Reliability, title: str, chosen: Sequence[int], with_redundancy: bool
 ) -> list[str]:
-    rows = [
-        [
-            title,
-            *(["redundancy"] if with_redundancy else []),
-            "MDB",
-            "by fit",
-            "unit",
-            *(f"{s}, µm" for s in result.effects),
-        ]
-    ]
-    rows[0].append("U6 at")
-    effects = {symbol: _effect(result, symbol) for symbol in result.effects}
-    for k in chosen:
-        unit = result.patterns.unit(k)
-        cells = [name(result.patterns, k)]
-        if with_redundancy:
-            cells.append(number(result.left[k], 3))
-        cells += [_shown(result.minimal_detectable[k]), _shown(result.found_by_fit[k]), SHOWN[unit]]
-        for symbol, effect in effects.items():
-            change = _effect_number(result, symbol, k, effect[k])
+    def effect_words(symbol: str) -> Callable[[int], str]:
+        def words(k: int) -> str:
+            change = _effect_number(result, symbol, k, effects[symbol][k])
             uncertainty = number(1e6 * result.effects[symbol].uncertainty[k], 3)
-            cells.append("-" if math.isnan(effect[k]) else f"{change} ({uncertainty})")
-        cells.append("" if math.isinf(result.minimal_detectable[k]) else _where(result, "U6", k))
-        rows.append(cells)
-    right = [
-        False,
-        *([True] if with_redundancy else []),
-        True,
-        True,
-        False,
-        *(True for _ in result.effects),
-        False,
-    ]
-    return aligned(rows, right)
+            return "-" if math.isnan(effects[symbol][k]) else f"{change} ({uncertainty})"
+
+        return words
+
+    hidden = np.isinf(result.minimal_detectable)
+    effects = {symbol: _effect(result, symbol) for symbol in result.effects}
+    columns = {
+        title: lambda k: name(result.patterns, k),
+        "redundancy": (result.left[chosen], 3),
+        "MDB": (result.minimal_detectable[chosen], _shown),
+        "by fit": (result.found_by_fit[chosen], _shown),
+        "unit": lambda k: SHOWN[result.patterns.unit(k)],
+        **{f"{symbol}, µm": (chosen, effect_words(symbol)) for symbol in effects},
+        "U6 at": lambda k: "" if hidden[k] else _where(result, "U6", k),
+    }
+    return table_lines(columns, chosen, None if with_redundancy else "redundancy")
 
 
 def _effect_number(result: Reliability, symbol: str, k: int, effect: float) -> str:
@@ -492,12 +478,12 @@ def _data(result: Reliability) -> dict[str, Any]:
         "observations": result.design.observation_count,
         "rank_deficiency": result.deficiency,
         **picked(result, "degrees_of_freedom", "sigma_is_estimated", "false_alarm", "power"),
-        "noncentrality": finite(result.noncentrality),
-        "fit_noncentrality": finite(result.fit_noncentrality),
+        "noncentrality": result.noncentrality,
+        "fit_noncentrality": result.fit_noncentrality,
         "redundancy": float(result.redundancy.sum()) + result.among_repeats,
         "redundancy_among_repeats": result.among_repeats,
         "observations_by_name": [
-            {**_pattern_data(result, k), "redundancy": float(result.left[k])}
+            {**_pattern_data(result, k), "redundancy": result.left[k]}
             for k in np.flatnonzero(is_single).tolist()
         ],
         "events": [_pattern_data(result, k) for k in np.flatnonzero(~is_single).tolist()],
@@ -510,8 +496,8 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
         "name": name(result.patterns, k),
         "kind": str(result.patterns.kind[k]),
         "unit": result.patterns.unit(k),
-        "minimal_detectable": finite(float(result.minimal_detectable[k])),
-        "found_by_fit": finite(float(result.found_by_fit[k])),
+        "minimal_detectable": result.minimal_detectable[k],
+        "found_by_fit": result.found_by_fit[k],
         **({"harmless": result.is_harmless(k)} if result.information[k] <= 0.0 else {}),
         "effects": {
             symbol: {
@@ -519,7 +505,7 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
                     result.effects[symbol].change[k]
                     * (1.0 if hidden else result.minimal_detectable[k])
                 ),
-                "standard_uncertainty": finite(float(result.effects[symbol].uncertainty[k])),
+                "standard_uncertainty": result.effects[symbol].uncertainty[k],
                 "at": _where(result, symbol, k),
             }
             for symbol in result.effects

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import finite, number
+from ballplate.presentation.formatting import finite, number, picked
 from ballplate.rank.verdict import Verdict, changed_names, length
 from ballplate.simulator.inputs.settings import listed
 from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
@@ -178,8 +178,7 @@ def _data(repair: Repair) -> dict[str, Any]:
         "average_U6_with_uncertain_offsets": None if loose is None else loose.total / loose.count,
         "offset_uncertainty": OFFSET_TRIAL,
         "rests_on_exact_offsets": repair.rests_on_offsets,
-        "readings": repair.readings,
-        "seconds": repair.seconds,
+        **picked(repair, "readings", "seconds"),
         "edits": [
             {"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in repair.edits
         ],

@@ -45,7 +45,7 @@ class ReproducedDocument(Result):
     def lines(self) -> list[str]:
         return reproduction_lines(self.found)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return reproduction_data(self.found)
 
     def to_markdown(self) -> str:

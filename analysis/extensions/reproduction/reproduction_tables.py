@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data, number, picked
+from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.simulator.inputs.settings import number_of
 
 from .compare import (
@@ -511,8 +511,7 @@ def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
         ],
         "sections": [_section_data(section) for section in reproduction.sections],
     }
-    plain_data: dict[str, Any] = as_data(data)
-    return plain_data
+    return data
 
 
 # In one piece: one mapping, in the form in which the JSON has it.

@@ -47,7 +47,7 @@ class CertifiedScores(Result):
     def lines(self) -> list[str]:
         return score_lines(self.problems, self.scores)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return score_data(self.scores, self.answers)
 
     def rows(self) -> list[dict[str, Any]]:

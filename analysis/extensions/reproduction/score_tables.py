@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ballplate.presentation.formatting import aligned, as_data
+from ballplate.presentation.formatting import aligned
 
 from .certified_problems import CertifiedProblem
 from .score import Score
@@ -67,4 +67,4 @@ def _cell(score: Score | None) -> str:
 
 def score_data(scores: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
     """Scores, and the answers that they are of."""
-    return {"scores": as_data(scores), "problems": results}
+    return {"scores": scores, "problems": results}

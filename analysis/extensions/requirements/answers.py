@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import aligned
+from ballplate.presentation.columns import table_lines
 from ballplate.presentation.panels import TriedValues, draw_tried
 from ballplate.presentation.result import Result
 
@@ -67,7 +67,7 @@ class Reach(Result):
         """The goal, whether the design meets it, and a row for each unknown."""
         now = "met" if self.present.is_met else "not met"
         lines = [
-            f"{self.label}: {self.title}",
+            self.heading,
             f"goal: {self.goal}",
             f"as drawn: {now}; {self.present.words}",
         ]
@@ -76,17 +76,20 @@ class Reach(Result):
                 f"rank deficiency {self.deficiency}: repair the design first; ballplate check shows"
                 " what is undetermined"
             )
-        rows = [["changed alone", "as drawn", "needed", "result"]]
-        for one in self.answers:
-            rows.append([one.title, one.present, _needed(one), _outcome(one)])
-        lines += ["", *aligned(rows, [False] * 4)]
+        columns = {
+            "changed alone": "title",
+            "as drawn": "present",
+            "needed": _needed,
+            "result": _outcome,
+        }
+        lines += ["", *table_lines(columns, self.answers)]
         notes = []
         for one in self.answers:
             notes += [f"{one.name}: {one.beside}"] if one.beside else []
             notes += [f"{one.name}: {remark}" for remark in one.remarks]
         return lines + ["", *notes] if notes else lines
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         """The same as plain data, values in metres or as numbers."""
         goal = self.goal
         told: dict[str, Any] = {"kind": goal.kind}
@@ -95,31 +98,18 @@ class Reach(Result):
         if goal.kind == "quantity":
             told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
         return {
-            "experiment": self.label,
-            "title": self.title,
+            **self.named,
             "goal": told,
             "is_met": self.present.is_met,
             "as_drawn": self.present.words,
             "rank_deficiency": self.deficiency,
             "undetermined": self.present.undetermined,
-            "answers": {
-                one.name: {
-                    "status": {"varied": "cannot be varied"}.get(one.status, one.status),
-                    "as_drawn": one.present or None,
-                    "needed": one.words if one.is_met else None,
-                    "needed_value": one.value if one.is_met else None,
-                    "limit": one.words if one.status == "none" else None,
-                    "outcome": one.outcome or None,
-                    "next": one.beside or None,
-                    "remarks": list(one.remarks),
-                }
-                for one in self.answers
-            },
+            "answers": {one.name: _answer_data(one) for one in self.answers},
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each unknown."""
-        return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
+        return [{"unknown": one.name, **_answer_data(one)} for one in self.answers]
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """How far from the goal the values are that were tried of each unknown.
@@ -150,6 +140,19 @@ def _panel(answer: Answer) -> TriedValues:
     }.get(answer.name, ("", 1.0))
     values, distances, is_met = (np.array(column) for column in zip(*answer.tried, strict=True))
     return TriedValues(answer.title, unit, factor * values, distances, is_met)
+
+
+def _answer_data(one: Answer) -> dict[str, Any]:
+    return {
+        "status": {"varied": "cannot be varied"}.get(one.status, one.status),
+        "as_drawn": one.present or None,
+        "needed": one.words if one.is_met else None,
+        "needed_value": one.value if one.is_met else None,
+        "limit": one.words if one.status == "none" else None,
+        "outcome": one.outcome or None,
+        "next": one.beside or None,
+        "remarks": list(one.remarks),
+    }
 
 
 def _needed(answer: Answer) -> str:

@@ -55,7 +55,7 @@ class FittedCurve(Result):
     def lines(self) -> list[str]:
         return curve_lines(self.curve, self.file.name, self.powers, self.at)
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         return curve_data(self.curve, str(self.file), self.powers, self.at)
 
     def rows(self) -> list[dict[str, Any]]:

@@ -7,9 +7,9 @@ import math
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
     aligned,
-    as_data,
     ascii_units,
     micro,
     number,
@@ -197,19 +197,17 @@ def _value_lines(curve: ErrorCurve, at: np.ndarray) -> list[str]:
         np.abs(slopes) * curve.fit.space.length < NOTHING * np.abs(curve.fit.coefficients).max()
     ] = 0.0
     spread = curve.standard_uncertainty(at)
-    heads = [f"{x.words}, {micro(x.unit)}", f"curve, {micro(y.unit)}"]
-    rows = [[*heads, "standard uncertainty", "expanded", "slope"]]
-    for place, value, slope, u in zip(at, values, slopes, spread, strict=True):
-        rows.append(
-            [
-                f"{place / x.factor:.7g}",
-                f"{value / y.factor:.5g}",
-                number(u / y.factor, 3),
-                number(curve.coverage_factor * u / y.factor, 3),
-                f"{in_unit(curve, slope, 1):.4g} {derivative_unit(curve, 1)}",
-            ]
-        )
-    return aligned(rows, [True] * 5)
+    columns = {
+        f"{x.words}, {micro(x.unit)}": (at / x.factor, "{:.7g}".format),
+        f"curve, {micro(y.unit)}": (values / y.factor, "{:.5g}".format),
+        "standard uncertainty": (spread / y.factor, 3),
+        "expanded": (curve.coverage_factor * spread / y.factor, 3),
+        "slope": (
+            [in_unit(curve, slope, 1) for slope in slopes],
+            lambda slope: f"{slope:.4g} {derivative_unit(curve, 1)}",
+        ),
+    }
+    return table_lines(columns)
 
 
 # In one piece: one mapping, in the form in which the JSON has it.
@@ -218,48 +216,43 @@ def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> 
     fitted, points, space = curve.fit, curve.points, curve.fit.space
     found = pieces(fitted, powers)
     units = {"length": "m", "angle": "rad"}
-    data: dict[str, Any] = as_data(
-        {
-            "file": file,
-            "x": {"name": points.x_column.name, "unit": units[points.x_column.kind]},
-            "y": {"name": points.y_column.name, "unit": units[points.y_column.kind]},
-            **picked(space, "order", "knots"),
-            "start": space.lower,
-            "end": space.upper,
-            **picked(
-                curve, "boundaries", "corners", "sigma", "sigma_is_estimated", "coverage_factor"
-            ),
-            **picked(fitted, "degrees_of_freedom", "sum_of_squares"),
-            "prescribed": [
-                {
-                    "at": hold.places[0],
-                    **picked(hold, "derivative", "value"),
-                    "missed_by": fitted.violation(hold),
-                }
-                for hold in curve.holds
-            ],
-            "free_coefficients": fitted.free,
-            "powers": powers,
-            "pieces": records(
-                start=found.breaks[:-1], end=found.breaks[1:], coefficients=found.coefficients
-            ),
-            "points": records(
-                point=points.names,
-                x=fitted.x,
-                y=fitted.y,
-                curve=fitted.y - fitted.residuals,
-                residual=fitted.residuals,
-                standard_uncertainty=curve.standard_uncertainty(fitted.x),
-            ),
-            "values": records(
-                x=at,
-                curve=fitted.values(at),
-                slope=fitted.values(at, 1),
-                standard_uncertainty=curve.standard_uncertainty(at),
-            ),
-        }
-    )
-    return data
+    return {
+        "file": file,
+        "x": {"name": points.x_column.name, "unit": units[points.x_column.kind]},
+        "y": {"name": points.y_column.name, "unit": units[points.y_column.kind]},
+        **picked(space, "order", "knots"),
+        "start": space.lower,
+        "end": space.upper,
+        **picked(curve, "boundaries", "corners", "sigma", "sigma_is_estimated", "coverage_factor"),
+        **picked(fitted, "degrees_of_freedom", "sum_of_squares"),
+        "prescribed": [
+            {
+                "at": hold.places[0],
+                **picked(hold, "derivative", "value"),
+                "missed_by": fitted.violation(hold),
+            }
+            for hold in curve.holds
+        ],
+        "free_coefficients": fitted.free,
+        "powers": powers,
+        "pieces": records(
+            start=found.breaks[:-1], end=found.breaks[1:], coefficients=found.coefficients
+        ),
+        "points": records(
+            point=points.names,
+            x=fitted.x,
+            y=fitted.y,
+            curve=fitted.y - fitted.residuals,
+            residual=fitted.residuals,
+            standard_uncertainty=curve.standard_uncertainty(fitted.x),
+        ),
+        "values": records(
+            x=at,
+            curve=fitted.values(at),
+            slope=fitted.values(at, 1),
+            standard_uncertainty=curve.standard_uncertainty(at),
+        ),
+    }
 
 
 def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:

@@ -15,7 +15,7 @@ from ballplate.extensions.pages.motions import (
     weak_motions,
 )
 from ballplate.extensions.repair.written import plane_of
-from ballplate.presentation.formatting import finite
+from ballplate.presentation.formatting import finite, picked
 from ballplate.rank.verdict import Verdict, verdict
 from ballplate.results.parts import scale_lines, scale_warnings, target_lines
 from ballplate.results.prediction import length_headline, rank_words
@@ -53,15 +53,11 @@ def answer(experiment: Experiment) -> dict[str, Any]:
     engine = perf_counter() - start
     lengths = quantities.get("U6")
     return {
-        "title": experiment.title,
-        "label": experiment.label,
+        **picked(experiment, "title", "label"),
         "scene": _scene(experiment),
         "rank": {
             "words": rank_words(judged),
-            "deficiency": judged.deficiency,
-            "expected": judged.expected,
-            "parameters": judged.parameters,
-            "observations": judged.observations,
+            **picked(judged, "deficiency", "expected", "parameters", "observations"),
             "reasons": list(judged.reasons),
         },
         "quantities": [_row(one) for one in quantities.values()],
@@ -87,14 +83,10 @@ def scale_answer(experiment: Experiment) -> list[str]:
 
 def _row(quantity: Quantity) -> dict[str, Any]:
     return {
-        "symbol": quantity.symbol,
-        "description": quantity.description,
+        **picked(quantity, "symbol", "description"),
         "maximum": finite(quantity.maximum),
         "average": finite(quantity.average),
-        "unit": quantity.unit,
-        "count": quantity.count,
-        "undetermined": quantity.undetermined,
-        "largest": quantity.largest,
+        **picked(quantity, "unit", "count", "undetermined", "largest"),
     }
 
 
@@ -117,8 +109,7 @@ def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
     read = np.zeros(len(layout.names), bool)
     read[place.balls] = True
     return {
-        "name": place.name,
-        "artefact": place.artefact,
+        **picked(place, "name", "artefact"),
         "probes": list(place.probes),
         "groups": len(place.readings),
         "readings": place.count,
@@ -176,8 +167,7 @@ def _map(at: Linearisation) -> dict[str, Any]:
         "y": found.y.tolist(),
         "slices": [
             {
-                "name": one.name,
-                "level": one.level,
+                **picked(one, "name", "level"),
                 "values": [[finite(v) for v in row] for row in one.values.tolist()],
             }
             for one in found.slices

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.formatting import picked
 from ballplate.simulator.computing.processes import begin_worker, interruptions_blocked
 from ballplate.simulator.computing.steps import ProgressStep, Report
 from ballplate.simulator.experiment.layout import lay_out
@@ -161,10 +162,7 @@ class Job:
         return {
             "id": number,
             "job": self.name,
-            "fingerprint": self.fingerprint,
-            "state": self.state,
-            "step": self.step,
-            "result": self.result,
+            **picked(self, "fingerprint", "state", "step", "result"),
             "page": bool(self.page),
         }
 

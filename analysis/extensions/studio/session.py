@@ -10,6 +10,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
+from ballplate.presentation.formatting import picked
 from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.trust import OPENED, UNKNOWN
 
@@ -397,10 +398,7 @@ def _with_first_variant(document: DesignDocument) -> DesignDocument:
 
 def _message_data(message: Message) -> dict[str, Any]:
     return {
-        "line": message.line,
-        "column": message.column,
-        "path": message.path,
-        "text": message.text,
+        **picked(message, "line", "column", "path", "text"),
     }
 
 

@@ -104,9 +104,9 @@ class SweepResult(Result):
         axes = names[: names.index("status") + 1]
         shown = [*axes, *(name for name in ("rank_deficiency",) if name in names), *averages]
         table = self.table[shown].to_string(index=False).splitlines()
-        return [f"{self.label}: {self.title}", self.headline(), *self.remarks, "", *table]
+        return [self.heading, self.headline(), *self.remarks, "", *table]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         one = self.summary
         counts = {"cells": one.cells, "done": one.done, "failed": one.failed, "left": one.left}
         return {
