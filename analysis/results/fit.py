@@ -23,7 +23,7 @@ from ballplate.simulator.readings.point_files import ensure_points, probe_places
 from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
-from ..presentation.columns import table_lines, table_rows
+from ..presentation.columns import Columns, table_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
 from ..presentation.formatting import given, picked
@@ -244,9 +244,9 @@ class Fit(FitResult):
             **self.said(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each parameter."""
-        return table_rows(ESTIMATE_COLUMNS, self.estimates)
+        return ESTIMATE_COLUMNS, self.estimates
 
     def __getitem__(self, name: str) -> ParameterEstimate:
         """The estimate of a parameter: its value, standard uncertainty and unit.
