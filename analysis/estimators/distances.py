@@ -4,7 +4,7 @@ comparison as in section 6.2.7.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -37,7 +37,7 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
-from ..presentation.columns import table_lines, table_rows
+from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import by_name, given, number, picked
 from ..presentation.result import FitResult, Result
 from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
@@ -136,9 +136,9 @@ class AlternativeFit(FitResult):
             **self.said(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each of the machine's parameters."""
-        return table_rows(ESTIMATE_COLUMNS, self.estimates)
+        return ESTIMATE_COLUMNS, self.estimates
 
 
 @dataclass(frozen=True, repr=False)
@@ -245,16 +245,16 @@ class EstimatorComparison(Result):
         against = {name: {**vars(one), "unit": "m"} for name, one in self.of_truth.items()}
         return data | given(against_truth=against)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each data set on which both estimators converged."""
         kept = [k for k in range(self.trials) if k not in self.failed]
         columns = {
             "data set": kept,
-            "root mean square": self.rms,
-            "maximum": self.maximum,
+            "root mean square, µm": self.rms,
+            "maximum, µm": self.maximum,
             "unit": ["m"] * len(kept),
         }
-        return table_rows(columns)
+        return columns, ()
 
 
 def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:

@@ -4,7 +4,7 @@ weights.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -26,7 +26,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.columns import table_lines, table_rows
+from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import picked
 from ..presentation.result import FitResult
 from ..rank.verdict import rank_complaint
@@ -131,7 +131,7 @@ class LengthFit(FitResult):
             **self.said(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each adjustment of the machine."""
         columns = {
             "adjustment": "what",
@@ -141,7 +141,7 @@ class LengthFit(FitResult):
             "unit": "unit",
             "to do": "words",
         }
-        return table_rows(columns, self.adjustments)
+        return columns, self.adjustments
 
 
 def has_all_errors(design: Design) -> bool:

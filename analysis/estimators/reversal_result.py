@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.columns import table_lines, table_rows
+from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import (
     SHOWN,
     by_name,
@@ -186,7 +187,7 @@ class ReversalFit(FitResult):
             **self.said(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each parameter, that of multiple redundancy beside it."""
         redundant = {one.name: one for one in self.redundant}
         others = [redundant.get(one.name) for one in self.estimates]
@@ -200,7 +201,7 @@ class ReversalFit(FitResult):
             ],
             "unit": "unit",
         }
-        return table_rows(columns, self.estimates)
+        return columns, self.estimates
 
     def plot(self, path: str | Path | None = None) -> Figure:
         return draw_vectors(self.residual_vectors(), self.title, path)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import repeat
 from typing import Any
 
@@ -37,8 +37,7 @@ def table_lines(
     """
     texts, right, used = [], [], [one for one in _pairs(columns) if one[0] != without]
     has_units = isinstance(dict(columns).get("unit"), str)
-    units = _values("unit", items) if has_units else ()
-    of_rows = [amount_of(1.0, unit)[0] for unit in units] or repeat(1.0)
+    of_rows = _factors_of_rows(columns, items)
     for heading, source, form in used:
         unit, values = heading.split(", ")[-1], _values(source, items)
         factors = repeat(FACTORS[unit]) if unit in FACTORS else of_rows
@@ -60,13 +59,44 @@ def by_axis(
     return {heading.format(axis): (own, of_own) for axis, own, of_own in columns}
 
 
-def table_rows(columns: Columns, items: Sequence[Any] = ()) -> list[dict[str, Any]]:
-    """A table as a mapping for each row, without units in the names."""
-    unit = f", ({'|'.join(FACTORS)})$"
-    every = [(re.sub(unit, "", heading), source) for heading, source, _ in _pairs(columns)]
-    names, sources = zip(*every, strict=True)
-    values = (_values(source, items) for source in sources)
-    return [dict(zip(names, row, strict=True)) for row in zip(*values, strict=True)]
+def table_rows(
+    columns: Columns, items: Sequence[Any] = (), in_units: bool = False
+) -> list[dict[str, Any]]:
+    """A table as a mapping for each row: in metres, radians and ratios, without units in the names,
+    or in the units of the headings and of the column "unit".
+    """
+    if in_units:
+        used = _in_units(columns, items)
+    else:
+        unit = f", ({'|'.join(FACTORS)})$"
+        used = {
+            re.sub(unit, "", heading): _values(source, items)
+            for heading, source, _ in _pairs(columns)
+        }
+    return [dict(zip(used, row, strict=True)) for row in zip(*used.values(), strict=True)]
+
+
+def _in_units(columns: Columns, items: Sequence[Any]) -> dict[str, list[Any]]:
+    """Values by headings; a list of units is that of rows in metres, and left out."""
+    own, found = _factors_of_rows(columns, items), {}
+    for heading, source, _ in _pairs(columns):
+        unit, values = heading.split(", ")[-1], _values(source, items)
+        if unit == "unit" and isinstance(source, str):
+            values = list(map(unit_of, values))
+        factors = repeat(FACTORS[unit]) if unit in FACTORS else own
+        if heading != "unit" or isinstance(source, str):
+            found[heading] = [
+                factor * value if isinstance(value, float) else value
+                for value, factor in zip(values, factors, strict=False)
+            ]
+    return found
+
+
+def _factors_of_rows(columns: Columns, items: Sequence[Any]) -> Iterable[float]:
+    """What takes values to the units that the column "unit" shows."""
+    if not isinstance(dict(columns).get("unit"), str):
+        return repeat(1.0)
+    return [amount_of(1.0, unit)[0] for unit in _values("unit", items)]
 
 
 def _pairs(columns: Columns) -> list[tuple[str, Any, Any]]:

@@ -29,7 +29,7 @@ def amount_of(value: float, unit: str) -> tuple[float, str]:
     >>> amount_of(0.02, "K")
     (20.0, 'mK')
     """
-    return (1e3 * value, "mK") if unit == "K" else (1e6 * value, SHOWN[unit])
+    return (1e3 * value, "mK") if unit == "K" else (1e6 * value, shown_unit(unit))
 
 
 def unit_of(unit: str) -> str:

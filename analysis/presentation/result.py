@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.inputs.settings import number_of
 
+from .columns import Columns, table_rows
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .formatting import as_data
@@ -75,16 +76,32 @@ class Result:
         return tuple(f"warning: {warning}" for warning in self.warnings)
 
     def rows(self) -> list[dict[str, Any]]:
-        """The rows of its main table, by the names of the columns; units have a column of their
-        own.
+        """The rows of its main table in metres, radians and ratios, by the names of the columns;
+        units have a column of their own.
         """
-        raise NotImplementedError
+        found = self.columns()
+        if found is None:
+            raise NotImplementedError
+        return table_rows(*found)
+
+    def columns(self) -> tuple[Columns, Sequence[Any]] | None:
+        """The columns of its main table, see `presentation.columns`, and the items that are its
+        rows; None where `rows` has them.
+        """
+        return None
+
+    def _shown_rows(self) -> list[dict[str, Any]]:
+        """The rows in the units that people read."""
+        found = self.columns()
+        return self.rows() if found is None else table_rows(*found, in_units=True)
 
     def to_frame(self) -> pandas.DataFrame:
-        """Its main table as a data frame; what is undetermined is NaN."""
+        """Its main table as a data frame in the units that its headings or its column "unit" name;
+        what is undetermined is NaN.
+        """
         import pandas
 
-        return pandas.DataFrame(self.rows())
+        return pandas.DataFrame(self._shown_rows())
 
     def to_markdown(self) -> str:
         """Its main table in Markdown, with label and title above."""
@@ -99,14 +116,17 @@ class Result:
         return self._written(as_html)
 
     def to_csv(self, path: str | Path | None = None) -> str:
-        """Its main table as CSV with a line of headings, with all digits; what is undetermined is
-        empty.
+        """Its main table as CSV with a line of headings, in metres, radians and ratios with all
+        digits; what is undetermined is empty.
 
         With a path the text is written as well.
 
         :raises OSError: the file cannot be written.
         """
-        text = self.to_frame().to_csv(index=False, lineterminator="\n")
+        import pandas
+
+        frame = pandas.DataFrame(self.rows())
+        text = frame.to_csv(index=False, lineterminator="\n")
         if path is not None:
             write_file(path, text.encode())
         return text
@@ -124,7 +144,7 @@ class Result:
         """Title and main table in a form, with four digits, `most` rows of it and how many more
         there are; without any row, the result in a few words.
         """
-        every, title = self.rows(), self.heading
+        every, title = self._shown_rows(), self.heading
         rows = every[:most]
         if not rows:
             return form("; ".join([f"{title}: {self.headline()}", *self.notes]), [])

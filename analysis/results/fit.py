@@ -20,7 +20,7 @@ from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
-from ..presentation.columns import table_lines, table_rows
+from ..presentation.columns import Columns, table_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
 from ..presentation.formatting import given, picked
@@ -245,9 +245,9 @@ class Fit(FitResult):
             **self.said(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each parameter."""
-        return table_rows(ESTIMATE_COLUMNS, self.estimates)
+        return ESTIMATE_COLUMNS, self.estimates
 
     def __getitem__(self, name: str) -> ParameterEstimate:
         """The estimate of a parameter: its value, standard uncertainty and unit.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,8 +12,8 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.settings import hint, number_of
 
-from ..presentation.columns import table_rows
-from ..presentation.formatting import given, picked
+from ..presentation.columns import Columns
+from ..presentation.formatting import given
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
@@ -159,26 +159,25 @@ class Prediction(Result):
     def _repr_html_(self) -> str:
         return super()._repr_html_() + picture_in_space(self)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each of U1 to U6; where these were not asked for, one with the rank and
         U6.
         """
         if self.quantities:
-            columns = {"symbol": list(self.quantities), **QUANTITY_COLUMNS}
-            return table_rows(columns, list(self.quantities.values()))
-        judged, lengths = self.verdict, self.lengths
-        return [
-            {
-                "rank": rank_words(judged),
-                **picked(judged, "parameters", "observations"),
-                "rank deficiency": judged.deficiency,
-                "as expected": judged.as_expected,
-                "weakly determined": len(judged.weak),
-                "U6 average": math.nan if lengths is None else lengths.average,
-                "U6 maximum": math.nan if lengths is None else lengths.maximum,
-                "unit": "m",
-            }
-        ]
+            symbols = {"symbol": list(self.quantities)}
+            return {**symbols, **QUANTITY_COLUMNS}, list(self.quantities.values())
+        columns = {
+            "rank": lambda one: rank_words(one.verdict),
+            "parameters": "verdict.parameters",
+            "observations": "verdict.observations",
+            "rank deficiency": "verdict.deficiency",
+            "as expected": "verdict.as_expected",
+            "weakly determined": lambda one: len(one.verdict.weak),
+            "U6 average, µm": lambda one: one.lengths.average if one.lengths else math.nan,
+            "U6 maximum, µm": lambda one: one.lengths.maximum if one.lengths else math.nan,
+            "unit": ["m"],
+        }
+        return columns, [self]
 
 
 Named = TypeVar("Named")

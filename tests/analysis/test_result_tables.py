@@ -9,6 +9,7 @@ from typing import Any
 
 import ballplate as bp
 import numpy as np
+import pandas as pd
 import pytest
 from ballplate.presentation.result import Result
 from ballplate.results.fit import Fit
@@ -90,7 +91,7 @@ def assert_shows(cells: list[list[str]], rows: list[dict[str, Any]]) -> None:
 
 def test_every_form_has_every_row(results: list[Result]) -> None:
     for result in results:
-        rows = result.rows()
+        rows = result.to_frame().to_dict("records")
         page = Cells(result.to_html())
         shown = Cells(result._repr_html_())
         most = 12 if isinstance(result, Fit) else 60
@@ -104,9 +105,20 @@ def test_every_form_has_every_row(results: list[Result]) -> None:
 
 def test_csv_has_all_digits(results: list[Result]) -> None:
     for result in results:
-        frame, found = result.to_frame(), read_table(io.StringIO(result.to_csv()))
+        frame, found = pd.DataFrame(result.rows()), read_table(io.StringIO(result.to_csv()))
         for name in frame.select_dtypes("number"):
             np.testing.assert_array_equal(found[name].to_numpy(float), frame[name].to_numpy(float))
+
+
+def test_frames_are_in_the_units_that_people_read(results: list[Result]) -> None:
+    """In that of a column, or in that of the column "unit"; those of CSV in metres and radians."""
+    prediction, fit = results[0], results[2]
+    for result, name in ((prediction, "average"), (fit, "standard uncertainty")):
+        frame, rows = result.to_frame(), pd.DataFrame(result.rows())
+        np.testing.assert_allclose(frame[name], 1e6 * rows[name], rtol=1e-12)
+        assert set(frame["unit"]) <= {"µm", "µrad", "µm, µrad"} and set(rows["unit"]) & {"m", "rad"}
+    (row,) = bp.check(bp.quickstart()).to_frame().to_dict("records")
+    assert row["U6 average, µm"] == 1e6 * bp.run(bp.quickstart())["U6"].average
 
 
 def test_what_is_undetermined_says_so(results: list[Result]) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
-from ballplate.presentation.columns import table_rows
+from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import number
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import freedom_words
@@ -193,13 +193,13 @@ class NextStep(Result):
             "remarks": self.notes,
         }
 
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each position that can be read next, the best first; U6 in metres."""
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
+        """One row for each position that can be read next, the best first."""
         columns = {
             "position": "name",
             "readings": "readings",
-            "U6 average": "average",
+            "U6 average, µm": "average",
             "undetermined": "then.undetermined",
             "target met": "then.is_met",
         }
-        return table_rows(columns, self.offered)
+        return columns, self.offered

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines, table_rows
+from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
 from ballplate.results.estimates import EstimatedFunctions, Function, estimated_functions
@@ -166,7 +167,7 @@ class Bootstrap(Result):
             "estimates": self.rows(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each estimate; what is undetermined is NaN."""
         columns = {
             "parameter": "name",
@@ -179,7 +180,7 @@ class Bootstrap(Result):
             "95 % to": self.intervals[:, 1],
             "unit": "unit",
         }
-        return table_rows(columns, self.functions)
+        return columns, self.functions
 
 
 U = "standard uncertainty"

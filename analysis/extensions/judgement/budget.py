@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom
@@ -95,21 +96,18 @@ class UncertaintyBudget(Result):
         rows.append([expanded, *(_micrometres(one, self.coverage_factor) for one in figures)])
         return aligned(rows, [False, *[True] * len(figures)])
 
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each source and figure, in metres."""
-        return [
-            {
-                "figure": one.name,
-                "source": source,
-                "standard uncertainty": contribution,
-                "share of variance": _ratio(one, k),
-                "unit": "m",
-            }
-            for one in self.figures
-            for k, (source, contribution) in enumerate(
-                zip(self.sources, one.contributions, strict=True)
-            )
-        ]
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
+        """One row for each source and figure."""
+        count = len(self.sources)
+        pairs = [(one, k) for one in self.figures for k in range(count)]
+        columns = {
+            "figure": [one.name for one, _ in pairs],
+            "source": list(self.sources) * len(self.figures),
+            "standard uncertainty, µm": [one.contributions[k] for one, k in pairs],
+            "share of variance": [_ratio(*pair) for pair in pairs],
+            "unit": ["m"] * len(pairs),
+        }
+        return columns, ()
 
     def data(self) -> dict[str, Any]:
         return {

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.columns import table_rows
+from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.simulator.readings.observed_readings import ObservedReadings
@@ -147,9 +148,9 @@ class Validation(FitResult):
             **self.said(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each that was left out."""
-        return table_rows(COLUMNS, self.left_out)
+        return COLUMNS, self.left_out
 
 
 COLUMNS = {
@@ -160,8 +161,8 @@ COLUMNS = {
     "sigma": "sigma",
     "chance": "chance",
     "largest standardised error": "worst.standardised",
-    "length change": "lengths.change",
-    "standard uncertainty": "lengths.standard_uncertainty",
+    "length change, µm": "lengths.change",
+    "standard uncertainty, µm": "lengths.standard_uncertainty",
     "unit": lambda one: "m",
 }
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines, table_rows
+from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.formatting import (
     number,
 )
@@ -159,9 +160,9 @@ class ConvertedMap(Result):
             "parameters": self.rows(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each parameter of the new map."""
-        return table_rows(COLUMNS, self._parameters)
+        return COLUMNS, self._parameters
 
     @property
     def _parameters(self) -> list[ParameterEstimate]:

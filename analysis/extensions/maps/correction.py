@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.presentation.columns import by_axis, table_lines, table_rows
+from ballplate.presentation.columns import Columns, by_axis, table_lines
 from ballplate.presentation.formatting import (
     number,
     picked,
@@ -283,10 +283,10 @@ class Correction(Result):
             "warnings": list(self.warnings),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each point, in metres."""
-        u = by_axis("u {}", self.standard_uncertainties)
-        return table_rows({**self._columns(), **u, "unit": ["m"] * len(self.points)})
+        u = by_axis("u {}, µm", self.standard_uncertainties)
+        return {**self._columns(), **u, "unit": ["m"] * len(self.points)}, ()
 
 
 OWN_SCALES = (

@@ -4,14 +4,14 @@ the points of a file, with their expanded uncertainties.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import by_axis, table_rows
+from ballplate.presentation.columns import Columns, by_axis
 from ballplate.presentation.formatting import given, records
 from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
@@ -146,19 +146,19 @@ class FittedErrorMap(Result):
             found["budget"] = budget_data(self.budget, k)
         return found | {"warnings": self.warnings}
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each point, in metres."""
         found, k = self.errors, self.fitted.coverage_factor
         columns = {
             **self._of_table(),
-            **by_axis("{}", found.points),
-            **by_axis("error {}", found.errors),
-            **by_axis("U {}", k * found.uncertainties),
-            "resultant": found.resultant,
+            **by_axis("{}, mm", found.points),
+            **by_axis("error {}, µm", found.errors),
+            **by_axis("U {}, µm", k * found.uncertainties),
+            "resultant, µm": found.resultant,
             "k": [k] * len(found.points),
             "unit": ["m"] * len(found.points),
         }
-        return table_rows(columns)
+        return columns, ()
 
     def _of_table(self) -> dict[str, list[str]]:
         """What a table of points says of each: its name and probe."""

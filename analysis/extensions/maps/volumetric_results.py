@@ -4,13 +4,13 @@ along its axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.columns import by_axis, table_rows
+from ballplate.presentation.columns import Columns, by_axis
 from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
 from ballplate.presentation.vectors import Vectors, draw_vectors
@@ -139,17 +139,17 @@ class ErrorsAtPoints(MachineErrors):
             **self.more_data(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each point, in metres."""
         found = self.errors
         columns = {
-            **by_axis("{}", found.points),
-            **by_axis("error {}", found.systematic),
-            "resultant": found.resultant,
-            **by_axis("random {}", found.deviation),
+            **by_axis("{}, mm", found.points),
+            **by_axis("error {}, µm", found.systematic),
+            "resultant, µm": found.resultant,
+            **by_axis("random {}, µm", found.deviation),
             "unit": ["m"] * len(found.points),
         }
-        return table_rows(columns)
+        return columns, ()
 
     def point_lines(self) -> Iterator[str]:
         return error_csv(self.errors, self.realisations, self.places.names_of_points)
