@@ -21,6 +21,7 @@ from ballplate.extensions.maps.campaign_tests import (
     joint_difference,
     with_common,
 )
+from ballplate.extensions.maps.same_readings import read_once_words, same_positions, same_readings
 from ballplate.presentation.formatting import aligned, as_data, number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.results.campaign_sigmas import campaign_sigmas
@@ -34,11 +35,6 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.same_readings import (
-    read_once_words,
-    same_positions,
-    same_readings,
-)
 
 from .lack_of_fit import chance_words
 from .left_out import MOST_POINTS

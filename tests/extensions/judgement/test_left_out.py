@@ -18,6 +18,7 @@ from ballplate.extensions.judgement.left_out import (
     rest_of,
     validate,
 )
+from ballplate.extensions.maps.same_readings import same_readings
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
@@ -25,7 +26,6 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
-from ballplate.simulator.readings.same_readings import same_readings
 from numpy.typing import NDArray
 
 from tests.reference import dense
