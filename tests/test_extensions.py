@@ -174,6 +174,10 @@ OPTIONS = {
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
+    "certificates": (
+        ["fit", "designs/quickstart.yaml", "READINGS", "--certificate", "values.csv"],
+        ["simulate", "designs/quickstart.yaml", "-o", "again.csv", "--certificate", "values.csv"],
+    ),
     "ci": (
         ["check", "designs/quickstart.yaml", "--format", "github"],
         ["check", "designs/quickstart.yaml", "--format", "junit"],

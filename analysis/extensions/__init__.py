@@ -74,9 +74,11 @@ SHIPPED = (
     _here(
         "certificates",
         commands={"certificate": "certificate_command"},
+        functions=_from("interface", "certificate"),
         services={
             **_from("plate_certificate", "plate_certificate"),
             **_from("digital_values", "read_digital"),
+            **_from("certificate_files", "CertificateFiles"),
         },
     ),
     _here(
