@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ballplate.api import (
-        certificate,
         check,
         compare,
         experiment,
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from ballplate.arguments import load, load_all
     from ballplate.estimators.estimator_choice import ESTIMATORS
     from ballplate.extensions.campaign.interface import sheet
+    from ballplate.extensions.certificates.interface import certificate
     from ballplate.extensions.compensation.interface import compensation, read_compensation
     from ballplate.extensions.judgement.interface import budget, models, validate
     from ballplate.extensions.laboratory.interface import read_report
@@ -166,7 +166,6 @@ _KERNEL = {
     "ballplate.api": (
         "check",
         "compare",
-        "certificate",
         "experiment",
         "fit",
         "load_map",

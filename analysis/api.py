@@ -186,28 +186,6 @@ def simulate(
     return pandas.DataFrame(reading_columns(found.design, found.readings, found.x))
 
 
-def certificate(
-    experiment: Experiment | PathLike, seed: int | None = None, exact: bool = False
-) -> pandas.DataFrame:
-    """Values of certificates, priors and probe offsets that go with `simulate` of the same seed, as
-    a table that `fit` takes.
-
-    >>> certificate(quickstart()).head(2)[["item", "first", "second"]].values.tolist()
-    [['calibration[0]', 'r1c1', 'r1c5'], ['calibration[0]', 'r5c1', 'r5c5']]
-    """
-    import pandas
-    from ballplate.simulator.readings import certificate_files
-    from ballplate.simulator.readings.simulated import simulated_readings
-
-    ensure_whole(0, seed=seed)
-    ensure_type(bool, "True or False", exact=exact)
-    chosen = experiment_of(experiment)
-    certificate_files.ensure_certified(chosen)
-    found = certificate_files.with_drawn_values(chosen, simulated_readings(chosen, seed, exact))
-    rows = certificate_files.certificate_rows(found)
-    return pandas.DataFrame(rows, columns=list(certificate_files.COLUMNS))
-
-
 @overload
 def fit(
     experiment: Experiment | PathLike,

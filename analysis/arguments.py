@@ -108,13 +108,14 @@ def observed_of(
 ) -> tuple[Experiment, ObservedReadings]:
     """An experiment with its certificate, and what its readings are."""
     from ballplate.simulator.experiment.layout import lay_out
-    from ballplate.simulator.readings.certificate_files import read_certificate
+    from ballplate.simulator.inputs.extensions import service
     from ballplate.simulator.readings.reading_files import read_readings
 
     chosen = experiment_of(experiment)
     tables, stated = tables_of(readings, chosen), len(chosen.doubts)
     if certificate is not None:
-        chosen = read_certificate(table_of("certificate", certificate), chosen)
+        read = service("CertificateFiles").read
+        chosen = read(table_of("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
     return chosen, replace(observed, of_certificate=chosen.doubts[stated:])
 

@@ -176,6 +176,10 @@ OPTIONS = {
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
     "maps": (["run", "designs/quickstart.yaml", "--lengths"],),
+    "certificates": (
+        ["fit", "designs/quickstart.yaml", "READINGS", "--certificate", "values.csv"],
+        ["simulate", "designs/quickstart.yaml", "-o", "again.csv", "--certificate", "values.csv"],
+    ),
     "ci": (
         ["check", "designs/quickstart.yaml", "--format", "github"],
         ["check", "designs/quickstart.yaml", "--format", "junit"],

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
-from .telling import complain, note, tell_notes, warn
+from .telling import note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
-    from ballplate.simulator.maps.fitted_map import FittedMap
 
     from ..presentation.result import Result
 
@@ -277,28 +276,6 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
         text = f"the file has several variants; choose one with --variant: {', '.join(names)}"
         raise refused(options.files[0], text)
     return found[0]
-
-
-# What fitted_map takes.
-FITTED = "map file, as fit -o writes it, or experiment file that names its readings"
-
-
-def fitted_map(path: Path) -> FittedMap:
-    """The map of a map file, or of an experiment file that names its readings, which are fitted;
-    says what is to be said of that fit.
-
-    :raises ExperimentError: the file is wrong, or the estimate did not converge.
-    """
-    from ballplate.simulator.experiment.map_files import read_map
-
-    from ..results.fit_of_file import fit_of_file, kind_of_file
-
-    if kind_of_file(path) != "experiment":
-        return read_map(path)
-    found = fit_of_file(path)
-    for remark in found.notes:
-        complain(remark)
-    return found.to_map()
 
 
 def print_lines(lines: Sequence[str]) -> None:

@@ -93,13 +93,13 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
     :raises UsageError: the readings come first, and the experiment file after them.
     :raises ExperimentError: one of the files is wrong.
     """
-    from ballplate.simulator.readings.certificate_files import read_certificate
+    from ballplate.simulator.inputs.extensions import service
 
     refuse_wrong_order(options)
     experiment = with_options(options, single(options))
     stated = len(experiment.doubts)
     if options.certificate:
-        experiment = read_certificate(options.certificate, experiment)
+        experiment = service("CertificateFiles").read(options.certificate, experiment)
     sources = options.readings or named_sources(experiment)
     return experiment, tables(options, experiment, sources, experiment.doubts[stated:])
 

@@ -52,33 +52,28 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Write one set of readings."""
-    from ballplate.simulator.readings.certificate_files import (
-        certified_values,
-        ensure_certified,
-        with_drawn_values,
-        write_certificate,
-    )
+    from ballplate.simulator.inputs.extensions import service
     from ballplate.simulator.readings.reading_files import write_readings
     from ballplate.simulator.readings.simulated import simulated_readings
 
     from .common import single
 
     experiment = single(options)
-    if options.certificate:
-        ensure_certified(experiment)
+    certificates = service("CertificateFiles") if options.certificate else None
+    if certificates is not None:
+        certificates.ensure_certified(experiment)
     found = simulated_readings(experiment, options.seed, options.exact)
     texts: dict[Path, Callable[[TextIO], None]] = {
         options.output: lambda stream: write_readings(stream, found.design, found.readings, found.x)
     }
     told = [f"{len(found.readings)} readings written to {options.output}"]
-    if options.certificate:
-        drawn = with_drawn_values(experiment, found)
+    if certificates is not None:
+        drawn = certificates.with_drawn_values(experiment, found)
         how = "exact" if options.exact else f"drawn with seed {found.seed}"
         comment = f"certificate values of {experiment.label}, {how}, for fit --certificate"
-        texts[options.certificate] = lambda stream: write_certificate(stream, drawn, comment)
-        told.append(
-            f"{len(certified_values(drawn))} certificate values written to {options.certificate}"
-        )
+        texts[options.certificate] = lambda stream: certificates.write(stream, drawn, comment)
+        count = len(certificates.certified_values(drawn))
+        told.append(f"{count} certificate values written to {options.certificate}")
     writers = {path: text_writer(print_to) for path, print_to in texts.items() if str(path) != "-"}
     is_written = write(options, writers)
     for line, path in zip(told, texts, strict=True) if is_written else ():

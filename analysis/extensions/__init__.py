@@ -119,9 +119,11 @@ SHIPPED = (
                 "evaluate",
             ),
         },
+        functions=_from("interface", "certificate"),
         services={
             **_from("plate_certificate", "plate_certificate"),
             **_from("digital_values", "read_digital"),
+            **_from("certificate_files", "CertificateFiles"),
         },
     ),
     _here(

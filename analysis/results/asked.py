@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import function, optional_function
 
 
@@ -26,13 +27,12 @@ class AskedResult(Protocol):
 
 
 class GroupVariances(AskedResult, Protocol):
-    """How uncertain `groups` of observations are, with the `weighting` of their variances."""
+    """How uncertain `groups` of observations are."""
 
     @property
     def groups(self) -> Sequence[Any]: ...
 
-    @property
-    def weighting(self) -> Sequence[float]: ...
+    def reweighted(self, design: Design) -> Design: ...
 
 
 class IssuedCertificate(AskedResult, Protocol):

@@ -17,8 +17,8 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
+from ballplate.simulator.readings.given_points import ensure_points, probe_places
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.point_files import ensure_points, probe_places
 
 from ..presentation.columns import Columns, table_lines
 from ..presentation.files import write_file

@@ -27,7 +27,6 @@ from .diagnosis import diagnosed, lack_of_fit
 from .estimates import estimated_functions, parameter_estimates
 from .fit import Fit
 from .groupings import Grouping
-from .observation_groups import groups_of, reweighted
 from .plates import plate_coordinates
 from .residuals import largest_residuals
 from .study import check
@@ -71,8 +70,7 @@ def fit(
     if components is not None:
         found = _variance_components(experiment, at, observed.x, components)
     if found is not None and reweight:
-        groups = groups_of(design, components or "axis")
-        observed = replace(observed, design=reweighted(design, groups, np.array(found.weighting)))
+        observed = replace(observed, design=found.reweighted(design))
         anew = fit(experiment, observed, "given", monomials)
         squares = solution.factor.sum_of_squares
         return replace(

@@ -27,8 +27,8 @@ from ballplate.simulator.maps.fitted_map import (
     MapData,
     determined_only,
 )
+from ballplate.simulator.readings.fingerprints import fingerprint, position_fingerprints
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.same_readings import fingerprint, position_fingerprints
 
 from ..presentation.formatting import number
 from .estimates import ParameterEstimate

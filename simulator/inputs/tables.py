@@ -393,3 +393,11 @@ def split_cells(line: str) -> list[tuple[int, str]] | None:
         if not separator:
             return cells
         start = match.end()
+
+
+def headings(text: str) -> set[str]:
+    """Names of the columns in the first line that is no comment, without their units."""
+    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
+    line = next(lines, "")
+    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
+    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}

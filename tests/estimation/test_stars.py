@@ -11,6 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from ballplate.extensions.certificates.certificate_files import (
+    read_certificate,
+    with_drawn_values,
+    write_certificate,
+)
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import draw, estimate_batch
 from ballplate.results.study import predict
@@ -24,11 +29,6 @@ from ballplate.simulator.experiment.load import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.certificate_files import (
-    read_certificate,
-    with_drawn_values,
-    write_certificate,
-)
 from ballplate.simulator.readings.simulated import simulated_readings
 from scipy.optimize import minimize
 

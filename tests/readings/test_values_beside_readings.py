@@ -11,9 +11,9 @@ import ballplate as bp
 import pandas as pd
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.certificates.certificate_files import read_certificate
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.certificate_files import read_certificate
 
 QUICKSTART = "designs/quickstart.yaml"
 

@@ -26,12 +26,12 @@ from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import to_python
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.certificate_files import certified_values
 from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.scale import OWN_SCALES, scale_of
 from ballplate.uncertainty.tasks import expansion
 
 from .certificate_csv import coordinates_csv, covariance_csv
+from .certificate_files import certified_values
 from .certificate_page import certificate_page
 from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
 from .datum import Datum, chosen_datum, in_datum, relative_to

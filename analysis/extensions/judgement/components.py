@@ -12,12 +12,12 @@ from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
 from ballplate.results.groupings import Grouping
-from ballplate.results.observation_groups import ObservationGroup, groups_of
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from .observation_groups import ObservationGroup, groups_of, reweighted
 from .restricted_likelihood import (
     SMALLEST,
     GroupSums,
@@ -92,6 +92,10 @@ class VarianceComponents(Result):
     by: Grouping
     groups: tuple[VarianceComponent, ...]
     weighting: tuple[float, ...]
+
+    def reweighted(self, design: Design) -> Design:
+        """A design whose groups have the estimated variances."""
+        return reweighted(design, groups_of(design, self.by), np.array(self.weighting))
 
     def headline(self) -> str:
         count = sum(one.is_estimated for one in self.groups)

@@ -18,9 +18,10 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.extensions.reliability.leftover import Leftover
-from ballplate.results.observation_groups import ObservationGroup
 from ballplate.simulator.computing.threads import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers
+
+from .observation_groups import ObservationGroup
 
 # Ratios of variances that are looked at; outside these, a group has no scatter or no weight.
 SMALLEST, LARGEST = 1e-4, 1e6

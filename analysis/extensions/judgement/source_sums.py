@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.results.groupings import Grouping
-from ballplate.results.observation_groups import ObservationGroup, groups_of, kinds_of_rows
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, Observations
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
@@ -27,6 +26,8 @@ from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
+
+from .observation_groups import ObservationGroup, groups_of, kinds_of_rows
 
 # Lengths of standards are formed of readings and compared with certificates; each row mixes both.
 READ_STANDARDS = "readings of length standards"

@@ -19,13 +19,10 @@ from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
 from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
-from ballplate.simulator.readings.same_readings import (
-    position_fingerprints,
-    same_positions,
-    same_readings,
-)
+from ballplate.simulator.readings.fingerprints import position_fingerprints
 
 from .campaign_tests import EstimatedSigma
+from .same_readings import same_positions, same_readings
 from .volumetric_errors import Volumetric
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it

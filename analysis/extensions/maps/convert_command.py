@@ -5,8 +5,10 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli.common import FITTED, add_json, map_path
+from ballplate.cli.common import add_json, map_path
 from ballplate.cli.outputs import add_force, add_output, write
+
+from .fitted_argument import FITTED, fitted_map
 
 DESCRIPTION = (
     "Convert a map that fit -o has written to another error model of the same volume: the nearest"
@@ -40,7 +42,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Convert a map; 1 if the new model cannot follow the old one."""
-    from ballplate.cli.common import fitted_map, show
+    from ballplate.cli.common import show
     from ballplate.cli.telling import complain
     from ballplate.simulator.experiment.map_files import write_map
 

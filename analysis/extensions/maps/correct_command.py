@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import FITTED, add_json, coverage_factor, fitted_map, show
+from ballplate.cli.common import add_json, coverage_factor, show
 from ballplate.cli.outputs import (
     UsageError,
     Writer,
@@ -17,10 +17,13 @@ from ballplate.cli.outputs import (
 )
 from ballplate.cli.telling import warn
 
+from .fitted_argument import FITTED, fitted_map
+
 if TYPE_CHECKING:
     from ballplate.simulator.design.objects import Tasks
     from ballplate.simulator.maps.fitted_map import FittedMap
-    from ballplate.simulator.readings.point_files import GivenPoints
+
+    from .point_files import GivenPoints
 
 DESCRIPTION = (
     "Correct the scale readings of a CSV file by a map that fit -o has written: corrected"
@@ -104,9 +107,9 @@ def _add_lengths(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print points and lengths, and write what was asked for; 1 if something is undetermined."""
     from ballplate.simulator.inputs.settings import hint
-    from ballplate.simulator.readings.point_files import read_points
 
     from .correction import MOST_CO_ORDINATES, correction
+    from .point_files import read_points
 
     fitted = fitted_map(options.map)
     names, probe = fitted.probes.names, options.probe or fitted.probe

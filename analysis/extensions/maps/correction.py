@@ -25,11 +25,11 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.point_files import GivenPoints
 from ballplate.uncertainty.scale import stretches
 
 from .corrected_points import corrected_with_blocks, corrected_with_root, tips
 from .mapped_lengths import mapped_lengths
+from .point_files import GivenPoints
 
 # Points and lengths that the text shows.
 SHOWN = 20

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.cli.common import (
-    FITTED,
     add_formats,
     add_picture,
     count,
-    fitted_map,
     print_json,
     print_lines,
     write_picture,
 )
 from ballplate.cli.outputs import UsageError, Writer, add_force
 from ballplate.cli.telling import complain
+
+from .fitted_argument import FITTED, fitted_map
 
 if TYPE_CHECKING:
     from .error_curves_result import ErrorCurves

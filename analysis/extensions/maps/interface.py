@@ -317,8 +317,9 @@ def correct(
     '0.080 µm'
     """
     import pandas
-    from ballplate.simulator.readings import point_files
+    from ballplate.simulator.readings.given_points import ensure_points, probe_places
 
+    from . import point_files
     from .correction import correction
     from .wanted_lengths import between_named
 
@@ -335,9 +336,9 @@ def correct(
         table = table_of("points", points)
         given = point_files.read_points(table, names, str(one), chosen.volume, offsets)
     else:
-        x = point_files.ensure_points(points, chosen.volume)
+        x = ensure_points(points, chosen.volume)
         asked = chosen.probe if probe is None else probe
-        probes = point_files.probe_places(asked, names, len(x))
+        probes = probe_places(asked, names, len(x))
         x = x if offsets is None else x - offsets[probes]
         given = point_files.GivenPoints(x, ("",) * len(x), probes)
     wanted = between_named(given, lengths)

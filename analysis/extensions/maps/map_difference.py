@@ -17,12 +17,12 @@ from ballplate.results.adjustments import FEW
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import InCommon
-from ballplate.simulator.readings.same_readings import read_once_words
 
 from .campaign_tests import TOO_ALIKE, TOO_RARE
 from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
+from .same_readings import read_once_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,7 +18,9 @@ from ballplate.simulator.inputs.quantities import parse_length
 from ballplate.simulator.inputs.tables import header_names
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.point_files import PROBE, ensure_points, read_points
+from ballplate.simulator.readings.given_points import ensure_points
+
+from .point_files import PROBE, read_points
 
 # Points along each axis of the volume, and along a line, unless told.
 GRID, POINTS = (5, 5, 5), 21

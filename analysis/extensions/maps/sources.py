@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from ballplate.results.fit import Fit
-from ballplate.results.fit_of_file import fit_of_file, kind_of_file
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import read_map
 from ballplate.simulator.inputs.quantities import LengthFunction
@@ -15,12 +14,13 @@ from ballplate.simulator.inputs.tables import header_names, read_table
 from ballplate.simulator.machines.description import MachineDescription
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.point_files import NAMING
 from ballplate.simulator.readings.reading_files import AXES
 
 from .compared_maps import ComparedMap, expected_map, map_of_fit
 from .comparison import ComparisonSettings, NotComparableError, compared
+from .fit_of_file import fit_of_file, kind_of_file
 from .map_difference import MapDifference
+from .point_files import NAMING
 from .shared_certificates import with_shared_certificates
 
 Side = Path | Fit | FittedMap

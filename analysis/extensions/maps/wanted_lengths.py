@@ -12,7 +12,8 @@ from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError, 
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.point_files import GivenPoints, read_pairs
+
+from .point_files import GivenPoints, read_pairs
 
 
 def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
+from ballplate.extensions.certificates.certificate_files import certified_values, with_values
 from ballplate.extensions.judgement.budget import UncertaintyBudget
 from ballplate.extensions.judgement.source_sums import source_sums, sources_of
 from ballplate.simulator.estimation.corrections import corrected_points
@@ -20,7 +21,6 @@ from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.readings.certificate_files import certified_values, with_values
 from numpy.typing import NDArray
 
 from tests.reference import dense

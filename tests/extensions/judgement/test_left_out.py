@@ -15,13 +15,13 @@ from ballplate.extensions.judgement.left_out import (
     rest_of,
     validate,
 )
+from ballplate.extensions.maps.same_readings import same_readings
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
-from ballplate.simulator.readings.same_readings import same_readings
 from numpy.typing import NDArray
 
 from tests.reference import dense

@@ -23,6 +23,11 @@ from ballplate.extensions.judgement.components import (
     judged,
     told_apart,
 )
+from ballplate.extensions.judgement.observation_groups import (
+    ObservationGroup,
+    groups_of,
+    reweighted,
+)
 from ballplate.extensions.judgement.restricted_likelihood import (
     at_ratios,
     estimated_ratios,
@@ -30,7 +35,6 @@ from ballplate.extensions.judgement.restricted_likelihood import (
 )
 from ballplate.extensions.reliability.leftover import Leftover, leftover
 from ballplate.results.groupings import GROUPINGS, Grouping
-from ballplate.results.observation_groups import ObservationGroup, groups_of, reweighted
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.joint_values import JointValues

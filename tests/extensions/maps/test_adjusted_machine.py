@@ -13,6 +13,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.certificates.certificate_files import with_drawn_values
 from ballplate.extensions.maps.adjusted_machine import (
     AdjustedMachine,
     adjusted_machine,
@@ -29,7 +30,6 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.certificate_files import with_drawn_values
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray

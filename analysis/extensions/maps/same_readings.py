@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-from itertools import pairwise
-
 import numpy as np
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fitted_map import InCommon
+from ballplate.simulator.readings.observed_readings import ObservedReadings
 from numpy.typing import NDArray
-
-from ..inputs.settings import listing
-from ..machines.protocol import Array
-from ..maps.fitted_map import InCommon
-from .observed_readings import ObservedReadings
 
 Flags = NDArray[np.bool_]
 
@@ -22,34 +18,6 @@ NOTHING = 1e-12
 FINEST, WHOLE = 12, 1e-3
 # Readings that were rounded by more than this part of the repeatability are compared as they stand.
 FINE = 0.51
-# Hexadecimal digits of a position's fingerprint.
-DIGITS = 16
-
-
-def position_fingerprints(observed: ObservedReadings) -> dict[str, str]:
-    """Beginnings of the SHA-256 of what the readings of each position say, by its name: balls,
-    probes and scale readings, in whatever order and form tables have them, and whatever positions
-    are called.
-    """
-    design, readings = observed.design, observed.design.readings
-    balls = np.array(design.balls.names)[readings.ball]
-    probes = np.array(design.probes.names)[readings.probe]
-    order = np.lexsort((*observed.x.T[::-1], probes, balls, readings.position))
-    position = readings.position[order]
-    starts = np.flatnonzero(np.diff(position, prepend=-1)).tolist()
-    found = {}
-    for start, end in pairwise([*starts, len(order)]):
-        rows = order[start:end]
-        digest = hashlib.sha256("\n".join([*balls[rows], *probes[rows]]).encode())
-        digest.update(np.ascontiguousarray(observed.x[rows], "<f8").tobytes())
-        found[design.positions.names[int(position[start])]] = digest.hexdigest()[:DIGITS]
-    return found
-
-
-def fingerprint(observed: ObservedReadings) -> str:
-    """SHA-256 of what all readings say."""
-    parts = sorted(position_fingerprints(observed).values())
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def same_positions(first: ObservedReadings, second: ObservedReadings) -> tuple[str, ...]:

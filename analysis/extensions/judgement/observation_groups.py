@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.results.groupings import Grouping
 from ballplate.simulator.design.arrays import Design, Observations, measured, reading_uncertainties
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
-
-from .groupings import Grouping
 
 
 @dataclass(frozen=True)

@@ -12,26 +12,30 @@ is of) and value:
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-
-from ..design.arrays import Design, State
-from ..design.observations.calibration import (
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.calibration import (
     FAR_FROM_DRAWING,
     CertifiedValue,
     far_from_drawing,
 )
-from ..design.observations.priors import Priors
-from ..experiment.exact_values import exact_contradictions
-from ..experiment.model import Experiment
-from ..experiment.star_tables import doubt_of_table
-from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path, refused
-from ..inputs.quantities import (
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.experiment.exact_values import exact_contradictions
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.star_tables import doubt_of_table
+from ballplate.simulator.inputs.messages import (
+    MOST_MESSAGES,
+    ExperimentError,
+    Message,
+    format_path,
+    refused,
+)
+from ballplate.simulator.inputs.quantities import (
     SMALLEST,
     QuantityError,
     length_text,
@@ -39,12 +43,12 @@ from ..inputs.quantities import (
     parse_length,
     parse_ratio,
 )
-from ..inputs.settings import hint, listing
-from ..inputs.spreadsheets import CsvWriter
-from ..inputs.tables import FileRow, read_table
-from ..inputs.yamltree import GivenText, read_text
-from ..machines.protocol import Array, ErrorModel
-from .simulated import Simulated
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.inputs.tables import FileRow, headings, read_table
+from ballplate.simulator.inputs.yamltree import GivenText, read_text
+from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.readings.simulated import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"
@@ -287,9 +291,11 @@ def is_calibration_table(source: GivenText) -> bool:
     return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
 
 
-def headings(text: str) -> set[str]:
-    """Names of the columns in the first line that is no comment, without their units."""
-    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
-    line = next(lines, "")
-    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
-    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}
+class CertificateFiles:
+    """The functions that read and write values of certificates."""
+
+    ensure_certified = staticmethod(ensure_certified)
+    certified_values = staticmethod(certified_values)
+    with_drawn_values = staticmethod(with_drawn_values)
+    write = staticmethod(write_certificate)
+    read = staticmethod(read_certificate)

@@ -1,0 +1,32 @@
+"""A map that a command names, of a map file or of readings that are fitted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballplate.cli.telling import complain
+
+if TYPE_CHECKING:
+    from ballplate.simulator.maps.fitted_map import FittedMap
+
+# What is taken.
+FITTED = "map file, as fit -o writes it, or experiment file that names its readings"
+
+
+def fitted_map(path: Path) -> FittedMap:
+    """The map of a map file, or of an experiment file that names its readings, which are fitted;
+    says what is to be said of that fit.
+
+    :raises ExperimentError: the file is wrong, or the estimate did not converge.
+    """
+    from ballplate.simulator.experiment.map_files import read_map
+
+    from .fit_of_file import fit_of_file, kind_of_file
+
+    if kind_of_file(path) != "experiment":
+        return read_map(path)
+    found = fit_of_file(path)
+    for remark in found.notes:
+        complain(remark)
+    return found.to_map()
