@@ -199,6 +199,9 @@ WALK = {
     "schema": Walk({}, {}),
 }
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
+# Of each kind: a name without an option, a table, a page, a picture, a second file.
+KINDS = [("init", "NAME.yaml"), ("simulate", "-o"), ("fit", "--report"), ("lengths", "--plot")]
+KINDS += [("correct", "--covariance")]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
 LEFT_OUT += ("--tasks", "--against", "--compare", "--watch")
@@ -354,11 +357,19 @@ def refused(
         assert words in err
 
 
-@pytest.mark.usefixtures("idle")
-@pytest.mark.parametrize(("command", "option"), WRITING)
-class TestToldBeforeTheWork:
-    """The command must not begin."""
+everywhere = pytest.mark.parametrize(("command", "option"), WRITING)
+of_each_kind = pytest.mark.parametrize(("command", "option"), KINDS)
 
+
+@pytest.mark.usefixtures("idle")
+class TestToldBeforeTheWork:
+    """The command must not begin.
+
+    That every option of every command goes the same way is seen above, and in what it is told of
+    its own inputs.
+    """
+
+    @of_each_kind
     def test_folder(
         self,
         command: str,
@@ -385,6 +396,7 @@ class TestToldBeforeTheWork:
             refused(line(command, files, {option: path}, "--force"), capsys, 3, f"{path}: {told}")
         assert content(tmp_path) == before
 
+    @of_each_kind
     def test_folder_that_takes_no_file(
         self,
         command: str,
@@ -411,6 +423,7 @@ class TestToldBeforeTheWork:
             refused(line(command, files, {option: path}, "--force"), capsys, 3, told)
         assert content(tmp_path) == before
 
+    @of_each_kind
     def test_file_that_may_not_be_changed(
         self,
         command: str,
@@ -438,6 +451,7 @@ class TestToldBeforeTheWork:
         )
         assert path.read_bytes() == b"old"
 
+    @of_each_kind
     def test_existing_file(
         self,
         command: str,
@@ -452,6 +466,7 @@ class TestToldBeforeTheWork:
         refused(line(command, files, {option: path}), capsys, 3, told)
         assert path.read_text() == "old"
 
+    @everywhere
     def test_extra(
         self,
         command: str,
@@ -474,6 +489,7 @@ class TestToldBeforeTheWork:
                 main(line(command, files, {option: path}))
         assert not path.exists()
 
+    @everywhere
     @pytest.mark.parametrize("make_link", [os.symlink, os.link])
     def test_input(
         self,
@@ -501,6 +517,7 @@ class TestToldBeforeTheWork:
             path.unlink()
         assert content(files) == before
 
+    @everywhere
     def test_other_output(
         self,
         command: str,
@@ -523,6 +540,7 @@ class TestToldBeforeTheWork:
             for path in paths.values():
                 path.unlink()
 
+    @everywhere
     def test_screen(
         self,
         command: str,
