@@ -254,8 +254,10 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
     assert main(fit) == 0
     shutil.copy(folder / "map.yaml", folder / "second-map.yaml")
-    fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
-    bp.write_map(fit.to_map(), folder / "curved-map.yaml")
+    # In the plane, where a model has few curves to be drawn.
+    few = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}
+    own = bp.load(folder / "design.yaml").with_({"error_model": few})
+    bp.write_map(bp.fit(own, bp.simulate(own)).to_map(), folder / "curved-map.yaml")
     return folder
 
 
@@ -842,7 +844,7 @@ def test_a_signal_leaves_files_old_or_new_together(
     is_there: bool, files: Path, tmp_path: Path
 ) -> None:
     """At a sample of all openings, links, changes of names and removals."""
-    task = {"signals": SIGNALS, "every": 3, "slow": is_there}
+    task = {"signals": SIGNALS, "every": 5 if is_there else 3, "slow": is_there}
     states = [
         ensure_whole(*one)
         for one in cuts(("simulate", "sheet"), files, tmp_path / "written", is_there, **task)

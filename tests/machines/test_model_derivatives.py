@@ -155,7 +155,7 @@ def draw(model: ErrorModel, seed: int, size: float) -> tuple[np.ndarray, np.ndar
 
 @models
 def test_jacobian_is_the_derivative_of_the_error(model: ErrorModel) -> None:
-    for size in (0.0, 1e-5, 1e-2):
+    for size in (0.0, 1e-2):
         x, a, p = draw(model, 1, size)
         assert_derivative(
             model.jacobian(x, a, p),

@@ -150,20 +150,26 @@ def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
     assert "rank deficiency" in told and "beyond the limit" in told
 
 
-@pytest.mark.parametrize("name", VERDICTS)
+OF_MAPS = [
+    ["correct", "MAP", "points.csv"],
+    ["map", "MAP", "--grid", "2,2,2"],
+    ["map", "MAP", "--error", "EXX"],
+    ["curves", "MAP"],
+    ["convert", "MAP", "--to", "metric"],
+    ["adjust", "MAP", "--scale", "x=10 um/m"],
+    ["diff", "MAP", "clean.npz"],
+    ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
+]
+
+
 @pytest.mark.parametrize(
-    "arguments",
+    ("arguments", "name"),
     [
-        ["correct", "MAP", "points.csv"],
-        ["map", "MAP", "--grid", "2,2,2"],
-        ["map", "MAP", "--error", "EXX"],
-        ["curves", "MAP"],
-        ["convert", "MAP", "--to", "metric"],
-        ["adjust", "MAP", "--scale", "x=10 um/m"],
-        ["diff", "MAP", "clean.npz"],
-        ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
+        *((given, "beyond") for given in OF_MAPS),
+        # The words of the others are of the same line.
+        *((OF_MAPS[0], name) for name in VERDICTS if name != "beyond"),
     ],
-    ids=lambda given: " ".join(given[:1] + given[2:3]),
+    ids=lambda given: given if isinstance(given, str) else " ".join(given[:1] + given[2:3]),
 )
 def test_every_command_repeats_it(
     arguments: list[str],
