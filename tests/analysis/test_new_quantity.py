@@ -83,7 +83,7 @@ print(json.dumps({
 def small() -> dict[str, Any]:
     """The quickstart with few balls, coefficients and points."""
     found: dict[str, Any] = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text("utf-8"))
-    found["artefacts"]["plate"]["balls"] = [4, 4]
+    found["artefacts"]["plate"]["balls"] = [3, 3]
     found["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
     found["evaluation"]["points"] = {"random": 20, "seed": 1}
     return found
