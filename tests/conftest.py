@@ -7,6 +7,9 @@ from __future__ import annotations
 import ast
 import atexit
 import compileall
+import contextlib
+import gc
+import importlib
 import importlib.util
 import inspect
 import os
@@ -119,11 +122,31 @@ def left_out() -> dict[str, str]:
 def pytest_configure(config: pytest.Config) -> None:
     # Files are handed out in the order below, not by the number of their tests.
     config.option.loadscopereorder = False
+    # What collection makes is kept: looking for garbage in it takes a sixth of its time, and a tenth
+    # of that of small tests.
+    gc.disable()
     if not os.access(ROOT, os.W_OK):
         from hypothesis import settings
 
         settings.register_profile("read-only", database=None)
         settings.load_profile("read-only")
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Half of the processes load all files beginning with the last, so that of two processes in a
+    new checkout each compiles half of them, and not both all.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+    if session.config.args_source is session.config.ArgsSource.TESTPATHS and int(worker[2:]) % 2:
+        for path in sorted((ROOT / "tests").rglob("test_*.py"), reverse=True):
+            # Whatever a file raises, its collection raises and reports, too.
+            with contextlib.suppress(Exception, pytest.skip.Exception):
+                importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:

@@ -18,6 +18,7 @@ from ballplate.simulator.experiment.layout import lay_out
 
 from tests.reference import dense
 from tests.reference.package_copies import package_copy, said_by_copy
+from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[2]
 
@@ -80,15 +81,6 @@ print(json.dumps({
 """
 
 
-def small() -> dict[str, Any]:
-    """The quickstart with few balls, coefficients and points."""
-    found: dict[str, Any] = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text("utf-8"))
-    found["artefacts"]["plate"]["balls"] = [4, 4]
-    found["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    found["evaluation"]["points"] = {"random": 20, "seed": 1}
-    return found
-
-
 def package(folder: Path) -> Path:
     """A copy of the package, and the file of quantities in it."""
     return package_copy(folder) / "uncertainty" / "quantities.py"
@@ -99,7 +91,7 @@ def told(folder: Path) -> dict[str, Any]:
     work = folder / "work"
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
-    (work / "base.yaml").write_text(yaml.safe_dump(small()), encoding="utf-8")
+    (work / "base.yaml").write_text(yaml.safe_dump(small_sections(20, 1)), encoding="utf-8")
     (work / "sweep.yaml").write_text(SWEEP)
     return said_by_copy(folder, SCRIPT, work)
 
@@ -123,7 +115,7 @@ def diagonals() -> np.ndarray:
     """Standard uncertainties of the four lengths between opposite corrected corners, by the dense
     reference.
     """
-    design = lay_out(experiment(small()))
+    design = lay_out(experiment(small_sections(20, 1)))
     problem = dense.planned(design, 3, 3)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (
         design.machine.volume.size

@@ -438,7 +438,7 @@ def test_closed_pipe_is_no_error() -> None:
             code,
             "check",
             "--quiet",
-            *sorted(map(str, Path("designs/certified").glob("*.yaml")))[:4],
+            *3 * [QUICKSTART],
         ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -31,8 +31,9 @@ def found_by(
     return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True)
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("arguments", ["--version", "check --help", "schema"])
+@pytest.mark.parametrize(
+    ("arguments", "unbuffered"), [("--version", "1"), ("check --help", ""), ("schema", "")]
+)
 def test_help_and_version_are_data_too(arguments: str, unbuffered: str, tmp_path: Path) -> None:
     for to, reason in ((">&-", "Bad file descriptor"), (">/dev/full", "No space left on device")):
         found = found_by(["bash", "-c", f"{COMMAND} {arguments} {to}"], tmp_path, unbuffered)

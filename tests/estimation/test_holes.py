@@ -29,24 +29,16 @@ from ballplate.simulator.readings.reading_files import read_readings, write_read
 from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.reference import dense
+from tests.reference.small_quickstart import PLATE, small_sections
 
 QUICKSTART: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
-PLATE = {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}
 HOLES = {**PLATE, "reads": "in plane", "flatness": "5 um"}
 FLATNESS = 5e-6
 
 
 def small(**changes: Any) -> Experiment:
     """The quickstart with nine holes and few coefficients."""
-    model = {**QUICKSTART["error_model"], "position_coefficients": 3, "rotation_coefficients": 3}
-    stated = {
-        **QUICKSTART,
-        "error_model": model,
-        "artefacts": {"plate": HOLES},
-        "evaluation": {"points": {"random": 12, "seed": 3}, "probe": "down"},
-        **changes,
-    }
-    return written_in_python(stated, Path())
+    return written_in_python(small_sections(**{"artefacts": {"plate": HOLES}} | changes), Path())
 
 
 def across(design: Design) -> np.ndarray:

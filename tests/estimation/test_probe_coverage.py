@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.experiment.layout import lay_out
@@ -19,9 +18,9 @@ from ballplate.simulator.experiment.load import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 
 from tests.influences.campaigns import Shares, assert_covered, shares_of
+from tests.reference.small_quickstart import small_sections
 
-QUICKSTART: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
-NAMES = tuple(QUICKSTART["probes"])
+NAMES = tuple(small_sections()["probes"])
 TIPS = np.array(
     [[0.0, 0.0, -0.05], [0.05, 0.0, 0.0], [-0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, -0.05, 0.0]]
 )
@@ -31,16 +30,7 @@ PAGE = Path("docs/reference/validation.md")
 
 
 def small(**changes: Any) -> Experiment:
-    """The quickstart with nine balls and few coefficients."""
-    model = {**QUICKSTART["error_model"], "position_coefficients": 3, "rotation_coefficients": 3}
-    stated = {
-        **QUICKSTART,
-        "error_model": model,
-        "artefacts": {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}},
-        "evaluation": {"points": {"random": 12, "seed": 3}, "probe": "down"},
-        **changes,
-    }
-    return written_in_python(stated, Path())
+    return written_in_python(small_sections(**changes), Path())
 
 
 def with_tips(experiment: Experiment, tips: np.ndarray) -> Design:

@@ -34,6 +34,7 @@ from scipy.optimize import minimize
 
 from tests.reference import dense
 from tests.reference.designs import altered
+from tests.reference.small_quickstart import small_sections
 
 QUICKSTART: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
 TIPS = np.array(
@@ -44,18 +45,8 @@ U = 2e-7
 
 def small(star: dict[str, Any] | None = None, **changes: Any) -> Experiment:
     """The quickstart with few balls and coefficients, and a star of all its probes."""
-    model = {**QUICKSTART["error_model"], "position_coefficients": 3, "rotation_coefficients": 3}
-    plate = {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}
-    stated = {
-        **QUICKSTART,
-        "error_model": model,
-        "artefacts": {"plate": plate},
-        "evaluation": {"points": {"random": 12, "seed": 3}, "probe": "down"},
-        **changes,
-    }
-    if star is not None:
-        stated["stars"] = [star]
-    return written_in_python(stated, Path())
+    stars = {} if star is None else {"stars": [star]}
+    return written_in_python(small_sections(**changes | stars), Path())
 
 
 def arms(count: int, d: int, seed: int) -> np.ndarray:

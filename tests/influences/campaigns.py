@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from tests.reference import dense
+from tests.reference.small_quickstart import small_sections
 
 Real = NDArray[np.float64]
 TOP = Path(__file__).parents[2]
@@ -35,12 +36,7 @@ Law = Callable[[Design, Real, Any], Any]
 
 def file_with(folder: Path, influences: list[dict[str, Any]] | None, **changed: Any) -> Experiment:
     """The first example with influence quantities, a smaller plate and fewer coefficients."""
-    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
-    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    told["true_machine"] = {"kind": "zero"}
-    told["evaluation"]["points"] = {"random": 20, "seed": 3}
-    told["sigma"] = "given"
+    told = small_sections(20, true_machine={"kind": "zero"}, sigma="given")
     told |= {"influences": influences} if influences else {}
     path = folder / "file.yaml"
     path.write_text(yaml.safe_dump(told | changed), encoding="utf-8")

@@ -7,14 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import ballplate as bp
 import numpy as np
 import pytest
 import yaml
-from ballplate.montecarlo.experiments import trials
 from ballplate.rank.verdict import verdict
-from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
@@ -27,8 +24,6 @@ from ballplate.uncertainty.quantities import QUANTITIES
 
 from tests.influences.campaigns import (
     Real,
-    assert_covered,
-    coverage,
     dense_spread,
     file_with,
     plain,
@@ -118,17 +113,6 @@ def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -
     # Of no use if drift had no part in them.
     without = dense.standard_uncertainties(of, symbols=["U6"])["U6"].mean()
     assert widened["U6"].mean() > 1.01 * without
-
-
-def test_the_derivative_is_that_of_the_law(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    state, readings = nominal_state(design), design.readings
-    x = np.random.default_rng(3).random((len(readings), 3))
-    blocks = reading_blocks(design, state, readings, x)
-    assert blocks.by_influence is not None
-    for k, e in enumerate(np.eye(4)):
-        expected = -law(design, x, e) / design.machine.repeatability
-        np.testing.assert_allclose(blocks.by_influence[:, :, k], expected, rtol=1e-9, atol=1e-6)
 
 
 def test_a_drift_within_one_position_is_as_large_as_its_time_says(tmp_path: Path) -> None:
@@ -329,57 +313,6 @@ def test_balls_read_again_in_a_position_stay_apart(tmp_path: Path) -> None:
         return at.of_shared(np.eye(len(at.layout))[at.layout.influences])
 
     assert (uncertainty(True) < 0.6 * uncertainty(False)).all()
-
-
-def test_declared_drifts_are_covered(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    assert_covered(coverage(design, design, law, SPREAD, 40), 40)
-
-
-@pytest.mark.long
-def test_declared_drifts_are_covered_in_many_campaigns(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    assert_covered(coverage(design, design, law, SPREAD, 3000), 3000)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name",
-    [
-        "drift declared",
-        "drift unknown",
-        "drift not declared",
-    ],
-)
-def test_the_page_states_what_is_wrong_otherwise(
-    name: str, drawn: Experiment, tmp_path: Path
-) -> None:
-    design = lay_out(drawn)
-    told = {
-        "drift declared": design,
-        "drift unknown": lay_out(file_with(tmp_path, [UNKNOWN | {"times": TIMES}])),
-        "drift not declared": plain(design),
-    }[name]
-    found = coverage(design, told, law, SPREAD, 400)
-    assert told_on_page(name) == pytest.approx(found.row, rel=0.01, abs=0.5)
-
-
-def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
-    outcome = trials(drawn, 1024).outcome
-    assert outcome is not None and not outcome.failed
-    for one in outcome.comparisons.values():
-        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
-
-
-def test_fit_tells_the_drift(drawn: Experiment) -> None:
-    fitted = bp.fit(drawn, bp.simulate(drawn, seed=5))
-    truth = simulated_readings(drawn, seed=5).truth.influences
-    told = {one.name: one for one in fitted.estimates if one.kind == "influence"}
-    off = np.array([one.value for one in told.values()]) - truth
-    u = np.array([one.standard_uncertainty for one in told.values()])
-    assert len(told) == 4 and (np.abs(off) < 4.5 * u).all() and (u <= SPREAD * 1.001).all()
-    (line,) = [one for one in fitted.lines() if one.startswith("drift of the scales")]
-    assert line.split()[-1] == "ppm/h"
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from ballplate.simulator.experiment.load import load
 
 from tests.reference import dense
 from tests.reference.package_copies import documented, package_copy, said_by_copy
+from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[2]
 UNCERTAINTY = 2e-5
@@ -52,12 +53,7 @@ print(json.dumps({
 
 def sections(*influences: dict[str, Any]) -> str:
     """An experiment file, the quickstart with few coefficients and points."""
-    found = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    found["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
-    found["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    found["evaluation"]["points"] = {"random": 20, "seed": 1}
-    found["true_machine"] = {"kind": "zero"}
-    found["sigma"] = "given"
+    found = small_sections(20, 1, true_machine={"kind": "zero"}, sigma="given")
     return str(yaml.safe_dump(found | ({"influences": list(influences)} if influences else {})))
 
 

@@ -32,17 +32,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from tests.reference import dense
+from tests.reference.small_quickstart import OF_ENTRIES, small_sections
 
 Real = NDArray[np.float64]
 
-SMALL = {
-    "artefacts.plate.balls": [3, 3],
-    "error_model.position_coefficients": 3,
-    "error_model.rotation_coefficients": 3,
-    "evaluation.points": {"random": 20, "seed": 3},
-    "true_machine": {"kind": "zero"},
-    "sigma": "given",
-}
 # Of the probes down, right, left, back, front.
 STYLI = np.array([[0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], float)
 
@@ -112,7 +105,7 @@ EVERY = {
 
 @pytest.fixture(scope="module")
 def small() -> bp.Experiment:
-    return bp.quickstart().with_(SMALL)
+    return bp.quickstart().with_(OF_ENTRIES | {"sigma": "given"})
 
 
 @pytest.fixture(params=EVERY)
@@ -374,11 +367,7 @@ def test_components_that_hardly_show_are_not_estimated(small: bp.Experiment) -> 
 
 def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
     """Everything in the pool chosen is the design of all positions; its file reads again."""
-    told = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
-    told["artefacts"]["plate"]["balls"] = [3, 3]
-    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    told["evaluation"]["points"] = {"random": 20, "seed": 3}
-    settings = disturbance.settings
+    told, settings = small_sections(20), disturbance.settings
     if settings["kind"] == "position scale":
         settings = settings | {"positions": ["z low", "x high", "y low"]}
     told["influences"] = [settings]

@@ -18,6 +18,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.reference import dense
+from tests.reference.small_quickstart import small_sections
 
 QUICKSTART: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
 ANGLES: dict[str, Any] = {
@@ -33,17 +34,8 @@ REINDEXED = [{"kind": "re-indexing", "standard_uncertainty": "0.5 um"}]
 
 def small(**changes: Any) -> Experiment:
     """The quickstart with few balls and coefficients, its tips those of a head."""
-    model = {**QUICKSTART["error_model"], "position_coefficients": 3, "rotation_coefficients": 3}
-    stated = {
-        **QUICKSTART,
-        "error_model": model,
-        "artefacts": {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}},
-        "evaluation": {"points": {"random": 12, "seed": 3}, "probe": "down"},
-        "head": {"tip": ["0 mm", "0 mm", "-50 mm"]},
-        "probes": ANGLES,
-        **changes,
-    }
-    return written_in_python(stated, Path())
+    head = {"head": {"tip": ["0 mm", "0 mm", "-50 mm"]}, "probes": ANGLES}
+    return written_in_python(small_sections(**head | changes), Path())
 
 
 def test_a_head_makes_the_offsets_of_a_star() -> None:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.montecarlo.experiments import trials
 from ballplate.rank.verdict import verdict
 from ballplate.simulator.design.arrays import Design, influence_shifts, nominal_state
 from ballplate.simulator.estimation.functions import linear_functions
@@ -25,12 +24,8 @@ from ballplate.uncertainty.quantities import QUANTITIES
 
 from tests.influences.campaigns import (
     Real,
-    assert_covered,
-    coverage,
     dense_spread,
     file_with,
-    plain,
-    told_on_page,
 )
 from tests.reference import dense
 
@@ -205,46 +200,6 @@ def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -
         np.testing.assert_allclose(values, expected, rtol=1e-6)
     own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
     np.testing.assert_allclose(own, np.sqrt(found.covariance[-1, -1]), rtol=1e-6)
-
-
-def test_declared_sag_is_covered(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    assert_covered(coverage(design, design, law, SPREAD, 40), 40)
-
-
-@pytest.mark.long
-def test_declared_sag_is_covered_in_many_campaigns(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    assert_covered(coverage(design, design, law, SPREAD, 3000), 3000)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name",
-    [
-        "sag declared",
-        "sag of another shape",
-        "sag not declared",
-    ],
-)
-def test_the_page_states_what_is_wrong_otherwise(
-    name: str, drawn: Experiment, tmp_path: Path
-) -> None:
-    design = lay_out(drawn)
-    told = {
-        "sag declared": design,
-        "sag of another shape": lay_out(file_with(tmp_path, [STATED | {"shape": "x"}])),
-        "sag not declared": plain(design),
-    }[name]
-    found = coverage(design, told, law, SPREAD, 400)
-    assert told_on_page(name) == pytest.approx(found.row, rel=0.01, abs=0.5)
-
-
-def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
-    outcome = trials(drawn, 1024).outcome
-    assert outcome is not None and not outcome.failed
-    for one in outcome.comparisons.values():
-        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
 
 
 def test_a_plan_weighs_the_sag_and_its_file_finds_the_values(tmp_path: Path) -> None:

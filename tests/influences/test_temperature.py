@@ -4,7 +4,6 @@ physical model with all its products, in dense computations and in simulated cam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,8 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.estimators.estimator_choice import fit_readings
-from ballplate.montecarlo.experiments import trials
 from ballplate.rank.verdict import verdict
-from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
@@ -27,7 +23,6 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.generate import scale_readings
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
@@ -35,12 +30,8 @@ from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
 
 from tests.influences.campaigns import (
-    Shares,
-    assert_covered,
     file_with,
     plain,
-    shares_of,
-    told_on_page,
 )
 from tests.reference import dense
 
@@ -105,6 +96,13 @@ def expanded(arms: Any, x: Any, position: Any, e: Any) -> Any:
     return of_plate[:, None] * arms - of_scales[:, None] * x
 
 
+def law(design: Design, x: Any, e: Any) -> Any:
+    """What they add where balls are as stated, with parameters e (16,) beside their values."""
+    state, readings = nominal_state(design), design.readings
+    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    return expanded(arms, x, readings.position, EXPECTED + e)
+
+
 @dataclass(frozen=True)
 class Dense:
     """The dense problem of a design with temperatures, as drawn; its last 16 parameters are
@@ -152,23 +150,6 @@ def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -
     assert widened["U6"].mean() > 1.1 * without
 
 
-def test_the_derivative_is_that_of_the_law(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    state, readings = nominal_state(design), design.readings
-    x = np.random.default_rng(3).random((len(readings), 3))
-    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    blocks = reading_blocks(design, state, readings, x)
-    assert blocks.by_influence is not None
-    for k in range(16):
-        step = 1e-30j * np.eye(16)[k]
-        slope = expanded(arms, x, readings.position, EXPECTED + step).imag / 1e-30
-        expected = -slope / design.machine.repeatability
-        np.testing.assert_allclose(blocks.by_influence[:, :, k], expected, rtol=1e-12, atol=1e-9)
-    undisturbed = reading_blocks(plain(design), state, readings, x).residual
-    shift = expanded(arms, x, readings.position, EXPECTED) / design.machine.repeatability
-    np.testing.assert_allclose(blocks.residual, undisturbed - shift, rtol=0, atol=1e-6)
-
-
 def test_a_distance_is_as_uncertain_as_its_plate_expands(tmp_path: Path) -> None:
     """On a perfect machine whose scale is known, L u(b) t is all that is left of a distance."""
     temperature = {
@@ -194,36 +175,6 @@ def test_a_distance_is_as_uncertain_as_its_plate_expands(tmp_path: Path) -> None
     )
 
 
-def campaign(design: Design, generator: np.random.Generator) -> tuple[Design, State, Real]:
-    """A campaign by the law itself: truth drawn from the statement, certified distances and
-    readings; the design with the certificate's values, the true places, and the readings.
-    """
-    state, readings = nominal_state(design), design.readings
-    e = EXPECTED + SPREAD * generator.standard_normal(16)
-    p = state.probes[readings.probe]
-    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    true = arms + state.origins[readings.position]
-    x = true - p
-    for _ in range(6):
-        x = scale_readings(design.model, true + expanded(arms, x, readings.position, e), state.a, p)
-    x += design.machine.repeatability * generator.standard_normal(x.shape)
-    given = design.of(CalibratedDistances)
-    wrong = given.value + given.uncertainty * generator.standard_normal(len(given))
-    return design.observed(given.given(value=wrong)), state, x
-
-
-def coverage(experiment: Experiment, told: Design, count: int) -> Shares:
-    """Campaigns of an experiment, fitted as the design `told` has them."""
-    design, generator = lay_out(experiment), np.random.default_rng(20261122)
-
-    def campaigns() -> Iterator[tuple[Design, Real]]:
-        for _ in range(count):
-            certified, _, x = campaign(design, generator)
-            yield told.observed(certified.of(CalibratedDistances)), x
-
-    return shares_of(campaigns())
-
-
 def as_told(change: dict[str, Any], folder: Path) -> Experiment:
     """The statement with some keys changed; None leaves a key out."""
     told = {key: value for key, value in (STATED | change).items() if value is not None}
@@ -237,49 +188,6 @@ EXACT = {
     "scale_expansion": {"value": "8 um/m/K", "standard_uncertainty": "0 um/m/K"},
     "scale_temperature": {"value": "20.8 degC"},
 }
-
-
-def shares(name: str, experiment: Experiment, folder: Path, count: int) -> Shares:
-    """Coverage of what is told, by its name on the documentation's page."""
-    design = lay_out(experiment)
-    told = {
-        "declared": lambda: design,
-        "values alone": lambda: lay_out(as_told(EXACT, folder)),
-        "not declared": lambda: plain(design),
-    }[name]()
-    return coverage(experiment, told, count)
-
-
-def test_declared_temperatures_are_covered(drawn: Experiment) -> None:
-    assert_covered(coverage(drawn, lay_out(drawn), 100), 100)
-
-
-@pytest.mark.long
-def test_declared_temperatures_are_covered_in_many_campaigns(drawn: Experiment) -> None:
-    assert_covered(coverage(drawn, lay_out(drawn), 3000), 3000)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name",
-    [
-        "declared",
-        "values alone",
-        "not declared",
-    ],
-)
-def test_the_page_states_what_is_wrong_otherwise(
-    name: str, drawn: Experiment, tmp_path: Path
-) -> None:
-    found = shares(name, drawn, tmp_path, 400)
-    assert told_on_page(name) == pytest.approx(found.row, rel=0.01, abs=0.5)
-
-
-def test_monte_carlo_scatters_by_the_uncertainty(drawn: Experiment) -> None:
-    outcome = trials(drawn, 1024).outcome
-    assert outcome is not None and not outcome.failed
-    for one in outcome.comparisons.values():
-        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
 
 
 UNKNOWN = {
@@ -451,22 +359,6 @@ def test_other_estimators_refuse(drawn: Experiment) -> None:
     for estimator in ("distances", "reversal", "length-equations"):
         with pytest.raises(ExperimentError, match="does not know influence quantities"):
             fit_readings(drawn, observed, estimator)
-
-
-def test_fit_tells_the_parameters(drawn: Experiment) -> None:
-    simulated = simulated_readings(drawn, seed=9)
-    observed = observe(simulated.design, simulated.readings, simulated.x)
-    found = fit_readings(drawn, observed)
-    told = {one.name: one for one in found.estimates if one.kind == "influence"}  # type: ignore[attr-defined]
-    assert len(told) == 16
-    off = np.array([one.value for one in told.values()]) - simulated.truth.influences
-    u = np.array([one.standard_uncertainty for one in told.values()])
-    assert (np.abs(off) < 4.5 * u).all() and (u <= SPREAD * 1.001).all()
-    (line,) = [one for one in found.lines() if one.startswith("expansion of plate")]
-    assert line.split()[-1] == "ppm/K"
-    assert float(line.split()[-3]) == pytest.approx(
-        1e6 * told["expansion of plate"].value, rel=1e-2
-    )
 
 
 def test_a_plan_knows_what_temperatures_leave(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from ballplate.simulator.maps.map_prior import (
 from scipy import stats
 
 from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files
+from tests.reference.small_quickstart import small_quickstart
 
 CALIBRATION = IN_SPACE["calibration"][0]
 # Readings to far less than the machine's errors make everything linear.
@@ -501,7 +502,7 @@ def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
 
 def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
     """A map as prior knowledge of a fit to the readings that it comes from, or to some of them."""
-    plain = bp.quickstart()
+    plain = small_quickstart()
     first, second = (bp.simulate(plain, seed) for seed in (1, 2))
     fit = bp.fit(plain, first)
     bp.write_map(fit.to_map(), tmp_path / "map.yaml")  # type: ignore[attr-defined]

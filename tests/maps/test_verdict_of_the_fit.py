@@ -20,6 +20,8 @@ import yaml
 from ballplate.cli import main
 from ballplate.simulator.maps.fit_verdict import LIMIT, LackOfFit
 
+from tests.reference.small_quickstart import SMALL, small_quickstart
+
 # By how much one probe's readings are wrong, in metres, and what that is.
 SHIFTS = {"clean": 0.0, "significant": 5e-6, "beyond": 1e-3}
 VERDICTS = {
@@ -29,19 +31,11 @@ VERDICTS = {
     "old": "not stated",
 }
 PITCH = ["--pitch", "500 mm"]
-DESIGN = {
-    "artefacts": {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}},
-    "error_model": {
-        "kind": "kinematic",
-        "position_coefficients": 3,
-        "rotation_coefficients": 2,
-    },
-}
 
 
 @cache
 def fit(name: str, **options: Any) -> bp.Fit:
-    experiment = bp.quickstart().with_(DESIGN)
+    experiment = small_quickstart()
     readings = bp.simulate(experiment)
     wrong = readings["probe"] == "front"
     assert wrong.any() and not wrong.all()
@@ -88,7 +82,7 @@ def test_the_three_verdicts_are_those_of_the_sum_of_squares() -> None:
 @pytest.mark.parametrize("factor", [0.3, 3.0, 20.0])
 def test_uncertainties_stated_wrong_are_no_failure(factor: float) -> None:
     """Scatter `factor` times what is stated has at most a warning, whatever the factor."""
-    experiment = bp.quickstart().with_(DESIGN)
+    experiment = small_quickstart()
     scattered = experiment.with_({"machine.repeatability": f"{0.2 * factor} um"})
     result = bp.fit(experiment, bp.simulate(scattered))
     assert result.sigma == pytest.approx(factor, rel=0.25)
@@ -143,27 +137,33 @@ def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
         for level in ("100 mm", "300 mm", "500 mm", "700 mm")
     ]
     one_probe = {"calibration": [], "probes": {"down": ["0 mm"] * 3}, "positions": positions}
-    experiment = bp.quickstart().with_(DESIGN | one_probe)
+    experiment = small_quickstart(**one_probe)
     readings = bp.simulate(experiment)
     readings["z_mm"] += np.arange(len(readings)) % 2
     told = bp.fit(experiment, readings).complaint
     assert "rank deficiency" in told and "beyond the limit" in told
 
 
-@pytest.mark.parametrize("name", VERDICTS)
+OF_MAPS = [
+    ["correct", "MAP", "points.csv"],
+    ["map", "MAP", "--grid", "2,2,2"],
+    ["map", "MAP", "--error", "EXX"],
+    ["map", "--curves", "MAP"],
+    ["map", "--convert", "MAP", "--to", "metric"],
+    ["adjust", "MAP", "--scale", "x=10 um/m"],
+    ["diff", "MAP", "clean.npz"],
+    ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
+]
+
+
 @pytest.mark.parametrize(
-    "arguments",
+    ("arguments", "name"),
     [
-        ["correct", "MAP", "points.csv"],
-        ["map", "MAP", "--grid", "2,2,2"],
-        ["map", "MAP", "--error", "EXX"],
-        ["map", "--curves", "MAP"],
-        ["map", "--convert", "MAP", "--to", "metric"],
-        ["adjust", "MAP", "--scale", "x=10 um/m"],
-        ["diff", "MAP", "clean.npz"],
-        ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
+        *((given, "beyond") for given in OF_MAPS),
+        # The words of the others are of the same line.
+        *((OF_MAPS[0], name) for name in VERDICTS if name != "beyond"),
     ],
-    ids=lambda given: " ".join(given[:1] + given[2:3]),
+    ids=lambda given: given if isinstance(given, str) else " ".join(given[:1] + given[2:3]),
 )
 def test_every_command_repeats_it(
     arguments: list[str],
@@ -190,20 +190,15 @@ def test_every_command_repeats_it(
 def test_an_experiment_repeats_that_of_its_map(role: str, maps: dict[str, Path]) -> None:
     for name in VERDICTS:
         stated = {"kind": "map", "file": str(maps[name])}
-        change = DESIGN | {role: [stated] if role == "priors" else stated}
-        doubts = [
-            one for one in bp.quickstart().with_(change).doubts if "in the fit of" in str(one)
-        ]
+        change = {role: [stated] if role == "priors" else stated}
+        doubts = [one for one in small_quickstart(**change).doubts if "in the fit of" in str(one)]
         assert len(doubts) == (name in ("significant", "beyond"))
 
 
 def test_diff_repeats_that_of_a_map_that_is_prior_knowledge(maps: dict[str, Path]) -> None:
-    readings = bp.simulate(bp.quickstart().with_(DESIGN))
+    readings = bp.simulate(small_quickstart())
     stated = {"kind": "map", "file": str(maps["beyond"])}
-    fits = [
-        bp.fit(bp.quickstart().with_(DESIGN | change), readings)
-        for change in ({}, {"priors": [stated]})
-    ]
+    fits = [bp.fit(small_quickstart(**change), readings) for change in ({}, {"priors": [stated]})]
     found = bp.diff(*fits)
     assert sum("in the fit of the map" in str(one) for one in found.notes) == 1
 
@@ -258,8 +253,8 @@ def test_the_exit_status_of_fit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    experiment = bp.quickstart().with_(DESIGN)
-    stated = yaml.safe_load(Path(bp.quickstart().source).read_text()) | DESIGN
+    experiment = small_quickstart()
+    stated = yaml.safe_load(Path(bp.quickstart().source).read_text()) | SMALL
     Path("design.yaml").write_text(yaml.safe_dump(stated))
     for name, shift in SHIFTS.items():
         readings = bp.simulate(experiment)

@@ -38,6 +38,8 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.uncertainty.summaries import uncertainties
 
+from tests.reference.small_quickstart import small_quickstart
+
 
 def shipped(path: str, name: str | None = None) -> Experiment:
     return next(one for one in load(Path("designs") / path) if one.name == name)
@@ -45,12 +47,12 @@ def shipped(path: str, name: str | None = None) -> Experiment:
 
 @cache
 def quickstart() -> Reference:
-    return reference(*true_experiment(shipped("quickstart.yaml")))
+    return reference(*true_experiment(small_quickstart()))
 
 
 @cache
 def two_thousand() -> MonteCarloOutcome:
-    """6.2.1 at n = 5, sigma 0.2 um, NDEL = NEPS = 5, on a machine with errors."""
+    """On a machine with errors."""
     return run_trials(quickstart(), 1, 2048)
 
 
@@ -86,7 +88,7 @@ def test_residuals_are_those_of_a_right_model() -> None:
 
 
 def test_linearised_uncertainties_are_those_of_the_plan() -> None:
-    planned = predict(shipped("quickstart.yaml")).quantities
+    planned = predict(small_quickstart()).quantities
     found = two_thousand().comparisons
     for symbol in ("U1", "U2", "U4", "U5"):
         assert found[symbol].linear_average == pytest.approx(planned[symbol].average, rel=1e-3), (

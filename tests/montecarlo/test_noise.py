@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tests.reference import dense
+from tests.reference.small_quickstart import OF_ENTRIES
 
 Real = NDArray[np.float64]
 
@@ -31,18 +32,11 @@ KINDS = {
     "uniform": (Noise("uniform"), stats.uniform(-np.sqrt(3.0), 2.0 * np.sqrt(3.0))),
     "student t": (Noise("student t", 5.0), stats.t(5.0, scale=np.sqrt(0.6))),
 }
-SMALL = {
-    "artefacts.plate.balls": [3, 3],
-    "error_model.position_coefficients": 3,
-    "error_model.rotation_coefficients": 3,
-    "evaluation.points": {"random": 20, "seed": 3},
-    "true_machine": {"kind": "zero"},
-}
 
 
 @pytest.fixture(scope="module")
 def small() -> bp.Experiment:
-    return bp.quickstart().with_(SMALL)
+    return bp.quickstart().with_(OF_ENTRIES)
 
 
 def generator() -> np.random.Generator:

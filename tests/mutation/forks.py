@@ -135,6 +135,8 @@ def exchange(trees: Mapping[str, ast.Module], names: dict[str, Any]) -> None:
         module = importlib.import_module("ballplate." + path.removesuffix(".py").replace("/", "."))
         vars(module).update(names)
         codes[file] = dict(_functions(compile(tree, file, "exec")))
+    # What is frozen is not listed.
+    gc.unfreeze()
     for some in gc.get_objects():
         if isinstance(some, FunctionType) and some.__code__.co_filename in codes:
             old = some.__code__

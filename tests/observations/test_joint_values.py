@@ -23,6 +23,7 @@ from scipy.linalg import null_space
 from scipy.stats import norm
 
 from tests.reference import dense
+from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[2]
 Real = NDArray[np.float64]
@@ -34,12 +35,10 @@ QUANTITIES = ("U1", "U2", "U3", "U4", "U5", "U6")
 
 def written(folder: Path, *calibration: dict[str, Any], **changes: Any) -> Experiment:
     """An experiment of a plate of 3 x 3 balls, in a file."""
-    found = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    found["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["600 mm", "600 mm"]}}
-    found["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    found["evaluation"]["points"] = {"random": 12, "seed": 1}
+    plate = {"kind": "grid", "balls": [3, 3], "size": ["600 mm", "600 mm"]}
+    found = small_sections(12, 1, artefacts={"plate": plate}, calibration=list(calibration))
     path = folder / "e.yaml"
-    path.write_text(yaml.safe_dump(found | {"calibration": list(calibration)} | changes))
+    path.write_text(yaml.safe_dump(found | changes))
     return load(path)[0]
 
 

@@ -28,7 +28,7 @@ from tests.robustness.worker import Worker
 
 # Where a test ends, as the next may fail for the same reason.
 ENOUGH = 10
-FEW, MANY = range(25), range(20_000)
+FEW, MANY = range(12), range(20_000)
 # Cases that once failed: a true machine too wild to be read by compare, and a picture whose name is
 # its ending.
 ONCE_FAILED = (3280, 6956)

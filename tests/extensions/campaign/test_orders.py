@@ -29,8 +29,9 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.uncertainty.quantities import evaluation_points
 from numpy.typing import NDArray
 
+from tests.reference.small_quickstart import small_sections
+
 Real = NDArray[np.float64]
-TOP = Path(__file__).parents[3]
 SET_UP, READING, PROBE, PLANE = 900.0, 12.0, 120.0, 1500.0
 TIMES = {"set_up": "15 min", "reading": "12 s", "probe_change": "2 min", "plane_change": "25 min"}
 DRIFT = {
@@ -42,11 +43,7 @@ DRIFT = {
 
 def pool_file(folder: Path, count: int = 6, **changed: Any) -> Path:
     """The first example's positions as a pool, with a smaller plate and fewer coefficients."""
-    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
-    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    told["true_machine"] = {"kind": "zero"}
-    told["evaluation"]["points"] = {"random": 12, "seed": 3}
+    told = small_sections(true_machine={"kind": "zero"})
     first, *others = told["positions"][:count]
     told |= {"positions": [first], "pool": {"candidates": others, "times": TIMES}}
     path = folder / "pool.yaml"

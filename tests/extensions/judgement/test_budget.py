@@ -24,6 +24,7 @@ from ballplate.simulator.experiment.model import Experiment
 from numpy.typing import NDArray
 
 from tests.reference import dense
+from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[3]
 Real = NDArray[np.float64]
@@ -31,11 +32,8 @@ Real = NDArray[np.float64]
 
 def small(**changed: Any) -> Experiment:
     """Nine balls in the six positions of the first example, and tasks."""
-    told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
-    told["artefacts"] = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
-    told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-    told["evaluation"] = {
-        "points": {"random": 12, "seed": 3},
+    told = small_sections()
+    told["evaluation"] |= {
         "probe": "right",
         "tasks": [
             {"name": "U6", "from": ["50 mm", "200 mm", "90 mm"], "to": ["550 mm", "0 mm", "0 mm"]}

@@ -47,21 +47,14 @@ from scipy.optimize import minimize
 from scipy.stats import binomtest, chi2
 
 from tests.reference import dense
+from tests.reference.small_quickstart import OF_ENTRIES, small_sections
 
 Real = NDArray[np.float64]
-
-SMALL = {
-    "artefacts.plate.balls": [3, 3],
-    "error_model.position_coefficients": 3,
-    "error_model.rotation_coefficients": 3,
-    "evaluation.points": {"random": 20, "seed": 3},
-    "true_machine": {"kind": "zero"},
-}
 
 
 @pytest.fixture(scope="module")
 def small() -> bp.Experiment:
-    return bp.quickstart().with_(SMALL)
+    return bp.quickstart().with_(OF_ENTRIES)
 
 
 @pytest.fixture(scope="module")
@@ -369,11 +362,7 @@ def write(tmp_path: Path) -> Callable[[bp.Experiment], Path]:
     import yaml
 
     def written(_: bp.Experiment) -> Path:
-        told = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
-        told["artefacts"]["plate"]["balls"] = [3, 3]
-        told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
-        told["evaluation"]["points"] = {"random": 20, "seed": 3}
-        told["true_machine"] = {"kind": "zero"}
+        told = small_sections(20, true_machine={"kind": "zero"})
         path = tmp_path / "quickstart.yaml"
         path.write_text(yaml.safe_dump(told), encoding="utf-8")
         return path

@@ -16,7 +16,7 @@ from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made
 from tests.certified.problems import PROBLEMS
 
-FOLDER = Path(__file__).parents[2] / "designs" / "certified"
+FOLDER = Path(__file__).parents[3] / "designs" / "certified"
 # Those that take a second or less, and the rest, a minute or more each.
 QUICK = (
     "two-dimensions",

@@ -20,7 +20,10 @@ from ballplate.simulator.splines.pieces import pieces
 
 from tests.reference import truncated_powers
 
-OURS, DOCUMENT = Path("designs/gilsinn/table-1.csv"), Path("tests/published/nistir-6517-table1.csv")
+OURS, DOCUMENT = (
+    Path("designs/gilsinn/table-1.csv"),
+    Path("tests/extensions/splines/nistir-6517-table1.csv"),
+)
 RADIUS = 0.037084
 TANGENT = (RADIUS, -RADIUS)
 
