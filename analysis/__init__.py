@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     from ballplate.extensions.reproduction.interface import reproduce
     from ballplate.extensions.requirements.interface import reach
     from ballplate.extensions.splines.interface import spline
+    from ballplate.extensions.sweeps.interface import stored, sweep, sweep_report
     from ballplate.extensions.sweeps.running import OtherSweepError
     from ballplate.extensions.sweeps.store_file import StoreError
-    from ballplate.extensions.sweeps.stores import stored, sweep, sweep_report
     from ballplate.planning.criteria import Criterion
     from ballplate.presentation.files import write_file
     from ballplate.presentation.result import Result
     from ballplate.presentation.table import Table
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.groupings import GROUPINGS
     from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.processes import in_processes
@@ -182,7 +182,7 @@ _KERNEL = {
     "ballplate.presentation.files": ("write_file",),
     "ballplate.presentation.result": ("Result",),
     "ballplate.presentation.table": ("Table",),
-    "ballplate.results.fit": ("Fit",),
+    "ballplate.results.fits": ("Fit",),
     "ballplate.results.prediction": ("Prediction",),
     "ballplate.uncertainty.quantities": ("QUANTITIES", "QuantityKind"),
     "ballplate.simulator.computing.processes": ("in_processes",),

@@ -6,8 +6,8 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
+from .notes import complain
 from .outputs import UsageError, add_force, write
-from .telling import complain
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
@@ -54,7 +54,7 @@ def _trial_count(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
-    from ..results.study import predict
+    from ..results.predictions import predict
     from .common import experiments, print_json, print_lines
 
     plans, found, interrupted = [], [], False
@@ -98,7 +98,7 @@ def run(options: Namespace) -> int:
 def _write_page(options: Namespace, prediction: Prediction) -> None:
     from ballplate.simulator.inputs.extensions import function
 
-    from .progress import progress
+    from .progress_bars import progress
 
     with progress(options) as shown:
         text = function("page")(prediction, report=shown.show)
@@ -109,8 +109,8 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
     from ballplate.simulator.computing.processes import processors
 
     from ..montecarlo.experiments import trials
-    from ..montecarlo.trials import MOST_TRIALS
-    from .progress import progress
+    from ..montecarlo.trial_runs import MOST_TRIALS
+    from .progress_bars import progress
 
     with progress(options) as shown:
 

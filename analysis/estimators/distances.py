@@ -41,7 +41,7 @@ from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import by_name, given, number, picked
 from ..presentation.result import FitResult, Result
 from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
-from ..results.parts import iteration_lines
+from ..results.text_blocks import iteration_lines
 from ..uncertainty.summaries import uncertainties
 from .length_fits import has_all_errors
 from .reversal_fits import reversal_beside_full

@@ -204,7 +204,7 @@ SHIPPED = (
             "sweep --export": Command("export_command", "results of a store as CSV or Parquet"),
         },
         functions={
-            **_from("stores", "stored", "sweep", "sweep_report"),
+            **_from("interface", "stored", "sweep", "sweep_report"),
             **_from("running", "OtherSweepError"),
             **_from("store_file", "StoreError"),
         },

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.extensions import service
@@ -19,9 +19,9 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
-from ..rank.verdict import Verdict
+from ..rank.verdicts import Verdict
 from ..results.prediction import Advice, Prediction
-from ..results.study import check
+from ..results.predictions import check
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 

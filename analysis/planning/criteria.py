@@ -29,8 +29,8 @@ from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
 from ..uncertainty.quantities import QUANTITIES, functions_of
+from .candidate_rows import STEP
 from .information import Information
-from .rows import STEP
 
 CriterionName = str
 

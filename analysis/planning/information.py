@@ -29,7 +29,15 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 
-from .rows import STEP, CandidateRows, PoolDesign, always, calibration_rows, draw, position_rows
+from .candidate_rows import (
+    STEP,
+    CandidateRows,
+    PoolDesign,
+    always,
+    calibration_rows,
+    draw,
+    position_rows,
+)
 
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10

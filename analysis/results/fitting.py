@@ -19,17 +19,17 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..rank.verdict import verdict
+from ..rank.verdicts import verdict
 from ..uncertainty.summaries import uncertainties
 from .adjustments import Adjustment, adjustments
-from .campaign_sigmas import CampaignSigmas, campaign_sigmas
 from .diagnosis import diagnosed, lack_of_fit
 from .estimates import estimated_functions, parameter_estimates
-from .fit import Fit
+from .fits import Fit
 from .groupings import Grouping
 from .plates import plate_coordinates
+from .predictions import check
 from .residuals import largest_residuals
-from .study import check
+from .sigmas_by_campaign import CampaignSigmas, campaign_sigmas
 
 
 # In one piece: an estimate is judged step by step, each from those before it.

@@ -15,13 +15,13 @@ from ballplate.simulator.inputs.settings import hint, number_of
 from ..presentation.columns import Columns
 from ..presentation.formatting import given
 from ..presentation.result import Result
-from ..rank.verdict import Verdict
+from ..rank.verdicts import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
-from .asked import SpaceView, picture_in_space, shown_in_space
+from .extension_results import SpaceView, picture_in_space, shown_in_space
 from .influences import InfluenceUncertainty, influence_data, influence_table
-from .parts import (
+from .text_blocks import (
     QUANTITY_COLUMNS,
     map_lines,
     quantities_data,

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from ballplate.presentation.result import Result
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.prediction import Prediction
 
 from tests.reference.tables import read_table

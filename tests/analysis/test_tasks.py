@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.estimation.functions import displacements, linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.uncertainty.pairs import pairs_of

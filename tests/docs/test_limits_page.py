@@ -13,14 +13,14 @@ from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import length_map as lengths
 from ballplate.extensions.maps import lengths_command as lengths_command
 from ballplate.extensions.maps import volumetric_errors as volumetric
-from ballplate.extensions.reliability import leftover
+from ballplate.extensions.reliability import remainders as leftover
 from ballplate.extensions.requirements import root_search as search
 from ballplate.extensions.splines import curve_options
 from ballplate.extensions.splines import error_curve as curve
 from ballplate.extensions.splines import read_points as read
 from ballplate.extensions.sweeps import axes, bundle, load
 from ballplate.extensions.sweeps import sweep_settings as settings
-from ballplate.montecarlo import trials
+from ballplate.montecarlo import trial_runs as trials
 from ballplate.planning import criteria, information
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values

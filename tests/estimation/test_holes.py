@@ -14,14 +14,14 @@ from ballplate import compare
 from ballplate.extensions.laboratory.gross_errors import find_gross_errors
 from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.results.fitting import fit
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import written_in_python
+from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.observed_readings import observe

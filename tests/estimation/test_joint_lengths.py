@@ -14,7 +14,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import trials
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
 from ballplate.simulator.design.observations.readings import expected_readings
@@ -28,7 +28,7 @@ from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
 from ballplate.simulator.estimation.length_equations import length_estimate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel

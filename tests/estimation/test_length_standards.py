@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import trials
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.generate import noisy_certificate
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.results.fitting import fit
-from ballplate.results.study import check, predict
+from ballplate.results.predictions import check, predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import reading_blocks
@@ -20,7 +20,7 @@ from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings

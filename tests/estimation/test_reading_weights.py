@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.results.fitting import fit
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.readings import reading_weights
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings

@@ -18,14 +18,14 @@ from ballplate.extensions.certificates.certificate_files import (
 )
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import draw, estimate_batch
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.star import Star, Stars, observed_stars
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import written_in_python
+from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.messages import ExperimentError

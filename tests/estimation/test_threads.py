@@ -9,8 +9,8 @@ import sys
 import pytest
 
 PROGRAM = """
-from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.results.predictions import predict
+from ballplate.simulator.experiment.loading import load
 (experiment,) = load("designs/quickstart.yaml")
 found = predict(experiment)
 print([(q.maximum.hex(), q.average.hex()) for q in found.quantities.values()], found.verdict.singular_values.tobytes())

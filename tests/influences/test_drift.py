@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.rank.verdict import verdict
+from ballplate.rank.verdicts import verdict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate

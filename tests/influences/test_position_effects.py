@@ -16,7 +16,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.extensions.judgement.components import AS_STATED, LARGER, variance_components
 from ballplate.montecarlo.experiments import trials
-from ballplate.planning.rows import draw
+from ballplate.planning.candidate_rows import draw
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import reading_blocks

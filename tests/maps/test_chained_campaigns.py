@@ -13,8 +13,8 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.campaign_sigmas import compared
 from ballplate.results.fitting import fit
+from ballplate.results.sigmas_by_campaign import compared
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.hat import whitened_residuals

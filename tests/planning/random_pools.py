@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.extensions.campaign.done import done_candidates
-from ballplate.planning.campaign import Request, campaign
+from ballplate.extensions.campaign.positions_read import done_candidates
+from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.criteria import NAMES, CriterionName
-from ballplate.planning.offer import offer
+from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.selection import Campaign
 from ballplate.planning.set_ups import SetUp
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.reading_files import write_readings

@@ -15,7 +15,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.planning.set_ups import renamed
 from ballplate.planning.short_names import short_names
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 
 POOL = """

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests import conftest

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ballplate.planning.campaign import Request
+from ballplate.planning.campaign_choice import Request
 from ballplate.planning.constraints import HOUR
 from ballplate.planning.orders import LEAST_CHANGE_OVER, ORDERS, ReadingOrder
 from ballplate.planning.schedule import run_sheet

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
 from ballplate.results.adjustments import FEW
-from ballplate.results.campaign_sigmas import with_sigmas
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit as fit_observed
-from ballplate.results.study import PlannedUncertainty
+from ballplate.results.predictions import PlannedUncertainty
+from ballplate.results.sigmas_by_campaign import with_sigmas
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
@@ -28,9 +28,9 @@ from ballplate.simulator.readings.reading_files import read_readings
 from ballplate.simulator.readings.reading_sources import Source
 from ballplate.uncertainty.summaries import uncertainties
 
-from .done import groups_taken
 from .next_result import NextStep, Offered
-from .redone import without_redone
+from .positions_read import groups_taken
+from .repeated_positions import without_redone
 
 # One-sided level of the bound of sigma where it comes from few degrees of freedom.
 CONFIDENCE = 0.95

@@ -12,8 +12,8 @@ from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import number
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import freedom_words
-from ballplate.results.fit import Fit
-from ballplate.results.study import PlannedUncertainty
+from ballplate.results.fits import Fit
+from ballplate.results.predictions import PlannedUncertainty
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.readings.observed_readings import ObservedReadings

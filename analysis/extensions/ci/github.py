@@ -6,7 +6,12 @@ import os
 from pathlib import Path
 
 from ballplate.planning.checked_files import CheckedDesign, CheckedFile
-from ballplate.results.parts import scale_lines, scale_warnings, target_lines, verdict_lines
+from ballplate.results.text_blocks import (
+    scale_lines,
+    scale_warnings,
+    target_lines,
+    verdict_lines,
+)
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
 

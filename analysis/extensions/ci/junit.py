@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from ballplate.planning.checked_files import CheckedDesign, CheckedFile
-from ballplate.results.parts import verdict_lines
+from ballplate.results.text_blocks import verdict_lines
 from ballplate.simulator.inputs.messages import in_one_line
 
 # No XML document can hold these, not even as character references.

@@ -11,7 +11,7 @@ from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.groupings import Grouping
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.threads import single_threaded

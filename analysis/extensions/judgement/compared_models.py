@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 from ballplate.extensions.reliability.exact_values import diagnosis_of_all
-from ballplate.extensions.reliability.leftover import too_many_entries
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
+from ballplate.extensions.reliability.remainders import too_many_entries
 from ballplate.extensions.reliability.wording import refit_words, suspect_words
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded

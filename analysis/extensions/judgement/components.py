@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.reliability.leftover import leftover, too_many_entries
+from ballplate.extensions.reliability.remainders import leftover, too_many_entries
 from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.extensions.reliability.leftover import Leftover
+from ballplate.extensions.reliability.remainders import Leftover
 from ballplate.simulator.computing.threads import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers
 

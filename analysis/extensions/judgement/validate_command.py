@@ -26,7 +26,7 @@ def add_options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Validate a fit; 1 if a prediction fails."""
     from ballplate.cli.common import show
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
 
     from .left_out import validate
 

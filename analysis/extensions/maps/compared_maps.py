@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.map_of_fit import data_of, maps_known
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
@@ -22,7 +22,7 @@ from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_c
 from ballplate.simulator.readings.fingerprints import position_fingerprints
 
 from .campaign_tests import EstimatedSigma
-from .same_readings import same_positions, same_readings
+from .readings_in_common import same_positions, same_readings
 from .volumetric_errors import Volumetric
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it

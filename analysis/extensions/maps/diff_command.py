@@ -107,11 +107,11 @@ def _grid(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Compare, write and print; 1 with --fail if a change is shown."""
-    from ballplate.cli.telling import complain
+    from ballplate.cli.notes import complain
     from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
 
     from .comparison import ComparisonSettings, NotComparableError
-    from .fit_of_file import fit_of_file
+    from .fit_files import fit_of_file
     from .shared_certificates import NothingSharedError
     from .sources import map_difference
 

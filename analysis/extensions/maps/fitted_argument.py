@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.telling import complain
+from ballplate.cli.notes import complain
 
 if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
@@ -22,7 +22,7 @@ def fitted_map(path: Path) -> FittedMap:
     """
     from ballplate.simulator.experiment.map_files import read_map
 
-    from .fit_of_file import fit_of_file, kind_of_file
+    from .fit_files import fit_of_file, kind_of_file
 
     if kind_of_file(path) != "experiment":
         return read_map(path)

@@ -30,7 +30,7 @@ from ballplate.simulator.inputs.yamltree import GivenText
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.simulator.machines.protocol import Array
     from ballplate.simulator.maps.fitted_map import FittedMap
 
@@ -56,8 +56,8 @@ def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
     >>> bp.convert(fitted, "{kind: empirical, coefficients: 5}")
     <ConvertedMap of map: empirical, 195 parameters, the same corrections>
     """
-    from .any_map import map_of_source
     from .converted_map import convert as converted
+    from .map_files_of_machines import map_of_source
 
     ensure_type(str, 'an error model such as "empirical"', to=to)
     found, label = map_of_source(map_or_path("fitted", fitted))
@@ -191,7 +191,7 @@ def map(
     """
     import numpy as np
 
-    from .any_map import map_errors
+    from .map_files_of_machines import map_errors
     from .map_places import PlacesAsked, parse_places, parse_plane
     from .realisations import MOST_DRAWS, Draws
     from .volumetric_errors import MOST_POINTS
@@ -245,8 +245,8 @@ def curves(
     >>> bp.curves(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
-    from .any_map import map_of_source
     from .error_curves_result import error_curves
+    from .map_files_of_machines import map_of_source
 
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)
@@ -321,7 +321,7 @@ def correct(
 
     from . import point_files
     from .correction import correction
-    from .wanted_lengths import between_named
+    from .selected_lengths import between_named
 
     ensure_one_of(("scale readings", "ball centres"), coordinates=coordinates)
     ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)

@@ -155,10 +155,10 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
-    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.loading import load
 
-    from .any_map import map_errors
     from .fitted_errors_result import FittedErrorMap
+    from .map_files_of_machines import map_errors
     from .map_places import PlacesAsked
     from .realisations import Draws
     from .volumetric_results import VolumetricMap

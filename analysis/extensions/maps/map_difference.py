@@ -22,7 +22,7 @@ from .campaign_tests import TOO_ALIKE, TOO_RARE
 from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
-from .same_readings import read_once_words
+from .readings_in_common import read_once_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import read_map
 from ballplate.simulator.inputs.quantities import LengthFunction
@@ -18,7 +18,7 @@ from ballplate.simulator.readings.reading_files import AXES
 
 from .compared_maps import ComparedMap, expected_map, map_of_fit
 from .comparison import ComparisonSettings, NotComparableError, compared
-from .fit_of_file import fit_of_file, kind_of_file
+from .fit_files import fit_of_file, kind_of_file
 from .map_difference import MapDifference
 from .point_files import NAMING
 from .shared_certificates import with_shared_certificates

@@ -18,7 +18,7 @@ from ballplate.simulator.inputs.arguments import (
 )
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
 
     from .embedded import View
@@ -37,7 +37,7 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
     >>> bp.view(bp.run(bp.quickstart()))
     <View of quickstart: positions, points, balls of plate>
     """
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
 
     from .offered import design_view, fit_view
@@ -80,9 +80,9 @@ def page(
     '<!DOCTYPE html>'
     """
     from ballplate.presentation.files import write_file
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
-    from ballplate.results.study import predict
+    from ballplate.results.predictions import predict
 
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)

@@ -23,8 +23,8 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.pairs import open_above, relative
 from ballplate.uncertainty.quantities import QUANTITIES
 
-from .leftover import columns_of_balls
-from .patterns import Patterns
+from .bias_patterns import Patterns
+from .remainders import columns_of_balls
 from .response import Response
 
 if TYPE_CHECKING:

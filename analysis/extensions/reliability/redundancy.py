@@ -20,13 +20,13 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Integers
 from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 
+from .bias_patterns import patterns
 from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
 from .events import event_groups
-from .leftover import Columns, leftover, too_many_entries
-from .patterns import patterns
 from .power import noncentrality
 from .reliability_result import Effects, Reliability
+from .remainders import Columns, leftover, too_many_entries
 from .response import responses
 
 FALSE_ALARM, POWER = 0.001, 0.8

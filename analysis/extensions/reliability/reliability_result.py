@@ -31,9 +31,9 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.quantities import QUANTITIES
 
+from .bias_patterns import DRIFTS, Patterns, single_kinds
 from .effects import MOST_PLACES, across_probes
 from .names import name
-from .patterns import DRIFTS, Patterns, single_kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

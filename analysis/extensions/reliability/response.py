@@ -11,8 +11,8 @@ from ballplate.simulator.estimation.hat import hat_rows
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .leftover import columns_of_balls
-from .patterns import Patterns
+from .bias_patterns import Patterns
+from .remainders import columns_of_balls
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -10,8 +10,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
 
-from .leftover import too_many_entries
 from .refits import diagnosis_with_refits
+from .remainders import too_many_entries
 from .suspects import Diagnosis
 from .wording import diagnosis_data, diagnosis_lines, diagnosis_words
 

@@ -16,9 +16,9 @@ from ballplate.simulator.inputs.settings import listed, listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 
+from .bias_patterns import Patterns, position_order
 from .cause_search import FAMILY, MOST
 from .names import common_ball, length_name, name, reading_name
-from .patterns import Patterns, position_order
 from .suspects import Diagnosis, MoreScatter, Refit, Suspect, Unexplained
 
 # A direction of a cause is told from so many standard uncertainties on.

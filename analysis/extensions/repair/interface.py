@@ -29,8 +29,8 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     >>> line in bp.repair("designs/npl/6.1.1.yaml", variant="B").splitlines()
     True
     """
-    from ballplate.results import study
-    from ballplate.simulator.experiment.load import with_pool
+    from ballplate.results import predictions as study
+    from ballplate.simulator.experiment.loading import with_pool
 
     from .mending import mended, to_write
     from .repair_search import repairs

@@ -12,7 +12,7 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from ballplate.rank.verdict import relative_changes
+from ballplate.rank.verdicts import relative_changes
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import finite, number, picked
-from ballplate.rank.verdict import Verdict, changed_names, length
+from ballplate.rank.verdicts import Verdict, changed_names, length
 from ballplate.simulator.inputs.settings import listed
 from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.rank.verdict import Verdict
+from ballplate.rank.verdicts import Verdict
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.computing.steps import Report
 from ballplate.simulator.experiment.model import Experiment

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from ballplate.planning.information import Information
-from ballplate.rank.verdict import Verdict, changed_names
-from ballplate.results.study import check
+from ballplate.rank.verdicts import Verdict, changed_names
+from ballplate.results.predictions import check
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position

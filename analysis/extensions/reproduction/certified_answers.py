@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from ballplate.presentation.formatting import as_data, picked
 from ballplate.results.fitting import fit
-from ballplate.results.study import predict
+from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.readings.reading_files import read_readings
 from ballplate.uncertainty.summaries import Quantity
 

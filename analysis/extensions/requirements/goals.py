@@ -9,7 +9,7 @@ from typing import Literal
 
 from ballplate.presentation.formatting import number, percent, shown_unit, uncertainty_words
 from ballplate.results.prediction import Prediction
-from ballplate.results.study import PlannedUncertainty
+from ballplate.results.predictions import PlannedUncertainty
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.quantities import (
     QuantityError,

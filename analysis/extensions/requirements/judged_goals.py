@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ballplate.results.study import planned_uncertainty
+from ballplate.results.predictions import planned_uncertainty
 from ballplate.simulator.experiment.model import Experiment
 
 from .goals import Goal, GoalError, check_goal, judge

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.results.study import PlannedUncertainty, planned_uncertainty, predict
+from ballplate.results.predictions import PlannedUncertainty, planned_uncertainty, predict
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded

@@ -49,7 +49,7 @@ def _next(document: DesignDocument, settings: Mapping[str, Any], report: Report)
 
 def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from ballplate.montecarlo.experiments import trials
-    from ballplate.results.study import predict
+    from ballplate.results.predictions import predict
 
     experiment = experiment_of(document)
     found = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
@@ -57,7 +57,7 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 
 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    from ballplate.planning.campaign import Request, campaign
+    from ballplate.planning.campaign_choice import Request, campaign
 
     experiment = experiment_of(document, planning=True)
     return {"lines": campaign(experiment, Request(), report=report).lines()}

@@ -12,7 +12,7 @@ from ballplate.extensions.repair.offers import offers
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
 from ballplate.extensions.repair.written import Edit, position_settings
-from ballplate.results.study import planned_uncertainty
+from ballplate.results.predictions import planned_uncertainty
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError

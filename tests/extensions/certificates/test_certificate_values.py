@@ -19,7 +19,7 @@ from ballplate.extensions.certificates.certificate_files import (
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 

@@ -15,7 +15,7 @@ from ballplate.extensions.judgement.left_out import (
     rest_of,
     validate,
 )
-from ballplate.extensions.maps.same_readings import same_readings
+from ballplate.extensions.maps.readings_in_common import same_readings
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out

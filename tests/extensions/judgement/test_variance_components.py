@@ -33,7 +33,7 @@ from ballplate.extensions.judgement.restricted_likelihood import (
     estimated_ratios,
     group_sums,
 )
-from ballplate.extensions.reliability.leftover import Leftover, leftover
+from ballplate.extensions.reliability.remainders import Leftover, leftover
 from ballplate.results.groupings import GROUPINGS, Grouping
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances

@@ -216,7 +216,7 @@ def test_tasks_of_an_experiment(fitted: FittedMap, tmp_path: Path) -> None:
     )
     from ballplate.extensions.maps.correction import correction
     from ballplate.extensions.maps.point_files import GivenPoints
-    from ballplate.extensions.maps.wanted_lengths import tasks_of_experiment
+    from ballplate.extensions.maps.selected_lengths import tasks_of_experiment
 
     nothing = GivenPoints(np.zeros((0, 3)), (), np.zeros(0, np.int64))
     found = correction(fitted, nothing, tasks_of_experiment(fitted, experiment))

@@ -9,8 +9,8 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.reliability.bias_patterns import patterns
 from ballplate.extensions.reliability.effects import changes_of
-from ballplate.extensions.reliability.patterns import patterns
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.response import responses
 from ballplate.simulator.design.arrays import Design, State, nominal_state

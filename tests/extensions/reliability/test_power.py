@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.bias_patterns import Patterns, patterns
 from ballplate.extensions.reliability.cause_search import diagnosis
-from ballplate.extensions.reliability.leftover import Columns, leftover
-from ballplate.extensions.reliability.patterns import Patterns, patterns
 from ballplate.extensions.reliability.power import (
     alarm_limit,
     chance_of_alarm,
@@ -19,6 +18,7 @@ from ballplate.extensions.reliability.power import (
 )
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.reliability_result import Reliability
+from ballplate.extensions.reliability.remainders import Columns, leftover
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.reliability.cause_search import Search
-from ballplate.extensions.reliability.leftover import leftover
+from ballplate.extensions.reliability.remainders import leftover
 from ballplate.extensions.reliability.scatter import (
     log_chances,
     ratio,

@@ -14,8 +14,8 @@ import ballplate as bp
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
+from ballplate.results.predictions import check
+from ballplate.simulator.experiment.loading import load
 
 from tests.reference.copies import copy_file
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ballplate.rank.verdicts import verdict
+from ballplate.results.influences import influence_uncertainties
+from ballplate.results.prediction import Prediction
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-
-from ..rank.verdict import verdict
-from ..uncertainty.scale import scale_of
-from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
-from ..uncertainty.tasks import TaskUncertainty
-from .influences import influence_uncertainties
-from .prediction import Prediction
+from ballplate.uncertainty.scale import scale_of
+from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
+from ballplate.uncertainty.tasks import TaskUncertainty
 
 if TYPE_CHECKING:
     pass

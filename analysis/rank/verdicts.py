@@ -11,6 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.rank.canonical import elementary_mixture, principal_directions
 from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
@@ -19,8 +20,6 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
-
-from .canonical import elementary_mixture, principal_directions
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01

@@ -7,12 +7,8 @@ from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.simulator.computing.rounding import printable
-from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.simulator.machines.protocol import Array
-
-from ..presentation.columns import table_lines
-from ..presentation.formatting import (
+from ballplate.presentation.columns import table_lines
+from ballplate.presentation.formatting import (
     by_name,
     given,
     number,
@@ -21,12 +17,15 @@ from ..presentation.formatting import (
     shown_unit,
     uncertainty_words,
 )
-from ..rank.verdict import GREAT, Verdict
-from ..uncertainty.scale import Scale
-from ..uncertainty.summaries import Quantity
-from ..uncertainty.tasks import TaskUncertainty, is_determined
-from .adjustments import ARCSECOND, Adjustment
-from .plates import PlateCoordinates
+from ballplate.rank.verdicts import GREAT, Verdict
+from ballplate.results.adjustments import ARCSECOND, Adjustment
+from ballplate.results.plates import PlateCoordinates
+from ballplate.simulator.computing.rounding import printable
+from ballplate.simulator.inputs.settings import listing, number_of
+from ballplate.simulator.machines.protocol import Array
+from ballplate.uncertainty.scale import Scale
+from ballplate.uncertainty.summaries import Quantity
+from ballplate.uncertainty.tasks import TaskUncertainty, is_determined
 
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration

@@ -9,26 +9,21 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.computing.processes import in_processes
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.inputs.extensions import optional_service, service
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.settings import listing
-
-from ..results.study import predict
-from .bound import Bound, bound
-from .choice import CurvePoint, DriftInOrders, Gain, OpenPool
-from .constraints import Budget, Constraints, constraints
-from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
-from .drift_times import in_time, without_drift
-from .information import pool_information
-from .offer import Offer, offer, open_directions
-from .orders import LEAST_CHANGE_OVER, OrderName
-from .schedule import Completion, run_sheet
-from .search import (
+from ballplate.planning.bound import Bound, bound
+from ballplate.planning.choice import CurvePoint, DriftInOrders, Gain, OpenPool
+from ballplate.planning.constraints import Budget, Constraints, constraints
+from ballplate.planning.criteria import (
+    CriterionName,
+    criterion,
+    is_about_balls,
+    refuse_many_points,
+)
+from ballplate.planning.drift_times import in_time, without_drift
+from ballplate.planning.information import pool_information
+from ballplate.planning.orders import LEAST_CHANGE_OVER, OrderName
+from ballplate.planning.remaining_candidates import Offer, offer, open_directions
+from ballplate.planning.schedule import Completion, run_sheet
+from ballplate.planning.search import (
     GAIN,
     Found,
     Losses,
@@ -39,8 +34,17 @@ from .search import (
     starts,
     value,
 )
-from .selection import Campaign
-from .short_names import short_names
+from ballplate.planning.selection import Campaign
+from ballplate.planning.short_names import short_names
+from ballplate.results.predictions import predict
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
+from ballplate.simulator.inputs.extensions import optional_service, service
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.settings import listing
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8

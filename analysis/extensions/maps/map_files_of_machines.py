@@ -17,8 +17,8 @@ from .error_curves_result import ErrorCurves, error_curves
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 from .map_places import PlacesAsked
 from .realisations import Draws
+from .selected_lengths import tasks_of_experiment
 from .volumetric_results import MachineErrors, machine_errors
-from .wanted_lengths import tasks_of_experiment
 
 # A map file says at its beginning that it is one.
 OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
