@@ -146,7 +146,7 @@ def run(
     from dataclasses import replace
 
     from .montecarlo.trial_runs import MOST_TRIALS
-    from .results import predictions as study
+    from .results import checked_designs as study
 
     ensure_whole(2, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)

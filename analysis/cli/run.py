@@ -54,7 +54,7 @@ def _trial_count(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
-    from ..results.predictions import predict
+    from ..results.checked_designs import predict
     from .common import experiments, print_json, print_lines
 
     plans, found, interrupted = [], [], False

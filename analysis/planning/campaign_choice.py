@@ -36,7 +36,7 @@ from ballplate.planning.search import (
 )
 from ballplate.planning.selection import Campaign
 from ballplate.planning.short_names import short_names
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import Report, counted, unreported

@@ -20,8 +20,8 @@ from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
 from ..rank.verdicts import Verdict
+from ..results.checked_designs import check
 from ..results.prediction import Advice, Prediction
-from ..results.predictions import check
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 

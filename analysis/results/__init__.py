@@ -1,1 +1,31 @@
 """Results that show themselves, and how they are written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .adjustments import ARCSECOND, FEW, coverage_factor, few_degrees_of_freedom, freedom_words
+    from .checked_designs import PlannedUncertainty, check, planned_uncertainty, predict
+    from .diagnosis import has_exact_values
+    from .estimates import (
+        ESTIMATE_COLUMNS,
+        EstimatedFunctions,
+        Function,
+        ParameterEstimate,
+        estimated_functions,
+        labels,
+    )
+    from .fits import Fit
+    from .fitting import fit
+    from .groupings import GROUPINGS, Grouping
+    from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words, maps_known
+    from .prediction import Prediction, length_headline, rank_words
+    from .residuals import reading_residuals
+    from .sigmas_by_campaign import campaign_sigmas, with_sigmas
+    from .text_blocks import scale_lines, scale_warnings, target_lines, verdict_lines
+
+__getattr__, __dir__ = lazily(__name__, __file__)

@@ -22,12 +22,12 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ..rank.verdicts import verdict
 from ..uncertainty.summaries import uncertainties
 from .adjustments import Adjustment, adjustments
+from .checked_designs import check
 from .diagnosis import diagnosed, lack_of_fit
 from .estimates import estimated_functions, parameter_estimates
 from .fits import Fit
 from .groupings import Grouping
 from .plates import plate_coordinates
-from .predictions import check
 from .residuals import largest_residuals
 from .sigmas_by_campaign import CampaignSigmas, campaign_sigmas
 

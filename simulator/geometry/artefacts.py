@@ -23,7 +23,7 @@ from .ball_layouts import (
     Pairs,
     frozen,
 )
-from .directions import DIRECTIONS, DirectionsSettings, directions
+from .listed_directions import DIRECTIONS, DirectionsSettings, directions
 
 
 class GridSettings(ArtefactSettings):

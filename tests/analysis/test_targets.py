@@ -15,7 +15,7 @@ from ballplate.cli import main
 from ballplate.extensions.maps.length_map import LengthMapSettings, length_map
 from ballplate.presentation.formatting import percent
 from ballplate.rank.verdicts import Verdict, weak_limit
-from ballplate.results.predictions import check, predict
+from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.corrections import correction_rows

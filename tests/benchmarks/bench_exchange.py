@@ -14,7 +14,7 @@ from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import criterion
 from ballplate.planning.information import Information, pool_information
 from ballplate.planning.search import Losses, SelectionProblem, best_addition, full_root
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.checked_designs import predict
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
 from ballplate.results.prediction import Prediction
-from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.layout import lay_out

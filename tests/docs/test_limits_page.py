@@ -36,7 +36,8 @@ from ballplate.simulator.experiment import (
 from ballplate.simulator.experiment import (
     curve_files as curves,
 )
-from ballplate.simulator.geometry import artefacts, directions
+from ballplate.simulator.geometry import artefacts
+from ballplate.simulator.geometry import listed_directions as directions
 from ballplate.simulator.inputs import decoding, messages, tables, yamltree
 from ballplate.simulator.inputs import settings as input_settings
 

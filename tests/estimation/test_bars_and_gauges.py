@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from ballplate.results.checked_designs import predict
 from ballplate.results.fitting import fit
-from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.parameters import shared_layout

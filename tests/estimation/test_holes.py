@@ -13,8 +13,8 @@ import yaml
 from ballplate import compare
 from ballplate.extensions.laboratory.gross_errors import find_gross_errors
 from ballplate.extensions.reliability.redundancy import reliability
+from ballplate.results.checked_designs import predict
 from ballplate.results.fitting import fit
-from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import eliminate

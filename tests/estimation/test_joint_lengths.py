@@ -14,7 +14,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import trials
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
 from ballplate.simulator.design.observations.readings import expected_readings

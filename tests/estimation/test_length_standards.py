@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import trials
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.experiment.layout import lay_out

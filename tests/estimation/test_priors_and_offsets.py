@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.checked_designs import check, predict
 from ballplate.results.fitting import fit
-from ballplate.results.predictions import check, predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import reading_blocks

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.checked_designs import predict
 from ballplate.results.fitting import fit
-from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.readings import reading_weights
 from ballplate.simulator.experiment.layout import lay_out

@@ -9,7 +9,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from ballplate.results.predictions import check
+from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.checks import excess
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position

@@ -11,7 +11,10 @@ from ballplate.extensions.laboratory.symmetry import turns_onto_itself
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.axes import PlateAxes, plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.directions import GeneratedDirectionsSettings, directions
+from ballplate.simulator.geometry.listed_directions import (
+    GeneratedDirectionsSettings,
+    directions,
+)
 from ballplate.simulator.geometry.motions import (
     fit_motion,
     fixes_pose,

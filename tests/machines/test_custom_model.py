@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.results.predictions import check
+from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError

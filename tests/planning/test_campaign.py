@@ -19,7 +19,7 @@ from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.search import SelectionProblem
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.internal_error import InternalError
 from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.experiment.loading import load

@@ -13,8 +13,8 @@ from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
 from ballplate.planning.search import Losses, SelectionProblem, value
+from ballplate.results.checked_designs import predict
 from ballplate.results.prediction import Prediction
-from ballplate.results.predictions import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen

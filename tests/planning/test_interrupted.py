@@ -19,7 +19,7 @@ from ballplate.planning.information import pool_information
 from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.schedule import run_sheet
 from ballplate.planning.selection import Campaign
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen

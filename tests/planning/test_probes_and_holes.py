@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.planning.search import value
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import with_chosen

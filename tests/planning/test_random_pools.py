@@ -18,7 +18,7 @@ from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.planning.selection import Campaign
-from ballplate.results.predictions import planned_uncertainty, predict
+from ballplate.results.checked_designs import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

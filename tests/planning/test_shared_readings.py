@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.planning.search import value
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import with_chosen

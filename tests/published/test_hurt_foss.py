@@ -13,15 +13,15 @@ import pytest
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.results.checked_designs import predict
 from ballplate.results.fitting import fit
-from ballplate.results.predictions import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.directions import directions
+from ballplate.simulator.geometry.listed_directions import directions
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings

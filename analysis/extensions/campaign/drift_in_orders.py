@@ -6,27 +6,23 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.planning.drift_times import in_time, without_drift
-from ballplate.planning.orders import OrderName
-from ballplate.planning.schedule import RunSheet
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.influences.drift import (
+from ballplate.planning import OrderName, RunSheet, in_time, without_drift
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import (
+    Design,
     DriftSettings,
     PointDriftSettings,
     ScaleDriftSettings,
 )
-from ballplate.simulator.estimation.functions import Distances, linear_functions
-from ballplate.simulator.estimation.linearisation import LinearFunctions, linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment
-from ballplate.simulator.inputs.quantities import (
+from ballplate.simulator.estimation import Distances, LinearFunctions, linear_functions, linearise
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, lay_out
+from ballplate.simulator.inputs import (
     QuantityError,
     parse_length_drift,
     parse_ratio_drift,
 )
-from ballplate.simulator.machines.protocol import Array
-from ballplate.uncertainty.quantities import evaluation_points
+from ballplate.simulator.machines import Array
+from ballplate.uncertainty import evaluation_points
 
 # Evaluation points between which distances are looked at, at the most.
 MOST_POINTS = 100

@@ -6,15 +6,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ballplate.planning.campaign_choice import Request
-from ballplate.planning.constraints import HOUR
-from ballplate.planning.orders import LEAST_CHANGE_OVER, ORDERS, ReadingOrder
-from ballplate.planning.schedule import run_sheet
-from ballplate.planning.selection import Campaign
-from ballplate.presentation.columns import table_lines
-from ballplate.presentation.formatting import finite, number
-from ballplate.simulator.experiment.model import Candidate, Experiment, Pool, Position
-from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.planning import (
+    HOUR,
+    LEAST_CHANGE_OVER,
+    ORDERS,
+    Campaign,
+    ReadingOrder,
+    Request,
+    run_sheet,
+)
+from ballplate.presentation import finite, number, table_lines
+from ballplate.simulator.experiment import Candidate, Experiment, Pool, Position
+from ballplate.simulator.inputs import ExperimentError, refused
 
 from .drift_in_orders import (
     DriftEffect,

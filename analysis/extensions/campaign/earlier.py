@@ -8,15 +8,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from ballplate.planning.remaining_candidates import Offer, offer
-from ballplate.planning.short_names import names_of_plan
-from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.whitening import CovarianceRoot
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.planning import Offer, names_of_plan, offer
+from ballplate.simulator.design import Calibration, CovarianceRoot
+from ballplate.simulator.experiment import Experiment, Position, load
+from ballplate.simulator.inputs import ExperimentError, GivenText, Message, hint, refused
 
 from .positions_read import done_candidates
 

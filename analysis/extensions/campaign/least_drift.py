@@ -8,23 +8,27 @@ from itertools import combinations, permutations, product
 from math import factorial, prod
 
 import numpy as np
-from ballplate.planning.drift_times import without_drift
-from ballplate.planning.orders import with_probes
-from ballplate.planning.schedule import first_readings
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.influences.drift import HOUR, Clock
-from ballplate.simulator.design.influences.protocol import (
+from ballplate.planning import first_readings, with_probes, without_drift
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import (
+    HOUR,
+    Clock,
     DesignParts,
     Disturbed,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
+    Readings,
 )
-from ballplate.simulator.design.objects import Readings
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.experiment import (
+    Candidate,
+    ChangeTimes,
+    Experiment,
+    Position,
+    lay_out,
+    with_chosen,
+)
+from ballplate.simulator.machines import Array, Integers
 from numpy.typing import NDArray
 
 from .drift_in_orders import effects_on_distances

@@ -10,19 +10,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.planning.set_ups import REST, SetUp, base_name, position_of, renamed
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
-from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.quantities import length_text
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import read_readings
-from ballplate.simulator.readings.reading_sources import named_rows
+from ballplate.planning import REST, SetUp, base_name, position_of, renamed
+from ballplate.simulator.design import Design
+from ballplate.simulator.experiment import (
+    Candidate,
+    Experiment,
+    Position,
+    ReadingGroup,
+    lay_out,
+    with_chosen,
+)
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import ExperimentError, GivenText, Message, hint, length_text
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import named_rows, read_readings
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")

@@ -6,10 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.settings import number_of
-from ballplate.simulator.inputs.tables import FileRow
-from ballplate.simulator.readings.observed_readings import reading_keys
+from ballplate.simulator.design import Design
+from ballplate.simulator.inputs import FileRow, number_of
+from ballplate.simulator.readings import reading_keys
 
 Names = tuple[str, ...]
 

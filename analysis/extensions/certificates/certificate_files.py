@@ -18,37 +18,38 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.observations.calibration import (
+from ballplate.simulator.design import (
     FAR_FROM_DRAWING,
     CertifiedValue,
+    Design,
+    Priors,
+    State,
     far_from_drawing,
 )
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.experiment.exact_values import exact_contradictions
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.star_tables import doubt_of_table
-from ballplate.simulator.inputs.messages import (
+from ballplate.simulator.experiment import Experiment, doubt_of_table, exact_contradictions
+from ballplate.simulator.inputs import (
     MOST_MESSAGES,
-    ExperimentError,
-    Message,
-    format_path,
-    refused,
-)
-from ballplate.simulator.inputs.quantities import (
     SMALLEST,
+    CsvWriter,
+    ExperimentError,
+    FileRow,
+    GivenText,
+    Message,
     QuantityError,
+    format_path,
+    headings,
+    hint,
     length_text,
+    listing,
     parse_angle,
     parse_length,
     parse_ratio,
+    read_table,
+    read_text,
+    refused,
 )
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.inputs.tables import FileRow, headings, read_table
-from ballplate.simulator.inputs.yamltree import GivenText, read_text
-from ballplate.simulator.machines.protocol import Array, ErrorModel
-from ballplate.simulator.readings.simulated import Simulated
+from ballplate.simulator.machines import Array, ErrorModel
+from ballplate.simulator.readings import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"

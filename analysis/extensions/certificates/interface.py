@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ballplate.arguments import PathLike, experiment_of
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import ensure_type, ensure_whole
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ensure_type, ensure_whole
 
 if TYPE_CHECKING:
     import pandas
@@ -23,7 +23,7 @@ def certificate(
     [['calibration[0]', 'r1c1', 'r1c5'], ['calibration[0]', 'r5c1', 'r5c5']]
     """
     import pandas
-    from ballplate.simulator.readings.simulated import simulated_readings
+    from ballplate.simulator.readings import simulated_readings
 
     from . import certificate_files
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ballplate.planning.checked_files import CheckedDesign, CheckedFile
-from ballplate.results.text_blocks import (
+from ballplate.planning import CheckedDesign, CheckedFile
+from ballplate.results import (
     scale_lines,
     scale_warnings,
     target_lines,
     verdict_lines,
 )
-from ballplate.simulator.inputs.messages import in_lines, in_one_line
+from ballplate.simulator.inputs import in_lines, in_one_line
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from ballplate.planning.checked_files import CheckedDesign, CheckedFile
-from ballplate.results.text_blocks import verdict_lines
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.planning import CheckedDesign, CheckedFile
+from ballplate.results import verdict_lines
+from ballplate.simulator.inputs import in_one_line
 
 # No XML document can hold these, not even as character references.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli.common import add_json, show, single
-from ballplate.cli.outputs import UsageError
-from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
-from ballplate.cli.table_options import KEYS
-from ballplate.results.groupings import GROUPINGS
+from ballplate.cli import (
+    KEYS,
+    UsageError,
+    add_json,
+    add_readings,
+    observed_readings,
+    show,
+    single,
+    warn_of,
+)
+from ballplate.results import GROUPINGS
 
 DESCRIPTION = (
     "Compute what each source of uncertainty contributes to U4, U6, the body diagonals and the"
@@ -38,7 +44,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print the budget of one experiment."""
-    from ballplate.results.fitting import fit
+    from ballplate.results import fit
 
     from .budget import budget
 

@@ -15,18 +15,14 @@ from ballplate.extensions.reliability.exact_values import diagnosis_of_all
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.extensions.reliability.remainders import too_many_entries
 from ballplate.extensions.reliability.wording import refit_words, suspect_words
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.corrections import corrected_points
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.kinematic_settings import KinematicSettings
-from ballplate.simulator.machines.protocol import Array, ErrorModel
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.summaries import uncertainties
+from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation import Linearisation, corrected_points, estimate, linearised_fit
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array, ErrorModel, KinematicSettings
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.uncertainty import uncertainties
 
 from .compared_models_result import ComparedModels, LengthChange, Rung
 from .lack_of_fit import PureError, chance_of, chance_words, pure_error

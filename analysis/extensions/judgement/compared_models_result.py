@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.columns import table_lines
-from ballplate.presentation.formatting import number, picked
-from ballplate.presentation.result import FitResult
-from ballplate.results.adjustments import freedom_words
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.presentation import FitResult, number, picked, table_lines
+from ballplate.results import freedom_words
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.uncertainty import Quantity
 
 from .lack_of_fit import PureError, chance_words
 from .rung_choice import FALSE_STEP, Beaten, Criteria

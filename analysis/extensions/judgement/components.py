@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.remainders import leftover, too_many_entries
-from ballplate.presentation.columns import table_lines
-from ballplate.presentation.formatting import picked
-from ballplate.presentation.result import Result
-from ballplate.results.groupings import Grouping
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.presentation import Result, picked, table_lines
+from ballplate.results import Grouping
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import Linearisation
+from ballplate.simulator.machines import Array, Integers
 
 from .observation_groups import ObservationGroup, groups_of, reweighted
 from .restricted_likelihood import (

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.columns import Columns
-from ballplate.presentation.formatting import aligned, number, picked
-from ballplate.presentation.result import FitResult
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.presentation import Columns, FitResult, aligned, number, picked
+from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_words
 

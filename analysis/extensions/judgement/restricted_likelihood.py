@@ -18,8 +18,8 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.extensions.reliability.remainders import Leftover
-from ballplate.simulator.computing.threads import scipy_linalg
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.computing import scipy_linalg
+from ballplate.simulator.machines import Array, Integers
 
 from .observation_groups import ObservationGroup
 

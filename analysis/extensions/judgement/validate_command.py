@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli.common import add_json
-from ballplate.cli.reading_options import (
-    add_readings,
-    observed_readings,
-    warn_of,
-)
+from ballplate.cli import add_json, add_readings, observed_readings, warn_of
 
 DESCRIPTION = (
     "Leave out each position, plate and direction in turn, predict its readings from all others,"
@@ -25,8 +20,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Validate a fit; 1 if a prediction fails."""
-    from ballplate.cli.common import show
-    from ballplate.cli.progress_bars import progress
+    from ballplate.cli import progress, show
 
     from .left_out import validate
 

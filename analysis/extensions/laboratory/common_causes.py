@@ -12,16 +12,16 @@ from collections.abc import Iterator, Mapping
 from itertools import permutations, product
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
+from ballplate.simulator.design import (
     Design,
     Readings,
     nominal_places,
     read_in_positions,
 )
-from ballplate.simulator.experiment.readings_section import ReadingsSettings
-from ballplate.simulator.geometry.motions import AXIS_NAMES, fixes_pose
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.experiment import ReadingsSettings
+from ballplate.simulator.geometry import AXIS_NAMES, fixes_pose
+from ballplate.simulator.inputs import listing
+from ballplate.simulator.machines import Array
 
 from .consensus import consensus_motion
 from .coordinate_kinds import controller_offsets

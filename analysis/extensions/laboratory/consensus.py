@@ -6,9 +6,9 @@ from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.geometry.motions import fit_motion
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.geometry import fit_motion
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
 # Subsets tried, and the points that each is judged by. With a third of the points wrong, three

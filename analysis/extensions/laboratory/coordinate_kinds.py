@@ -7,21 +7,17 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
+from ballplate.simulator.design import (
     Design,
     Readings,
     nominal_places,
     read_in_positions,
 )
-from ballplate.simulator.experiment.readings_section import (
-    CompensationSettings,
-    ReadingsSettings,
-)
-from ballplate.simulator.geometry.motions import fixes_pose
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.generate import NoReadingError, scale_readings
+from ballplate.simulator.experiment import CompensationSettings, ReadingsSettings
+from ballplate.simulator.geometry import fixes_pose
+from ballplate.simulator.inputs import listing, refused
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import NoReadingError, scale_readings
 
 from .consensus import consensus_motion
 from .gross_errors import AGAINST_DRAWING, ball_pitches

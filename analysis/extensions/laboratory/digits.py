@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.quantities import LENGTH_UNITS, format_length
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Design
+from ballplate.simulator.inputs import LENGTH_UNITS, format_length
+from ballplate.simulator.machines import Array
 
 # Units, in metres, of whose powers of ten tables have the last digits, and the largest exponent.
 UNITS = (1.0, float(LENGTH_UNITS["in"]))

@@ -6,14 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, Readings
-from ballplate.simulator.design.objects import SLIGHTLY
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.experiment.readings_section import ReadingsSettings
-from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import SLIGHTLY, Design, Lengths, Readings
+from ballplate.simulator.experiment import ReadingsSettings
+from ballplate.simulator.inputs import ExperimentError, Mark, Message, format_length
+from ballplate.simulator.machines import Array
 
 from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors

@@ -20,13 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, read_in_positions
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.design.observations.readings import seen_places
-from ballplate.simulator.estimation.initial import initial_state
-from ballplate.simulator.geometry.motions import fit_motion
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.design import Design, Lengths, Priors, read_in_positions, seen_places
+from ballplate.simulator.estimation import initial_state
+from ballplate.simulator.geometry import fit_motion
+from ballplate.simulator.machines import Array, Integers
 from numpy.typing import NDArray
 
 from .consensus import consensus_motion, distances

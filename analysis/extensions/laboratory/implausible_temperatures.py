@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.influences.temperature import COLDEST, WARMEST
-from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.design import COLDEST, WARMEST, Design
+from ballplate.simulator.inputs import Mark
 
 
 def doubts_about_temperatures(design: Design, marks: Sequence[Mark]) -> tuple[str, ...]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.formatting import picked
-from ballplate.presentation.result import Result
+from ballplate.presentation import Result, picked
 
 from .imported import ImportedReadings
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, Lengths
+from ballplate.simulator.estimation import FLAT, fit_sphere
+from ballplate.simulator.machines import Array
 
 # Departures of the factor from one that are doubtful, and that no machine has; a length that is
 # only drawn may be off.

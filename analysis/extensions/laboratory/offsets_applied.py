@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
+from ballplate.simulator.design import (
     Design,
     Readings,
     locations,
@@ -18,14 +18,10 @@ from ballplate.simulator.design.arrays import (
     nominal_state,
     read_in_positions,
 )
-from ballplate.simulator.estimation.initial import initial_state
-from ballplate.simulator.experiment.readings_section import (
-    CompensationSettings,
-    ReadingsSettings,
-)
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.estimation import initial_state
+from ballplate.simulator.experiment import CompensationSettings, ReadingsSettings
+from ballplate.simulator.inputs import Mark, format_length
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
 from .common_causes import TURNED, poses_found

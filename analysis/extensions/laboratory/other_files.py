@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import re
 
-from ballplate.simulator.inputs.tables import headings
-from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.inputs import GivenText, headings
 
 from .formats.registered import recognised
 from .formats.report import Format

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ballplate.simulator.design.arrays import Design, Readings
-from ballplate.simulator.experiment.readings_section import ReadingsSettings
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, Readings
+from ballplate.simulator.experiment import ReadingsSettings
+from ballplate.simulator.inputs import Mark
+from ballplate.simulator.machines import Array
 
 from .common_causes import doubts_about_poses
 from .coordinate_kinds import as_scale_readings, doubts_about_copies

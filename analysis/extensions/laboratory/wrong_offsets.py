@@ -12,15 +12,19 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, Readings, measured, read_in_positions
-from ballplate.simulator.design.objects import Flags
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.design.observations.readings import seen_places
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.design import (
+    Design,
+    Flags,
+    Lengths,
+    Priors,
+    Readings,
+    measured,
+    read_in_positions,
+    seen_places,
+)
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import format_length, listing
+from ballplate.simulator.machines import Array, Integers
 
 from .consensus import consensus_motion
 from .gross_errors import AGAINST_DRAWING, AGAINST_READINGS, ball_pitches, find_gross_errors

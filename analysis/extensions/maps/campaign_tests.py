@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import scipy_linalg, single_threaded
+from ballplate.simulator.machines import Array
 
 # Differences that are so small by no larger chance than this are doubted.
 TOO_RARE = 1e-3

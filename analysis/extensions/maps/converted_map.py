@@ -7,16 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, table_lines
-from ballplate.presentation.formatting import (
-    number,
-)
-from ballplate.presentation.result import Result
-from ballplate.results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
-from ballplate.results.map_of_fit import FRAMES
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
-from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
+from ballplate.presentation import Columns, Result, number, table_lines
+from ballplate.results import ESTIMATE_COLUMNS, FRAMES, ParameterEstimate
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.maps import CONVERSION, FittedMap, LeftOut, verdict_data, verdict_line
 
 from .corrected_points import corrected_with_root
 from .largest_differences import (

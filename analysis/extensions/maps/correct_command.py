@@ -6,22 +6,24 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_json, coverage_factor, show
-from ballplate.cli.notes import warn
-from ballplate.cli.outputs import (
+from ballplate.cli import (
     UsageError,
     Writer,
     add_force,
+    add_json,
     add_output,
+    coverage_factor,
+    show,
     text_writer,
+    warn,
     write,
 )
 
 from .fitted_argument import FITTED, fitted_map
 
 if TYPE_CHECKING:
-    from ballplate.simulator.design.objects import Tasks
-    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.simulator.design import Tasks
+    from ballplate.simulator.maps import FittedMap
 
     from .point_files import GivenPoints
 
@@ -106,7 +108,7 @@ def _add_lengths(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print points and lengths, and write what was asked for; 1 if something is undetermined."""
-    from ballplate.simulator.inputs.settings import hint
+    from ballplate.simulator.inputs import hint
 
     from .correction import MOST_CO_ORDINATES, correction
     from .point_files import read_points
@@ -140,7 +142,7 @@ def run(options: Namespace) -> int:
 
 def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
-    from ballplate.simulator.experiment.loading import load
+    from ballplate.simulator.experiment import load
 
     from .selected_lengths import between_listed, between_named, tasks_of_experiment
 

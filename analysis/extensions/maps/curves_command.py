@@ -6,16 +6,18 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import (
+from ballplate.cli import (
+    UsageError,
+    Writer,
+    add_force,
     add_formats,
     add_picture,
+    complain,
     count,
     print_json,
     print_lines,
     write_picture,
 )
-from ballplate.cli.notes import complain
-from ballplate.cli.outputs import UsageError, Writer, add_force
 
 from .fitted_argument import FITTED, fitted_map
 

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines
-from ballplate.presentation.formatting import SHOWN, aligned, ascii_units, number, picked
-from ballplate.presentation.result import Result
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.presentation import SHOWN, Result, aligned, ascii_units, number, picked, table_lines
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import CsvWriter
+from ballplate.simulator.maps import FittedMap
 
 from .error_functions import (
     POSITIONS,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.notes import complain
+from ballplate.cli import complain
 
 if TYPE_CHECKING:
-    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.simulator.maps import FittedMap
 
 # What is taken.
 FITTED = "map file, as fit -o writes it, or experiment file that names its readings"
@@ -20,7 +20,7 @@ def fitted_map(path: Path) -> FittedMap:
 
     :raises ExperimentError: the file is wrong, or the estimate did not converge.
     """
-    from ballplate.simulator.experiment.map_files import read_map
+    from ballplate.simulator.experiment import read_map
 
     from .fit_files import fit_of_file, kind_of_file
 

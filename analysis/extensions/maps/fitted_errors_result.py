@@ -11,17 +11,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, by_axis
-from ballplate.presentation.formatting import given, records
-from ballplate.presentation.result import Result
-from ballplate.presentation.scenes import box_edges, projection
-from ballplate.presentation.vectors import Vectors, draw_vectors
-from ballplate.results.adjustments import few_degrees_of_freedom
-from ballplate.results.map_of_fit import left_out_words
-from ballplate.simulator.design.objects import Tasks
-from ballplate.simulator.inputs.settings import hint, number_of
-from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.presentation import (
+    Columns,
+    Result,
+    Vectors,
+    box_edges,
+    by_axis,
+    draw_vectors,
+    given,
+    projection,
+    records,
+)
+from ballplate.results import few_degrees_of_freedom, left_out_words
+from ballplate.simulator.design import Tasks
+from ballplate.simulator.inputs import hint, number_of
+from ballplate.simulator.machines import Integers
+from ballplate.simulator.maps import FittedMap
 
 from .fitted_errors import (
     FittedErrors,

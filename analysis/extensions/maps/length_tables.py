@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines
-from ballplate.presentation.formatting import (
+from ballplate.presentation import (
+    Result,
     csv_lines,
     number,
     percent,
     picked,
     records,
+    table_lines,
     uncertainty_words,
 )
-from ballplate.presentation.result import Result
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.machines import Array
 
 from .length_groups import GroupedLengths, LengthGroups, target_words
 from .length_plots import draw_lengths

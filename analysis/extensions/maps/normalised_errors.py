@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.rounding import blank, comparable
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import blank, comparable, single_threaded
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
 from .campaign_tests import (

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.results.fits import Fit
-from ballplate.simulator.estimation.functions import BallPlaces, displacements
-from ballplate.simulator.geometry.motions import AXIS_NAMES, fit_motion
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.results import Fit
+from ballplate.simulator.estimation import BallPlaces, displacements
+from ballplate.simulator.geometry import AXIS_NAMES, fit_motion
+from ballplate.simulator.machines import Array, Integers
 
 from .campaign_tests import orthonormal
 from .compared_maps import ComparedMap, MappedValues, motions, without_shared

@@ -8,17 +8,19 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.inputs.messages import (
+from ballplate.simulator.design import Volume
+from ballplate.simulator.inputs import (
     MORE_ERRORS,
     MOST_MESSAGES,
     ExperimentError,
+    GivenText,
+    Mark,
     Message,
+    header_names,
+    hint,
+    read_table,
 )
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.tables import header_names, read_table
-from ballplate.simulator.inputs.yamltree import GivenText, Mark
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines import Array, Integers
 
 AXES = ("x", "y", "z")
 # Columns of text that a file may have; the first three name its points.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fitted_map import InCommon
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.inputs import listing
+from ballplate.simulator.machines import Array
+from ballplate.simulator.maps import InCommon
+from ballplate.simulator.readings import ObservedReadings
 from numpy.typing import NDArray
 
 Flags = NDArray[np.bool_]

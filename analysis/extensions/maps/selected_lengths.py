@@ -6,12 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.design.objects import Tasks
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError, refused
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.design import Tasks
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import (
+    MOST_MESSAGES,
+    ExperimentError,
+    GivenText,
+    hint,
+    listing,
+    refused,
+)
+from ballplate.simulator.maps import FittedMap
 
 from .point_files import GivenPoints, read_pairs
 

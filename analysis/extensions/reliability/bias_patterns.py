@@ -12,25 +12,26 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, locations
-from ballplate.simulator.design.influences.drift import Drift, even_clock
-from ballplate.simulator.design.observations.lengths import (
+from ballplate.simulator.design import (
+    Design,
+    Drift,
     Lengths,
+    State,
+    even_clock,
+    expected_readings,
     length_directions,
     length_values,
     length_whitening,
-)
-from ballplate.simulator.design.observations.readings import (
-    expected_readings,
+    locations,
     offset_sensitivity,
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.estimation.hat import row_count, row_places
-from ballplate.simulator.machines.protocol import Array, Integers, Unit
+from ballplate.simulator.estimation import row_count, row_places
+from ballplate.simulator.machines import Array, Integers, Unit
 
 if TYPE_CHECKING:
-    from ballplate.simulator.design.observations.whitening import Whitening
+    from ballplate.simulator.design import Whitening
     from scipy.sparse import csc_array
 
 # Axes along which a reading changes lengths by less than this share of the most are left out, and

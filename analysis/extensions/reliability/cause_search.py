@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.estimation import Linearisation, linearise
+from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
 from .events import SLIP, Cause, cause, event_groups, whole

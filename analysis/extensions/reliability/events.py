@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.design import CalibratedDistances
+from ballplate.simulator.machines import Integers
 
 from .bias_patterns import Patterns
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from ballplate.results.diagnosis import has_exact_values
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array
+from ballplate.results import has_exact_values
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import Linearisation, estimate, linearised_fit
+from ballplate.simulator.machines import Array
 
 from .cause_search import diagnosis
 from .suspects import Diagnosis, Suspect

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.lengths import length_name
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.design import CalibratedDistances, Design, length_name
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.machines import Integers
 
 from .bias_patterns import Patterns
 

@@ -8,17 +8,18 @@ import math
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, measured
-from ballplate.simulator.estimation.functions import Parameters
-from ballplate.simulator.estimation.hat import row_count, row_places
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Integers
-from ballplate.uncertainty.quantities import QUANTITIES, functions_of
+from ballplate.simulator.computing import (
+    ProgressStep,
+    Report,
+    comparable,
+    single_threaded,
+    unreported,
+)
+from ballplate.simulator.design import Design, measured
+from ballplate.simulator.estimation import Parameters, linearise, row_count, row_places
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.machines import Integers
+from ballplate.uncertainty import QUANTITIES, functions_of
 
 from .bias_patterns import patterns
 from .cause_search import FAMILY

@@ -21,15 +21,23 @@ from ballplate.extensions.laboratory.wrong_offsets import (
     stated_offsets,
     with_offsets,
 )
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.objects import Flags
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.estimation.gauss_newton import as_drawn, estimate, linearised_fit
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
-from ballplate.simulator.machines.kinematic import KinematicModel
-from ballplate.simulator.machines.plane import PlaneModel
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.design import Design, Flags, Priors
+from ballplate.simulator.estimation import (
+    Linearisation,
+    as_drawn,
+    estimate,
+    linearise,
+    linearised_fit,
+)
+from ballplate.simulator.machines import (
+    ARRANGEMENTS,
+    Arrangement,
+    Array,
+    ErrorModel,
+    Integers,
+    KinematicModel,
+    PlaneModel,
+)
 
 from .bias_patterns import patterns
 from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search

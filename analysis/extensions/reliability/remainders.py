@@ -8,11 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.hat import hat_rows, row_count, whitened_residuals
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.design import Design, shared_layout
+from ballplate.simulator.estimation import Linearisation, hat_rows, row_count, whitened_residuals
+from ballplate.simulator.machines import Array, Integers
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.estimation.hat import hat_rows
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.estimation import Linearisation, hat_rows
+from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import Patterns
 from .remainders import columns_of_balls

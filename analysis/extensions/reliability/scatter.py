@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, measured, reading_uncertainties
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.design import Design, measured, reading_uncertainties
+from ballplate.simulator.machines import Array, Integers
 
 from .remainders import Leftover
 

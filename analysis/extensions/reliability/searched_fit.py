@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.estimation import Linearisation
+from ballplate.simulator.inputs import Mark
+from ballplate.simulator.machines import Array
 
 from .refits import diagnosis_with_refits
 from .remainders import too_many_entries

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, locations
-from ballplate.simulator.design.observations.readings import rotation_sensitivity
-from ballplate.simulator.estimation.hat import row_count
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, State, locations, rotation_sensitivity
+from ballplate.simulator.estimation import row_count
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.machines import Array
 from numpy.polynomial import legendre
 
 from .bias_patterns import LinearisedDesign

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.machines.protocol import Array, Integers, Unit
+from ballplate.simulator.design import Design
+from ballplate.simulator.machines import Array, Integers, Unit
 
 from .bias_patterns import Patterns
 from .scatter import Scatter

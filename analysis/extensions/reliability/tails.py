@@ -5,7 +5,7 @@ floating-point number.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import Array
 
 # Below this, chances come from the leading term of their series.
 SMALLEST = 1e-280

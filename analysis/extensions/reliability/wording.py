@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN, number, picked
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.settings import listed, listing
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Integers
+from ballplate.presentation import SHOWN, number, picked
+from ballplate.simulator.design import CalibratedDistances, Lengths
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import Mark, listed, listing
+from ballplate.simulator.machines import Integers
 
 from .bias_patterns import Patterns, position_order
 from .cause_search import FAMILY, MOST

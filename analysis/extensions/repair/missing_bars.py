@@ -12,14 +12,12 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from ballplate.rank.verdicts import relative_changes
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.parameters import SharedLayout
-from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.settings import listed
-from ballplate.simulator.machines.protocol import Array
+from ballplate.rank import relative_changes
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.design import Design, Lengths, SharedLayout
+from ballplate.simulator.geometry import without_rigid_motion
+from ballplate.simulator.inputs import listed
+from ballplate.simulator.machines import Array
 
 from .proposed_bars import MISSING, bars_to_add
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    Experiment,
-)
-from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import BallLayout
+from ballplate.simulator.machines import Array
 
 from .proposed_bars import bar_directions
 

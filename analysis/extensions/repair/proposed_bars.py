@@ -8,11 +8,10 @@ from collections.abc import Iterator
 from itertools import combinations, combinations_with_replacement
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.geometry.directions import directions
-from ballplate.simulator.inputs.settings import listed
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, Lengths
+from ballplate.simulator.geometry import directions
+from ballplate.simulator.inputs import listed
+from ballplate.simulator.machines import Array
 
 # Singular values below this fraction of the largest: what readings tell of a direction through
 # their own scatter only.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.rank.verdicts import Verdict
-from ballplate.results.prediction import Prediction
-from ballplate.simulator.computing.steps import Report
-from ballplate.simulator.experiment.model import Experiment
+from ballplate.rank import Verdict
+from ballplate.results import Prediction
+from ballplate.simulator.computing import Report
+from ballplate.simulator.experiment import Experiment
 
 from .repair_search import Repairs, repairs
 from .repair_tables import certificate_data, certificate_lines, repair_data, repair_lines

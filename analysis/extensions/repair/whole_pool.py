@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.planning.information import Information
-from ballplate.rank.verdicts import Verdict, changed_names
-from ballplate.results.predictions import check
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.settings import listing
+from ballplate.planning import Information
+from ballplate.rank import Verdict, changed_names
+from ballplate.results import check
+from ballplate.simulator.computing import Report, comparable, unreported
+from ballplate.simulator.experiment import Candidate, Experiment, Position, with_chosen
+from ballplate.simulator.inputs import ExperimentError, listing
 
 from .repair_search import Repair, repairs
 from .repair_tables import changes_in_words

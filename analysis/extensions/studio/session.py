@@ -10,9 +10,8 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from ballplate.presentation.formatting import picked
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.trust import OPENED, UNKNOWN
+from ballplate.presentation import picked
+from ballplate.simulator.inputs import OPENED, UNKNOWN, ExperimentError, Message, refused
 
 from .actions import ActionError, done, settings_of
 from .document import (

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.inputs.arguments import (
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.inputs import (
     ensure_one_of,
     ensure_path,
     ensure_report,
@@ -145,7 +145,7 @@ def sweep_report(
         return sweep_page(Path(store), sweep, run_modules, beside, report)
     with closing(open_store(Path(store))) as opened:
         results = read_results(opened, sweep)
-        from ballplate.presentation.formats import FORMATS
+        from ballplate.presentation import FORMATS
 
         from .report.tables import report_tables
 

@@ -21,7 +21,7 @@ from ballplate.extensions.maps.length_map import (
     length_map,
     length_pairs,
 )
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment

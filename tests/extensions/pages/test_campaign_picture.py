@@ -13,7 +13,7 @@ from ballplate.extensions.campaign.campaign_picture import draw_campaign, words
 from ballplate.planning.choice import CurvePoint, Gain
 from ballplate.planning.constraints import Budget, Spent
 from ballplate.planning.selection import Campaign
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
 

@@ -10,7 +10,7 @@ import pytest
 import yaml
 from ballplate.extensions.repair.missing_bars import _told
 from ballplate.rank.verdicts import Verdict
-from ballplate.results.predictions import check, predict
+from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 

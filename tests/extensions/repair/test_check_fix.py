@@ -14,7 +14,7 @@ import ballplate as bp
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.results.predictions import check
+from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
 
 from tests.reference.copies import copy_file

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from ballplate.extensions.repair.mending import mended, to_write
 from ballplate.extensions.repair.repair_search import Repair, repairs
-from ballplate.results.predictions import check
+from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError

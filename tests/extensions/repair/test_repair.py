@@ -23,7 +23,7 @@ from ballplate.extensions.repair.repair_search import Repair, Repairs, repairs
 from ballplate.extensions.repair.repair_tables import repair_lines
 from ballplate.extensions.repair.screening import rank_of, seen_by
 from ballplate.planning.checked_files import Wanted, check_files
-from ballplate.results.predictions import check, predict
+from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import (

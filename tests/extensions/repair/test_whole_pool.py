@@ -14,7 +14,7 @@ from ballplate.extensions.repair import repair_search, whole_pool
 from ballplate.extensions.repair.changes import ChangeKind, apply_all
 from ballplate.extensions.repair.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.planning.information import pool_information
-from ballplate.results.predictions import planned_uncertainty
+from ballplate.results.checked_designs import planned_uncertainty
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position

@@ -16,7 +16,7 @@ from ballplate.extensions.repair.mending import mended
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import repair_lines
 from ballplate.presentation.formatting import number
-from ballplate.results.predictions import check, predict
+from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 

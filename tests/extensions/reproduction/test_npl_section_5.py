@@ -23,8 +23,8 @@ from ballplate.extensions.reproduction.shipped import (
     sums_of_squares,
 )
 from ballplate.rank.verdicts import Verdict
+from ballplate.results.checked_designs import check
 from ballplate.results.fits import Fit
-from ballplate.results.predictions import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 

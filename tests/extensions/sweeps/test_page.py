@@ -23,7 +23,7 @@ from ballplate.extensions.sweeps.report.page import page
 from ballplate.extensions.sweeps.report.results import read_results
 from ballplate.extensions.sweeps.report.verdicts import ranks
 from ballplate.extensions.sweeps.store import open_store
-from ballplate.results.predictions import predict
+from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.experiment.loading import load
 from ballplate.uncertainty.error_map_uncertainty import error_map

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import closing
 from pathlib import Path
 
-from ballplate.simulator.computing.steps import Report
+from ballplate.simulator.computing import Report
 
 from ..store import open_store
 from .page import page
