@@ -18,9 +18,9 @@ from ballplate.simulator.inputs.unusable import UnusableError
 from .completion import SHELLS, PrintCompletion
 from .encoding import write_data_in_utf8, write_readably
 from .interruption import Interruption, files_named, interruptions, leave, tell, written
+from .notes import add_telling, told
 from .outputs import UsageError, check_outputs
 from .streams import StandardOutputError, keep_standard_numbers, lasting_streams
-from .telling import add_telling, told
 
 USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 

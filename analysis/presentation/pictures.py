@@ -11,9 +11,9 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.machines.protocol import Array
 
-from ..uncertainty.error_map import ErrorMap, Slice
+from ..uncertainty.error_map_uncertainty import ErrorMap, Slice
 from .formatting import number
-from .scene import Box, DrawnPosition, Scene, scene
+from .scenes import Box, DrawnPosition, Scene, scene
 from .svg import (
     DASHES,
     INK,

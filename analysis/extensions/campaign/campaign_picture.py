@@ -16,7 +16,7 @@ from ballplate.planning.constraints import HOUR, Budget, Spent
 from ballplate.planning.criteria import DESCRIPTIONS
 from ballplate.presentation.formatting import number
 from ballplate.presentation.pictures import draw_scene
-from ballplate.presentation.scene import scene
+from ballplate.presentation.scenes import scene
 from ballplate.presentation.svg import (
     DASHES,
     INK,

@@ -96,8 +96,8 @@ def run(options: Namespace) -> int:
 def _judged(
     options: Namespace, experiment: Experiment, goal: Goal, sources: Sequence[Path]
 ) -> NextStep:
-    from ballplate.cli.progress import progress
-    from ballplate.cli.telling import complain
+    from ballplate.cli.notes import complain
+    from ballplate.cli.progress_bars import progress
 
     from .next_position import next_step
 
@@ -116,7 +116,7 @@ def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
 
     from ballplate.cli.common import print_lines
     from ballplate.cli.excerpts import print_errors
-    from ballplate.cli.telling import note
+    from ballplate.cli.notes import note
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from .watching_command import settled

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
 from ballplate.gross_errors.wording import diagnosis_words
-from ballplate.planning.done import groups_taken
+from ballplate.planning.positions_read import groups_taken
 from ballplate.results.adjustments import FEW
-from ballplate.results.campaign_sigmas import with_sigmas
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
+from ballplate.results.sigmas_by_campaign import with_sigmas
 from ballplate.results.study import PlannedUncertainty
 from ballplate.results.study import fit as fit_observed
 from ballplate.simulator.computing.steps import Report, counted, unreported

@@ -11,7 +11,7 @@ from ballplate.extensions.requirements.goals import Goal, Judgement
 from ballplate.presentation.formatting import finite, number
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import freedom_words
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.study import PlannedUncertainty
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.settings import listing, number_of

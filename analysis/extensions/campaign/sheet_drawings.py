@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from ballplate.presentation.paper import escaped, on_paper, pitch
-from ballplate.presentation.scene import Box, DrawnPosition, scene
+from ballplate.presentation.scenes import Box, DrawnPosition, scene
 from ballplate.presentation.svg import SERIES
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.geometry.ball_layouts import BallLayout

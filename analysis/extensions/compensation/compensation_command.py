@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.cli.common import add_json, argument_type, show
+from ballplate.cli.notes import complain
 from ballplate.cli.outputs import (
     Output,
     UsageError,
@@ -15,7 +16,6 @@ from ballplate.cli.outputs import (
     check_outputs,
     write,
 )
-from ballplate.cli.telling import complain
 
 if TYPE_CHECKING:
     from .compensation_tables import CompensationTable

@@ -19,7 +19,7 @@ from ballplate.simulator.inputs.arguments import (
 from ballplate.simulator.inputs.quantities import QuantityError
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.simulator.maps.fitted_map import FittedMap
 
     from .compensation_tables import (

@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.presentation.formatting import aligned, finite, number
 from ballplate.presentation.result import Result
 from ballplate.results.adjustments import few_degrees_of_freedom
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.groupings import Grouping
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.threads import single_threaded

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.gross_errors.leftover import leftover, too_many_entries
+from ballplate.gross_errors.remainders import leftover, too_many_entries
 from ballplate.presentation.formatting import aligned, finite, number, picked
 from ballplate.presentation.result import Result
 from ballplate.results.groupings import Grouping

@@ -14,7 +14,6 @@ from typing import Any, Literal
 import numpy as np
 from ballplate.presentation.formatting import aligned, as_data, number, picked
 from ballplate.presentation.result import FitResult
-from ballplate.results.campaign_sigmas import campaign_sigmas
 from ballplate.results.campaign_tests import (
     TOO_ALIKE,
     TOO_RARE,
@@ -24,6 +23,7 @@ from ballplate.results.campaign_tests import (
     joint_difference,
     with_common,
 )
+from ballplate.results.sigmas_by_campaign import campaign_sigmas
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.corrections import corrected_points, correction_rows
@@ -34,7 +34,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.same_readings import (
+from ballplate.simulator.readings.readings_in_common import (
     read_once_words,
     same_positions,
     same_readings,

@@ -22,7 +22,7 @@ from ballplate.simulator.inputs.arguments import (
 if TYPE_CHECKING:
     import pandas
     from ballplate.arguments import Tables
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
 
     from .budget import UncertaintyBudget
     from .cross_validation import CrossValidation
@@ -113,7 +113,7 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     >>> bp.budget(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())), by="probe").sources[0]
     'calibration[0]: distances of plate'
     """
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
 
     from .budget import budget as budget_of
 

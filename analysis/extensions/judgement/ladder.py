@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 from ballplate.gross_errors.exact_values import diagnosis_of_all
-from ballplate.gross_errors.leftover import too_many_entries
 from ballplate.gross_errors.refits import diagnosis_with_refits
+from ballplate.gross_errors.remainders import too_many_entries
 from ballplate.gross_errors.wording import refit_words, suspect_words
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded

@@ -41,7 +41,7 @@ def _coefficients(text: str) -> int:
 def run(options: Namespace) -> int:
     """Compare error models; 1 if none is recommended."""
     from ballplate.cli.common import show
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
 
     from .ladder import ladder
     from .rungs import MOST_COEFFICIENTS

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.results.campaign_sigmas import campaign_sigmas
+from ballplate.results.sigmas_by_campaign import campaign_sigmas
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import (

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.gross_errors.leftover import Leftover
+from ballplate.gross_errors.remainders import Leftover
 from ballplate.results.observation_groups import ObservationGroup
 from ballplate.simulator.computing.threads import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers

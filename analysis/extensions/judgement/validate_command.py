@@ -49,7 +49,7 @@ def add_options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Validate a fit; 1 if a prediction fails, or two campaigns differ."""
     from ballplate.cli.common import show
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
     from ballplate.presentation.result import FitResult
 
     if options.other_plate and not options.against:

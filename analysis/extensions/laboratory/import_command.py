@@ -6,9 +6,9 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from ballplate.cli.notes import complain, note
 from ballplate.cli.outputs import add_force, add_output, text_writer, write
 from ballplate.cli.table_options import rule
-from ballplate.cli.telling import complain, note
 
 GROUP = "measure"
 HELP = "make a table of readings of reports of CMM programs"

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.cli.common import add_json, map_path, percentage, show, write_noted
+from ballplate.cli.notes import warn
 from ballplate.cli.outputs import UsageError, add_force, add_output
 from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
-from ballplate.cli.telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.results.campaign_tests import EstimatedSigma
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.map_of_fit import data_of, maps_known
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.objects import Volume
@@ -20,7 +20,7 @@ from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
 from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
-from ballplate.simulator.readings.same_readings import (
+from ballplate.simulator.readings.readings_in_common import (
     position_fingerprints,
     same_positions,
     same_readings,

@@ -43,7 +43,7 @@ def add_options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Convert a map; 1 if the new model cannot follow the old one."""
     from ballplate.cli.common import fitted_map, show
-    from ballplate.cli.telling import complain
+    from ballplate.cli.notes import complain
     from ballplate.simulator.experiment.map_files import write_map
 
     from .converted_map import convert

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.cli.common import FITTED, add_json, coverage_factor, fitted_map, show
+from ballplate.cli.notes import warn
 from ballplate.cli.outputs import (
     UsageError,
     Writer,
@@ -15,7 +16,6 @@ from ballplate.cli.outputs import (
     text_writer,
     write,
 )
-from ballplate.cli.telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.design.objects import Tasks
@@ -139,7 +139,7 @@ def run(options: Namespace) -> int:
 
 def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
-    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.loading import load
 
     from .wanted_lengths import between_listed, between_named, tasks_of_experiment
 

@@ -16,8 +16,8 @@ from ballplate.cli.common import (
     print_lines,
     write_picture,
 )
+from ballplate.cli.notes import complain
 from ballplate.cli.outputs import UsageError, Writer, add_force
-from ballplate.cli.telling import complain
 
 if TYPE_CHECKING:
     from .error_curves_result import ErrorCurves

@@ -102,7 +102,7 @@ def _grid(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Compare, write and print; 1 with --fail if a change is shown."""
-    from ballplate.cli.telling import complain
+    from ballplate.cli.notes import complain
     from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
 
     from .comparison import ComparisonSettings, NotComparableError

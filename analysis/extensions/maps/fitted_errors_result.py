@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.presentation.formatting import as_data
 from ballplate.presentation.result import Result
-from ballplate.presentation.scene import box_edges, projection
+from ballplate.presentation.scenes import box_edges, projection
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.results.adjustments import few_degrees_of_freedom
 from ballplate.results.map_of_fit import left_out_words

@@ -30,7 +30,7 @@ from ballplate.simulator.inputs.yamltree import GivenText
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.simulator.machines.protocol import Array
     from ballplate.simulator.maps.fitted_map import FittedMap
 

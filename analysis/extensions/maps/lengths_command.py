@@ -95,7 +95,7 @@ def _grid(text: str) -> tuple[int, ...]:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
 
     from .length_map import length_map, length_settings, pair_csv
     from .length_tables import point_csv

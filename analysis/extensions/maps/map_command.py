@@ -157,7 +157,7 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
-    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.loading import load
 
     from .any_map import map_errors
     from .fitted_errors_result import FittedErrorMap

@@ -18,7 +18,7 @@ from ballplate.results.campaign_tests import TOO_ALIKE, TOO_RARE
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
 from ballplate.simulator.maps.fitted_map import InCommon
-from ballplate.simulator.readings.same_readings import read_once_words
+from ballplate.simulator.readings.readings_in_common import read_once_words
 
 from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
 from .comparison import MapComparison

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.results.campaign_tests import orthonormal
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.functions import BallPlaces, displacements
 from ballplate.simulator.geometry.motions import AXIS_NAMES, fit_motion
 from ballplate.simulator.machines.protocol import Array, Integers

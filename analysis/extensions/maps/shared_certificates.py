@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, Observations
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates

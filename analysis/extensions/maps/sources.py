@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.results.fit import Fit
-from ballplate.results.fit_of_file import fit_of_file, kind_of_file
+from ballplate.results.fit_files import fit_of_file, kind_of_file
+from ballplate.results.fits import Fit
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import read_map
 from ballplate.simulator.inputs.quantities import LengthFunction

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from ballplate.presentation.formatting import SHOWN, number
 from ballplate.presentation.pictures import draw_box
-from ballplate.presentation.scene import box, projection
+from ballplate.presentation.scenes import box, projection
 from ballplate.presentation.svg import (
     DASHES,
     INK,

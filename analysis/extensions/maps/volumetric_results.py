@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import as_data
 from ballplate.presentation.result import Result
-from ballplate.presentation.scene import box_edges, projection
+from ballplate.presentation.scenes import box_edges, projection
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import Message

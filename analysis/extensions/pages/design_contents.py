@@ -13,7 +13,7 @@ from ballplate.planning.checked_files import Wanted, checked_design
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.load import with_pool
+from ballplate.simulator.experiment.loading import with_pool
 from ballplate.simulator.experiment.model import Experiment
 
 from .motions import null_motions, weak_motions

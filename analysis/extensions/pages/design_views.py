@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from ballplate.presentation.scene import MOST_BALLS, box_edges, hull, names_fit, projection
+from ballplate.presentation.scenes import MOST_BALLS, box_edges, hull, names_fit, projection
 from ballplate.presentation.svg import round_number
 from ballplate.simulator.design.arrays import Design, locations, nominal_state
 from ballplate.simulator.estimation.corrections import correction_rows

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.presentation.scene import box_edges, projection
+from ballplate.presentation.scenes import box_edges, projection
 from ballplate.results.estimates import ParameterEstimate, labels
 from ballplate.results.residuals import reading_residuals
 from ballplate.simulator.design.arrays import measured

@@ -19,7 +19,7 @@ from ballplate.simulator.inputs.arguments import (
 from ballplate.simulator.inputs.extensions import function, optional_service
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
 
     from .embedded import View
@@ -38,7 +38,7 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
     >>> bp.view(bp.run(bp.quickstart()))
     <View of quickstart: positions, points, balls of plate>
     """
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
 
     if isinstance(given, Fit | Prediction):
@@ -76,7 +76,7 @@ def page(
     '<!DOCTYPE html>'
     """
     from ballplate.presentation.files import write_file
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
     from ballplate.results.study import predict
 

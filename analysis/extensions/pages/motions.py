@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.rank.verdict import null_changes, weak_changes
+from ballplate.rank.verdicts import null_changes, weak_changes
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Readings
 from ballplate.simulator.estimation.corrections import correction_rows

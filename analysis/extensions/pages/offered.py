@@ -11,7 +11,7 @@ from .embedded import View
 from .views import judged_pictures, position_picture, residual_pictures
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ballplate.extensions.maps.length_groups import target_words
-from ballplate.gross_errors.leftover import too_many_entries
+from ballplate.gross_errors.remainders import too_many_entries
 from ballplate.presentation.formatting import uncertainty_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.model import Experiment

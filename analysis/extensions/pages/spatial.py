@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.scene import RISE, TURN, projection
+from ballplate.presentation.scenes import RISE, TURN, projection
 from ballplate.simulator.machines.protocol import Array
 
 from .document import shipped

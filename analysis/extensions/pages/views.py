@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from ballplate.presentation.scene import box_edges, projection
-from ballplate.rank.verdict import Direction, Verdict
+from ballplate.presentation.scenes import box_edges, projection
+from ballplate.rank.verdicts import Direction, Verdict
 from ballplate.results.residuals import reading_residuals
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, measured

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.gross_errors.leftover import columns_of_balls
-from ballplate.gross_errors.patterns import Patterns
+from ballplate.gross_errors.bias_patterns import Patterns
+from ballplate.gross_errors.remainders import columns_of_balls
 from ballplate.simulator.computing.rounding import first_largest_of_columns
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.readings import offset_sensitivity

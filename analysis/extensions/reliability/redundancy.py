@@ -8,10 +8,10 @@ import math
 from typing import Literal
 
 import numpy as np
+from ballplate.gross_errors.bias_patterns import patterns
 from ballplate.gross_errors.cause_search import FAMILY
 from ballplate.gross_errors.events import event_groups
-from ballplate.gross_errors.leftover import Columns, leftover, too_many_entries
-from ballplate.gross_errors.patterns import patterns
+from ballplate.gross_errors.remainders import Columns, leftover, too_many_entries
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded

@@ -66,7 +66,7 @@ def _share(text: str) -> float:
 def run(options: Namespace) -> int:
     """Tell the reliability of all experiments of the files."""
     from ballplate.cli.common import experiments, print_json, print_lines
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
 
     from .redundancy import reliability
     from .reliability_result import write_observations

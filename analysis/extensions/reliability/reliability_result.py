@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
+from ballplate.gross_errors.bias_patterns import DRIFTS, Patterns, single_kinds
 from ballplate.gross_errors.names import name
-from ballplate.gross_errors.patterns import DRIFTS, Patterns, single_kinds
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,

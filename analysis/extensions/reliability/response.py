@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.gross_errors.leftover import columns_of_balls
-from ballplate.gross_errors.patterns import Patterns
+from ballplate.gross_errors.bias_patterns import Patterns
+from ballplate.gross_errors.remainders import columns_of_balls
 from ballplate.simulator.estimation.hat import hat_rows
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers

@@ -30,7 +30,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     True
     """
     from ballplate.results import study
-    from ballplate.simulator.experiment.load import with_pool
+    from ballplate.simulator.experiment.loading import with_pool
 
     from .mending import mended, to_write
     from .repair_search import repairs

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.rank.verdict import effects, weak_limit
+from ballplate.rank.verdicts import effects, weak_limit
 from ballplate.simulator.computing.rounding import above, comparable
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out

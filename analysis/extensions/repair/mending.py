@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ballplate.rank.verdict import Verdict
+from ballplate.rank.verdicts import Verdict
 from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import place_of
 from ballplate.simulator.inputs.messages import Steps, format_path

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ballplate.cli.notes import note
 from ballplate.cli.outputs import check_overwritten, write_outputs
-from ballplate.cli.telling import note
 from ballplate.planning.checked_files import (
     CheckedDesign,
     CheckedFile,

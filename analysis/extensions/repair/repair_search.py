@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from ballplate.rank.verdict import independent_mixture
+from ballplate.rank.verdicts import independent_mixture
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import predict
 from ballplate.simulator.computing.rounding import comparable

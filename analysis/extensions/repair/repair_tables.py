@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import finite, number
 from ballplate.rank.proposed_bars import listed
-from ballplate.rank.verdict import Verdict, changed_names, length
+from ballplate.rank.verdicts import Verdict, changed_names, length
 from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
 
 from .changes import KINDS

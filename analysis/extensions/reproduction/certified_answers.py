@@ -9,7 +9,7 @@ from ballplate.presentation.formatting import as_data, picked
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.readings.reading_files import read_readings
 from ballplate.uncertainty.summaries import Quantity
 

@@ -40,7 +40,7 @@ def reproduce(
     >>> bp.reproduce("npl", "6.1.2").is_right
     True
     """
-    from ballplate.montecarlo.trials import MOST_TRIALS
+    from ballplate.montecarlo.trial_runs import MOST_TRIALS
 
     from .reproduction_result import reproduce_npl
     from .score_result import score_certified

@@ -76,7 +76,7 @@ def run(options: Namespace) -> int:
     an answer to a certified problem is wrong or missing.
     """
     from ballplate.cli.common import print_json, print_lines
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
 
     from .reproduction_result import ReproducedDocument, reproduce_npl
     from .score_result import CertifiedScores, score_certified

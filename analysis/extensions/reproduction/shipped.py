@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import fit, predict
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.settings import hint

@@ -53,7 +53,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
 
     from .goals import GoalError, parse_goal

@@ -11,7 +11,7 @@ import numpy as np
 from ballplate.presentation.result import Result
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.splines.pieces import Powers
+from ballplate.simulator.splines.polynomial_pieces import Powers
 from ballplate.simulator.splines.spline_problems import SplineError
 
 from .compensated_points import CompensatedPoints, compensated_points, nominal_points

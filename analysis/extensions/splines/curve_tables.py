@@ -20,7 +20,7 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.splines.constraints import Constraint
-from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
+from ballplate.simulator.splines.polynomial_pieces import Pieces, Powers, pieces
 from ballplate.simulator.splines.space import Side
 
 from .error_curve import ErrorCurve

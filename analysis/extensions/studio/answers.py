@@ -16,9 +16,9 @@ from ballplate.extensions.pages.motions import (
 )
 from ballplate.extensions.repair.written import plane_of
 from ballplate.presentation.formatting import finite
-from ballplate.rank.verdict import Verdict, verdict
-from ballplate.results.parts import scale_lines, scale_warnings, target_lines
+from ballplate.rank.verdicts import Verdict, verdict
 from ballplate.results.prediction import length_headline, rank_words
+from ballplate.results.text_blocks import scale_lines, scale_warnings, target_lines
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import locations
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
@@ -28,7 +28,7 @@ from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.uncertainty.error_map import point_map
+from ballplate.uncertainty.error_map_uncertainty import point_map
 from ballplate.uncertainty.scale import scale_of
 from ballplate.uncertainty.summaries import Quantity, uncertainties
 

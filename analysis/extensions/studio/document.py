@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.trust import OPENED, Trust

@@ -56,7 +56,7 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 
 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    from ballplate.planning.campaign import Request, campaign
+    from ballplate.planning.campaign_choice import Request, campaign
 
     experiment = experiment_of(document, planning=True)
     return {"lines": campaign(experiment, Request(), report=report).lines()}

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ballplate.simulator.experiment.load import trees_of
+from ballplate.simulator.experiment.loading import trees_of
 from ballplate.simulator.experiment.modules import runs_code
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import UNKNOWN

@@ -244,6 +244,6 @@ def _stopping(session: Session) -> Callable[[Request, dict[str, Any]], Any]:
 
 
 def _schema() -> Any:
-    from ballplate.simulator.experiment.schema import schema
+    from ballplate.simulator.experiment.json_schema import schema
 
     return schema()

@@ -7,8 +7,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from ballplate.cli.common import add_file, whole
+from ballplate.cli.notes import note
 from ballplate.cli.outputs import Needed, UsageError
-from ballplate.cli.telling import note
 
 if TYPE_CHECKING:
     from .session import Session

@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ballplate.cli.notes import complain
 from ballplate.cli.outputs import PARQUET, UsageError, add_force, add_output, write
-from ballplate.cli.telling import complain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

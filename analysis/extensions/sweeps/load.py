@@ -10,7 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.experiment.load import build
+from ballplate.simulator.experiment.loading import build
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import (
     is_same_place,

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.cli.common import add_workers
+from ballplate.cli.notes import complain
 from ballplate.cli.outputs import UsageError
-from ballplate.cli.telling import complain
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
@@ -99,7 +99,7 @@ def run(options: Namespace) -> int:
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ballplate.cli.progress import progress
+    from ballplate.cli.progress_bars import progress
 
     from .local import ChangedError
     from .running import compute_sweep, enter
@@ -166,7 +166,7 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    from ballplate.cli.progress import duration
+    from ballplate.cli.progress_bars import duration
     from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.inputs.settings import number_of
 

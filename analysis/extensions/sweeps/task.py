@@ -15,9 +15,9 @@ from ballplate.montecarlo.experiments import Trials, block_of_trials, combined, 
 from ballplate.montecarlo.figures import MonteCarloEstimate, MonteCarloOutcome
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import predict
+from ballplate.simulator.computing.library_versions import versions
 from ballplate.simulator.computing.memory import want_of_memory
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.computing.versions import versions
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.unusable import UnusableError

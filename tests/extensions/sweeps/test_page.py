@@ -25,8 +25,8 @@ from ballplate.extensions.sweeps.report.verdicts import ranks
 from ballplate.extensions.sweeps.store import open_store
 from ballplate.results.study import predict
 from ballplate.simulator.computing.steps import unreported
-from ballplate.simulator.experiment.load import load
-from ballplate.uncertainty.error_map import error_map
+from ballplate.simulator.experiment.loading import load
+from ballplate.uncertainty.error_map_uncertainty import error_map
 
 from tests.extensions.sweeps.stores import Page, axis, done, failed, made_up
 

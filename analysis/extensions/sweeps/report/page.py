@@ -16,14 +16,14 @@ import numpy as np
 from ballplate.extensions.pages.document import style
 from ballplate.presentation.formatting import micro, number, percent, uncertainty_words
 from ballplate.presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
-from ballplate.presentation.scene import MOST_BALLS, Scene, scene
+from ballplate.presentation.scenes import MOST_BALLS, Scene, scene
 from ballplate.presentation.table import Block, Entry, Row, Table
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
-from ballplate.uncertainty.error_map import error_map
+from ballplate.uncertainty.error_map_uncertainty import error_map
 from ballplate.uncertainty.quantities import DESCRIPTIONS
 
 from ..columns import symbol_column

@@ -12,9 +12,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
-
-from .quantities import evaluation_points
-from .summaries import point_pairs
+from ballplate.uncertainty.quantities import evaluation_points
+from ballplate.uncertainty.summaries import point_pairs
 
 # Points along x and y of a slice.
 POINTS = 21
