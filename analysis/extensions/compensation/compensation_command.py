@@ -6,14 +6,16 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_json, argument_type, show
-from ballplate.cli.notes import complain
-from ballplate.cli.outputs import (
+from ballplate.cli import (
     Output,
     UsageError,
     add_force,
+    add_json,
     add_output,
+    argument_type,
     check_outputs,
+    complain,
+    show,
     write,
 )
 

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import aligned
-from ballplate.presentation.panels import TriedValues, draw_tried
-from ballplate.presentation.result import Result
+from ballplate.presentation import Result, TriedValues, aligned, draw_tried
 
 from .goals import Goal, Judgement
 from .unknowns import UnknownName

@@ -13,11 +13,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.quantities import QuantityError, exact_number
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.xmltree import Element, parse_xml
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs import (
+    Element,
+    QuantityError,
+    exact_number,
+    parse_xml,
+    refused,
+    shorten,
+)
+from ballplate.simulator.machines import Array
 
 from .report import LOCATED, SPHERE, Feature, Format, Report, ReportProblems, System
 

@@ -14,17 +14,27 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.pages.document import style
-from ballplate.presentation.formatting import micro, number, percent, uncertainty_words
-from ballplate.presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
-from ballplate.presentation.scenes import MOST_BALLS, Scene, scene
-from ballplate.presentation.table import Block, Entry, Row, Table
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.settings import listing
-from ballplate.uncertainty.error_map_uncertainty import error_map
-from ballplate.uncertainty.quantities import DESCRIPTIONS
+from ballplate.presentation import (
+    MOST_BALLS,
+    Block,
+    Entry,
+    Row,
+    Scene,
+    Table,
+    micro,
+    number,
+    percent,
+    probes_svg,
+    scene,
+    scene_svg,
+    slice_svg,
+    slice_words,
+    uncertainty_words,
+)
+from ballplate.simulator.computing import Report, counted, unreported
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.inputs import in_one_line, listing
+from ballplate.uncertainty import DESCRIPTIONS, error_map
 
 from ..columns import symbol_column
 from ..store import Store

@@ -6,8 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.formatting import micro, number
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     DASHES,
     INK,
     MARKERS,
@@ -17,6 +16,8 @@ from ballplate.presentation.svg import (
     as_svg,
     common_legend,
     drawing,
+    micro,
+    number,
     placed_axes,
 )
 
