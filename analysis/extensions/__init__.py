@@ -6,7 +6,7 @@ An extension imports the contract and its own folder; where it builds on another
 
 from __future__ import annotations
 
-from ballplate.simulator.inputs import Extension
+from ballplate.simulator.inputs.extensions import Extension
 
 
 def _here(name: str, **provided: dict[str, str]) -> Extension:

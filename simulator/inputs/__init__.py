@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     )
     from .days import stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
-    from .extensions import Extension, function, optional_service
+    from .extensions import function, optional_service
     from .messages import (
         MORE_ERRORS,
         MOST_MESSAGES,
