@@ -26,6 +26,7 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
+    ("certificates", "laboratory"): "both read XML",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
     ("pages", "reliability"): "pages show how gross errors would act",

@@ -16,10 +16,8 @@ from ballplate.gross_errors import DRIFTS, Patterns, name, single_kinds
 from ballplate.presentation import (
     SHOWN,
     Result,
-    RowOfPoints,
     aligned,
     ascii_units,
-    draw_rows,
     finite,
     number,
     picked,
@@ -34,6 +32,7 @@ from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import QUANTITIES
 
 from .effects import MOST_PLACES, across_probes
+from .rows_picture import RowOfPoints, draw_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
