@@ -30,9 +30,8 @@ if TYPE_CHECKING:
         to_uncertainty,
         uncertainty_words,
     )
-    from .panels import RowOfPoints, TriedValues, draw_rows, draw_tried
     from .paper import escaped, on_paper, pitch
-    from .pictures import draw_box, draw_scene, probes_svg, scene_svg, slice_svg, slice_words
+    from .pictures import draw_box, draw_scene, scene_figure
     from .result import FitResult, Result
     from .scenes import (
         MOST_BALLS,
@@ -56,7 +55,6 @@ if TYPE_CHECKING:
         PAPER,
         SERIES,
         WIDTH,
-        as_svg,
         blank_axes,
         common_legend,
         drawing,
@@ -65,6 +63,7 @@ if TYPE_CHECKING:
         round_number,
         save,
         scale_bar,
+        scaled_axis,
         sticks,
     )
     from .table import Block, Entry, Row, Table

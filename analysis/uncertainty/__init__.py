@@ -8,7 +8,6 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .error_map_uncertainty import error_map, point_map
     from .pairs import PairSummary, PairTile, open_above, pair_tiles, pairs_of, relative
     from .quantities import (
         DESCRIPTIONS,
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
         scale_of,
         stretches,
     )
-    from .summaries import Quantity, summarise, uncertainties
+    from .summaries import Quantity, point_pairs, summarise, uncertainties
     from .tasks import expansion
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -88,7 +88,6 @@ if TYPE_CHECKING:
     from .trust import OPENED, UNKNOWN, Trust
     from .unusable import UnusableError
     from .validation import validated
-    from .xmltree import Element, parse_xml, read_xml
     from .yamltree import (
         LOADER,
         GivenText,

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.extensions.laboratory.xmltree import Element, read_xml
 from ballplate.simulator.inputs import (
     MOST_NAMES,
-    Element,
     ExperimentError,
     Floats,
     Mark,
@@ -27,7 +27,6 @@ from ballplate.simulator.inputs import (
     half_digit,
     matrix_problems,
     metres_or_radians,
-    read_xml,
     shorten,
     unit_of_area,
 )

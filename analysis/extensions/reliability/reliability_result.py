@@ -15,10 +15,8 @@ import numpy as np
 from ballplate.presentation import (
     SHOWN,
     Result,
-    RowOfPoints,
     aligned,
     ascii_units,
-    draw_rows,
     number,
     picked,
     table_lines,
@@ -34,6 +32,7 @@ from ballplate.uncertainty import QUANTITIES
 from .bias_patterns import DRIFTS, Patterns, single_kinds
 from .effects import MOST_PLACES, across_probes
 from .names import name
+from .rows_picture import RowOfPoints, draw_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.presentation import Result, TriedValues, draw_tried, table_lines
+from ballplate.presentation import Result, table_lines
 
 from .goals import Goal, Judgement
+from .tried_values_picture import TriedValues, draw_tried
 from .unknowns import UnknownName
 
 if TYPE_CHECKING:

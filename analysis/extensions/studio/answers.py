@@ -15,6 +15,7 @@ from ballplate.extensions.pages.motions import (
     weak_motions,
 )
 from ballplate.extensions.repair.written import plane_of
+from ballplate.extensions.sweeps.error_map_uncertainty import point_map
 from ballplate.presentation import finite, picked
 from ballplate.rank import Verdict, verdict
 from ballplate.results import length_headline, rank_words, scale_lines, scale_warnings, target_lines
@@ -24,7 +25,7 @@ from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, Position, lay_out
 from ballplate.simulator.geometry import ball_coordinates, even_grid, without_rigid_motion
 from ballplate.simulator.inputs import Target
-from ballplate.uncertainty import Quantity, point_map, scale_of, uncertainties
+from ballplate.uncertainty import Quantity, scale_of, uncertainties
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9

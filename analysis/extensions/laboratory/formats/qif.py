@@ -14,15 +14,14 @@ from fractions import Fraction
 
 import numpy as np
 from ballplate.simulator.inputs import (
-    Element,
     QuantityError,
     exact_number,
-    parse_xml,
     refused,
     shorten,
 )
 from ballplate.simulator.machines import Array
 
+from ..xmltree import Element, parse_xml
 from .report import LOCATED, SPHERE, Feature, Format, Report, ReportProblems, System
 
 NAMESPACE = re.compile(r"http://qifstandards\.org/xsd/qif[0-9]*")

@@ -24,22 +24,20 @@ from ballplate.presentation import (
     micro,
     number,
     percent,
-    probes_svg,
     scene,
-    scene_svg,
-    slice_svg,
-    slice_words,
     uncertainty_words,
 )
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.inputs import in_one_line, listing
-from ballplate.uncertainty import DESCRIPTIONS, error_map
+from ballplate.uncertainty import DESCRIPTIONS
 
 from ..columns import symbol_column
+from ..error_map_uncertainty import error_map
 from ..store import Store
 from .answer import answer
 from .cells import NoExperimentError, experiments
+from .design_pictures import probes_svg, scene_svg, slice_svg, slice_words
 from .heatmaps import heat_maps
 from .plots import plot_svg
 from .results import ReportedSweep, best_and_worst, cell_list, criterion

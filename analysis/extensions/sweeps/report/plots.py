@@ -13,7 +13,6 @@ from ballplate.presentation import (
     PAPER,
     SERIES,
     WIDTH,
-    as_svg,
     common_legend,
     drawing,
     micro,
@@ -21,6 +20,7 @@ from ballplate.presentation import (
     placed_axes,
 )
 
+from .design_pictures import as_svg
 from .series import Panel, Plot, SeriesLine
 
 if TYPE_CHECKING:
