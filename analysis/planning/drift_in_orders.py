@@ -29,7 +29,7 @@ from ballplate.simulator.inputs.quantities import (
 )
 from ballplate.simulator.machines.protocol import Array
 
-from ..uncertainty.quantities import evaluation_points
+from ..uncertainty.kernel_quantities import evaluation_points
 from .orders import OrderName
 from .schedule import RunSheet
 from .short_names import with_names

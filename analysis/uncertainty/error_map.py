@@ -13,7 +13,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 
-from .quantities import evaluation_points
+from .kernel_quantities import evaluation_points
 from .summaries import point_pairs
 
 # Points along x and y of a slice.

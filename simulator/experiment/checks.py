@@ -381,7 +381,7 @@ def check_use(
                 [
                     one.kind
                     for one in sections.entries("calibration").values()
-                    if one.artefact in (name, None)
+                    if getattr(one, "artefact", "") in (name, None)
                 ]
                 if calibration_count
                 else []
@@ -404,8 +404,9 @@ def check_calibration_read(
     """Report calibrated balls of a length standard that no position reads; of plates, all are
     reported.
     """
-    is_standard = references.artefacts[calibration.artefact].role == "length_standard"
-    if not isinstance(calibration, DistanceCalibration) or not is_standard:
+    if not isinstance(calibration, DistanceCalibration):
+        return
+    if references.artefacts[calibration.artefact].role != "length_standard":
         return
     if len(positions) < position_count:
         return

@@ -24,7 +24,7 @@ from ballplate.simulator.estimation.linearisation import LinearFunctions, Linear
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.uncertainty.quantities import evaluation_points, task_distances
+from ballplate.uncertainty.kernel_quantities import evaluation_points, task_distances
 from ballplate.uncertainty.tasks import expansion
 
 from .source_sums import SourceSums, source_sums, sources_of
